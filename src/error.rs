@@ -1,0 +1,46 @@
+//! The library's one error type: what went wrong, in which file or object, and what to do about it.
+use std::path::{Path, PathBuf};
+
+/// Result of everything in the library that can fail.
+pub type Result<T, E = Error> = std::result::Result<T, E>;
+
+/// Why the library could not do as asked.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// A file or a value given by the user cannot be used.
+    #[error("{subject}: {problem}; {remedy}")]
+    Input {
+        /// File name, flag or key that the problem is in.
+        subject: String,
+        /// What is wrong, in half a sentence.
+        problem: String,
+        /// What the user can do about it, in half a sentence.
+        remedy: String,
+    },
+    /// The user, or the program on the user's behalf, stopped a long computation.
+    #[error("cancelled")]
+    Cancelled,
+}
+
+impl Error {
+    /// An [`Error::Input`] about the file at `path`.
+    pub fn in_file(path: &Path, problem: impl ToString, remedy: impl ToString) -> Self {
+        Self::input(path.display(), problem, remedy)
+    }
+
+    /// An [`Error::Input`] about `subject`: a flag, a key, a name.
+    pub fn input(subject: impl ToString, problem: impl ToString, remedy: impl ToString) -> Self {
+        Self::Input { subject: subject.to_string(), problem: problem.to_string(), remedy: remedy.to_string() }
+    }
+
+    /// An [`Error::Input`] for a file that cannot be opened or read.
+    pub fn unreadable(path: &Path, cause: std::io::Error) -> Self {
+        Self::in_file(path, format!("cannot be read ({cause})"), "check the name and its permissions")
+    }
+
+    /// An [`Error::Input`] for a file that cannot be written.
+    pub fn unwritable(path: impl Into<PathBuf>, cause: impl std::fmt::Display) -> Self {
+        let path = path.into();
+        Self::in_file(&path, format!("cannot be written ({cause})"), "choose a folder that exists and may be written to")
+    }
+}
