@@ -1,1 +1,143 @@
-fn main() {}
+//! Compiles every shader in `glsl/` to SPIR-V with shaderc and writes one typed table of them.
+//!
+//! By default the compiler is shaderc's command line, `glslc` (Debian and Ubuntu have a package of that name; the
+//! environment variable GLSLC names another). With the feature `shaderc-from-source` it is the shaderc crate.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::{env, fs};
+
+/// Names of the BRDF models, in the order of their ids.
+macro_rules! brdf_models {
+    ($($name:ident => $model:ident),* $(,)?) => { const BRDF_MODELS: &[&str] = &[$(stringify!($name)),*]; };
+}
+include!("src/brdf/models.rs");
+
+fn main() {
+    println!("cargo:rerun-if-changed=glsl");
+    println!("cargo:rerun-if-changed=src/brdf/models.rs");
+    println!("cargo:rerun-if-env-changed=GLSLC");
+    let out = PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets OUT_DIR"));
+    let glsl = Path::new("glsl");
+
+    let generated = out.join("glsl");
+    write(&generated.join("brdf_models.glsl"), &brdf_switch());
+
+    let mut table = String::new();
+    for source in files(glsl) {
+        let (stem, extension) = (text(source.file_stem()), text(source.extension()));
+        let stage = match extension.as_str() {
+            "vert" => "Vertex",
+            "frag" => "Fragment",
+            "comp" => "Compute",
+            _ => continue,
+        };
+        if fs::read_to_string(&source).expect("a readable shader").contains("#include \"method.glsl\"") {
+            // One variant for each shading method: method.glsl stands for its file.
+            for method in files(&glsl.join("methods")) {
+                let method = text(method.file_stem());
+                let folder = out.join(format!("method_{method}"));
+                write(&folder.join("method.glsl"), &format!("#include \"methods/{method}.glsl\"\n"));
+                compile(&mut table, &source, &format!("{stem}_{method}"), stage, &[glsl, &generated, &folder], &out);
+            }
+        } else {
+            let name = if stage == "Compute" { stem } else { format!("{stem}_{extension}") };
+            compile(&mut table, &source, &name, stage, &[glsl, &generated], &out);
+        }
+    }
+    write(&out.join("shaders.rs"), &table);
+}
+
+/// GLSL that includes every model and picks one by its id; models that no material of a scene uses are compiled out.
+fn brdf_switch() -> String {
+    let mut glsl = String::from("// Generated from src/brdf/models.rs.\n");
+    for name in BRDF_MODELS {
+        let _ = writeln!(glsl, "#include \"brdf/{name}.glsl\"");
+    }
+    glsl += "layout(constant_id = 1) const uint MODELS_USED = 0xffffffffu; // bit i: some material has model i\n";
+    glsl += "vec3 brdf(Material material, vec3 w_i, vec3 w_o) {\n";
+    for (id, name) in BRDF_MODELS.iter().enumerate() {
+        let bit = 1_u32 << id;
+        let _ = writeln!(
+            glsl,
+            "    if ((MODELS_USED & {bit}u) != 0u && material.model == {id}u) return {name}(material.parameters, w_i, w_o);"
+        );
+    }
+    glsl + "    return vec3(0.0);\n}\n"
+}
+
+/// Compiles one shader and adds its line to the table.
+fn compile(table: &mut String, source: &Path, name: &str, stage: &str, includes: &[&Path], out: &Path) {
+    let spirv = out.join(format!("{name}.spv"));
+    to_spirv(source, &spirv, includes);
+    let constant = name.to_uppercase();
+    let spirv = spirv.display();
+    let _ = writeln!(
+        table,
+        "/// `{}`.\npub const {constant}: Shader = Shader {{ name: {name:?}, stage: Stage::{stage}, spirv: include_bytes!({:?}) }};",
+        source.display(),
+        spirv.to_string(),
+    );
+}
+
+#[cfg(not(feature = "shaderc-from-source"))]
+fn to_spirv(source: &Path, spirv: &Path, includes: &[&Path]) {
+    let compiler = env::var_os("GLSLC").unwrap_or_else(|| "glslc".into());
+    let mut command = std::process::Command::new(&compiler);
+    command.args(["--target-env=vulkan1.2", "-Werror", "-o"]).arg(spirv).arg(source);
+    for folder in includes {
+        command.arg("-I").arg(folder);
+    }
+    let output = command.output().unwrap_or_else(|cause| {
+        panic!(
+            "{compiler:?} cannot be run ({cause}): install glslc (Debian 12, Ubuntu 24.04: apt-get install glslc; elsewhere the Vulkan SDK), or build with --features shaderc-from-source"
+        )
+    });
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+}
+
+#[cfg(feature = "shaderc-from-source")]
+fn to_spirv(source: &Path, spirv: &Path, includes: &[&Path]) {
+    let kind = match text(source.extension()).as_str() {
+        "vert" => shaderc::ShaderKind::Vertex,
+        "frag" => shaderc::ShaderKind::Fragment,
+        _ => shaderc::ShaderKind::Compute,
+    };
+    let mut options = shaderc::CompileOptions::new().expect("shaderc options");
+    options.set_target_env(shaderc::TargetEnv::Vulkan, shaderc::EnvVersion::Vulkan1_2 as u32);
+    options.set_warnings_as_errors();
+    options.set_include_callback(|name, _, _, _| {
+        let found = includes.iter().map(|folder| folder.join(name)).find(|file| file.is_file());
+        let file = found.ok_or_else(|| format!("{name} is in none of {includes:?}"))?;
+        let content = fs::read_to_string(&file).map_err(|cause| cause.to_string())?;
+        Ok(shaderc::ResolvedInclude { resolved_name: file.display().to_string(), content })
+    });
+    let compiler = shaderc::Compiler::new().expect("a shaderc compiler");
+    let code = fs::read_to_string(source).expect("a readable shader");
+    match compiler.compile_into_spirv(&code, kind, &source.display().to_string(), "main", Some(&options)) {
+        Ok(artifact) => fs::write(spirv, artifact.as_binary_u8()).expect("a writable OUT_DIR"),
+        Err(cause) => panic!("{cause}"),
+    }
+}
+
+/// The files of a folder in a fixed order.
+fn files(folder: &Path) -> Vec<PathBuf> {
+    let entries = fs::read_dir(folder).unwrap_or_else(|cause| panic!("{}: {cause}", folder.display()));
+    let mut files: Vec<_> = entries.map(|entry| entry.expect("a readable folder").path()).collect();
+    files.retain(|path| path.is_file());
+    files.sort();
+    files
+}
+
+/// Writes a generated file, only when it changes, so that what depends on it is not rebuilt for nothing.
+fn write(path: &Path, contents: &str) {
+    if fs::read_to_string(path).is_ok_and(|old| old == contents) {
+        return;
+    }
+    fs::create_dir_all(path.parent().expect("generated files have a folder")).expect("a writable OUT_DIR");
+    fs::write(path, contents).expect("a writable OUT_DIR");
+}
+
+fn text(part: Option<&std::ffi::OsStr>) -> String {
+    part.unwrap_or_default().to_string_lossy().into_owned()
+}

@@ -17,6 +17,9 @@ pub enum Error {
         /// What the user can do about it, in half a sentence.
         remedy: String,
     },
+    /// Vulkan refused something.
+    #[error(transparent)]
+    Vulkan(#[from] crate::vulkan::VulkanError),
     /// The user, or the program on the user's behalf, stopped a long computation.
     #[error("cancelled")]
     Cancelled,

@@ -1,1 +1,32 @@
-//! placeholder
+//! The Vulkan layer: everything that touches a raw handle, and the only place where `unsafe` is allowed.
+//!
+//! Nothing here knows of BRDFs, threads or environments. Lifetimes are handled once: every object holds its
+//! [`Device`], and dropping one hands its handles to the device's deletion queue, which destroys them when
+//! the GPU has finished the last submission made before the drop. So no caller ever has to wait before dropping.
+//!
+//! ```text
+//! instance  loader, validation messages          shader    SPIR-V and what it declares (reflection)
+//! device    choice, queue, submissions, deletion  pipeline  layouts from reflection, cache on disk
+//! memory    buffers, images, samplers, upload     commands  one recorded pass after another
+//!                                                 frames    frames in flight, timestamps
+//! ```
+
+mod commands;
+mod device;
+mod error;
+mod frames;
+mod instance;
+mod memory;
+mod pipeline;
+mod shader;
+
+pub use commands::{Bindings, ColorTarget, Commands, DepthTarget, Groups};
+pub use device::{Device, DeviceDescription, DeviceKind, describe_devices};
+pub use error::VulkanError;
+pub use frames::{Frames, PassTime};
+pub use instance::{Instance, Messages};
+pub use memory::{Buffer, BufferUse, Image, ImageShape, Memory, Sampler, SamplerKind};
+pub use pipeline::{ComputePipeline, GraphicsPipeline, GraphicsState, PipelineCache};
+pub use shader::{Shader, Stage, compiled};
+
+pub(crate) type Result<T> = std::result::Result<T, VulkanError>;

@@ -1,0 +1,98 @@
+#version 450
+// Sorts pixels into interior, edge and background, and lists those that have to be shaded.
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_samplerless_texture_functions : require
+#include "packing.glsl"
+#include "tiles.glsl"
+
+layout(local_size_x = 8, local_size_y = 8) in;
+
+layout(constant_id = 0) const uint SUBPIXELS = 2; // per axis
+
+layout(set = 0, binding = 0) uniform utexture2D geometry;
+layout(set = 0, binding = 1, std430) buffer Counters {
+    PixelClass classes[2];
+    uint covered_subpixels;
+    uint covered_edge_subpixels;
+} counters;
+// Interior pixels from the front, edge pixels from the back.
+layout(set = 0, binding = 2, std430) writeonly buffer PixelList {
+    uint pixels[];
+} pixel_list;
+layout(set = 0, binding = 3, rgba32f) uniform writeonly image2D radiance;
+
+layout(push_constant) uniform Push {
+    uvec2 size_px;
+    // Sub-pixels whose normals lie within this angle of the first one's count as one smooth surface.
+    float cos_smooth;
+} push;
+
+shared uint listed[2];
+shared uint first[2];
+shared uint covered_total;
+shared uint covered_edge_total;
+
+void main() {
+    if (gl_LocalInvocationIndex == 0) {
+        listed[INTERIOR] = 0;
+        listed[EDGE] = 0;
+        covered_total = 0;
+        covered_edge_total = 0;
+    }
+    barrier();
+
+    uvec2 pixel = gl_GlobalInvocationID.xy;
+    bool inside = all(lessThan(pixel, push.size_px));
+    uint covered = 0;
+    bool smooth_surface = true;
+    if (inside) {
+        uvec2 reference = uvec2(0);
+        vec3 reference_normal = vec3(0.0);
+        for (uint j = 0; j < SUBPIXELS * SUBPIXELS; ++j) {
+            uvec2 texel = texelFetch(geometry, ivec2(pixel * SUBPIXELS + uvec2(j % SUBPIXELS, j / SUBPIXELS)), 0).xy;
+            if (!is_covered(texel)) {
+                continue;
+            }
+            vec3 normal = geometry_normal(texel);
+            if (covered++ == 0) {
+                reference = texel;
+                reference_normal = normal;
+            }
+            smooth_surface = smooth_surface && texel.y == reference.y && dot(normal, reference_normal) >= push.cos_smooth;
+        }
+        if (covered == 0) {
+            imageStore(radiance, ivec2(pixel), vec4(0.0));
+        }
+    }
+    uint kind = smooth_surface && covered == SUBPIXELS * SUBPIXELS ? INTERIOR : EDGE;
+    uint place = 0;
+    if (covered > 0) {
+        place = atomicAdd(listed[kind], 1);
+        atomicAdd(covered_total, covered);
+        if (kind == EDGE) {
+            atomicAdd(covered_edge_total, covered);
+        }
+    }
+    barrier();
+
+    // One addition to each global counter a workgroup, and the pixels of a tile stay neighbours in the list.
+    if (gl_LocalInvocationIndex < 2 && listed[gl_LocalInvocationIndex] > 0) {
+        uint k = gl_LocalInvocationIndex;
+        first[k] = atomicAdd(counters.classes[k].count, listed[k]);
+        uint groups = (first[k] + listed[k] + SHADE_GROUP_SIZE - 1) / SHADE_GROUP_SIZE;
+        atomicMax(counters.classes[k].groups_x, min(groups, MAX_GROUPS));
+        atomicMax(counters.classes[k].groups_y, 1);
+        atomicMax(counters.classes[k].groups_z, 1);
+    }
+    if (gl_LocalInvocationIndex == 0 && covered_total > 0) {
+        atomicAdd(counters.covered_subpixels, covered_total);
+        atomicAdd(counters.covered_edge_subpixels, covered_edge_total);
+    }
+    barrier();
+
+    if (covered > 0) {
+        uint index = first[kind] + place;
+        uint last = push.size_px.x * push.size_px.y - 1;
+        pixel_list.pixels[kind == INTERIOR ? index : last - index] = pixel.x | pixel.y << 16;
+    }
+}

@@ -1,0 +1,29 @@
+#version 450
+// Pass 1 of the paper (section 4.1): the normal and material of every sub-pixel.
+#extension GL_GOOGLE_include_directive : require
+#include "geometry_cache.glsl"
+#include "packing.glsl"
+
+layout(location = 0) in vec3 eye_position;
+layout(location = 1) in vec3 world_normal;
+
+layout(location = 0) out uvec2 geometry;
+
+void main() {
+    // The triangle's own normal, turned to the eye: tells which side is seen, whatever the winding.
+    vec3 facet_normal = cross(dFdx(eye_position), dFdy(eye_position));
+    if (dot(facet_normal, eye_position) > 0.0) {
+        facet_normal = -facet_normal;
+    }
+    vec3 normal = world_normal;
+    // Interpolated normals that cancel out leave nothing to normalise: the facet's normal stands in. 1e-20 is far
+    // below any sum of unit vectors that is not a cancellation, and its square root is still a normal float.
+    if (dot(normal, normal) < 1e-20) {
+        normal = facet_normal;
+    }
+    // Both sides of a surface shade alike.
+    if (dot(normal, facet_normal) < 0.0) {
+        normal = -normal;
+    }
+    geometry = pack_geometry(normalize(normal), object.material);
+}

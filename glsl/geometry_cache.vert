@@ -1,0 +1,21 @@
+#version 450
+// Pass 1 of the paper (section 4.1): where the surface is.
+#extension GL_GOOGLE_include_directive : require
+#include "geometry_cache.glsl"
+
+layout(location = 0) in vec3 position;
+layout(location = 1) in vec3 normal;
+
+layout(location = 0) out vec3 eye_position;
+layout(location = 1) out vec3 world_normal;
+
+void main() {
+    vec3 from_eye = (object.to_eye * vec4(position, 1.0)).xyz;
+    eye_position = from_eye;
+    // Cofactors of the linear part: the normal matrix up to scale, right for mirrored and sheared objects too.
+    mat3 linear_part = mat3(object.to_eye);
+    mat3 cofactors = mat3(cross(linear_part[1], linear_part[2]), cross(linear_part[2], linear_part[0]),
+                          cross(linear_part[0], linear_part[1]));
+    world_normal = cofactors * normal;
+    gl_Position = project(from_eye);
+}

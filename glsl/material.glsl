@@ -1,0 +1,21 @@
+// Materials as the GPU holds them. Twin of the layout: src/passes/shade.rs.
+#include "brdf/parameters.glsl"
+
+struct Material {
+    BrdfParameters parameters;
+    uint model;        // position in src/brdf/models.rs
+    uint first_thread; // where its threads start in the thread buffer
+    uint thread_count;
+    uint row_count;
+};
+
+layout(set = 0, binding = 5, std430) readonly buffer Materials {
+    Material materials[];
+};
+
+layout(set = 0, binding = 6) uniform sampler3D brdf_tables;
+
+// Texel (phi_d, theta_d, theta_h) of the atlas of BRDF tables, between texel centres trilinearly.
+vec4 brdf_table_texel(vec3 texel_coordinate) {
+    return textureLod(brdf_tables, texel_coordinate / vec3(textureSize(brdf_tables, 0)), 0.0);
+}

@@ -1,0 +1,74 @@
+#version 450
+// Pass 2 of the paper (section 4.2): each sub-pixel evaluates its partition of the threads, the pixel is their sum.
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_samplerless_texture_functions : require
+#include "camera.glsl"
+#include "packing.glsl"
+#include "surface.glsl"
+#include "tiles.glsl"
+
+layout(local_size_x = 64) in;
+
+layout(constant_id = 0) const uint SUBPIXELS = 2; // per axis
+
+layout(set = 0, binding = 0) uniform utexture2D geometry;
+layout(set = 0, binding = 1, std430) readonly buffer Counters {
+    PixelClass classes[2];
+} counters;
+layout(set = 0, binding = 2, std430) readonly buffer PixelList {
+    uint pixels[];
+} pixel_list;
+layout(set = 0, binding = 3, rgba32f) uniform writeonly image2D radiance;
+
+layout(push_constant) uniform Push {
+    Camera camera;
+    uvec2 size_px;
+    uint kind;              // which class of pixels
+    float face_size;        // of level 0 of the environment pyramid
+    vec2 rotation;          // cosine and sine of the environment's rotation about +Y
+    float radiance_scale;   // radiance of a texel of value 1
+} push;
+
+#include "environment.glsl"
+#include "material.glsl"
+#include "brdf_models.glsl"
+
+// A method gives the sum over threads first, first + stride, ... of weight times environment: a partition of
+// the radiance that leaves `surface` towards the eye.
+#include "method.glsl"
+
+// World to environment coordinates: the environment is turned by the rotation, so directions are turned back.
+vec3 to_environment(vec3 d) {
+    return vec3(push.rotation.x * d.x - push.rotation.y * d.z, d.y, push.rotation.y * d.x + push.rotation.x * d.z);
+}
+
+void main() {
+    const uint subpixel_count = SUBPIXELS * SUBPIXELS;
+    uint count = counters.classes[push.kind].count;
+    uint last = push.size_px.x * push.size_px.y - 1;
+    bool interior = push.kind == INTERIOR;
+    for (uint index = gl_GlobalInvocationID.x; index < count; index += SHADE_GROUP_SIZE * gl_NumWorkGroups.x) {
+        uint packed = pixel_list.pixels[interior ? index : last - index];
+        uvec2 pixel = uvec2(packed & 0xffffu, packed >> 16);
+        vec3 sum = vec3(0.0);
+        uint covered = 0;
+        for (uint j = 0; j < subpixel_count; ++j) {
+            uvec2 subpixel = pixel * SUBPIXELS + uvec2(j % SUBPIXELS, j / SUBPIXELS);
+            uvec2 texel = texelFetch(geometry, ivec2(subpixel), 0).xy;
+            if (!is_covered(texel)) {
+                continue;
+            }
+            ++covered;
+            vec2 position = (vec2(subpixel) + 0.5) / vec2(push.size_px * SUBPIXELS);
+            vec3 w_o = -normalize(camera_ray(push.camera, position));
+            Surface surface = make_surface(to_environment(geometry_normal(texel)), to_environment(w_o));
+            Material material = materials[geometry_material(texel)];
+            sum += interior ? estimate(surface, material, j, subpixel_count) : estimate(surface, material, 0, 1);
+        }
+        if (!interior) {
+            sum /= float(subpixel_count);
+        }
+        float coverage = float(covered) / float(subpixel_count);
+        imageStore(radiance, ivec2(pixel), vec4(sum * push.radiance_scale, coverage));
+    }
+}

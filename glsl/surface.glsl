@@ -1,0 +1,29 @@
+// A point to shade: its shading frame and view angle. Twin: Surface in src/shading.rs.
+
+struct Surface {
+    // Columns: x, the part of w_o orthogonal to n; y = z cross x; z = n. In the environment's coordinates.
+    mat3 frame;
+    // Angle between the normal and w_o, held below the horizon's side by the shading method.
+    float theta_o;
+};
+
+// An axis orthogonal to n, for where w_o gives none (Duff et al. 2017).
+vec3 any_tangent(vec3 n) {
+    float s = n.z >= 0.0 ? 1.0 : -1.0;
+    float a = -1.0 / (s + n.z);
+    return vec3(1.0 + s * n.x * n.x * a, s * n.x * n.y * a, -s * n.x);
+}
+
+// n and w_o are unit vectors.
+Surface make_surface(vec3 n, vec3 w_o) {
+    float cos_theta_o = dot(n, w_o);
+    vec3 across = w_o - cos_theta_o * n;
+    float sin_theta_o = length(across);
+    // Below 1e-6, the rounding error of `across`, its direction means nothing; the frame may then turn freely about n,
+    // since an isotropic BRDF seen along n looks the same all around.
+    vec3 x = sin_theta_o > 1e-6 ? across / sin_theta_o : any_tangent(n);
+    Surface surface;
+    surface.frame = mat3(x, cross(n, x), n);
+    surface.theta_o = atan(sin_theta_o, cos_theta_o);
+    return surface;
+}

@@ -1,0 +1,194 @@
+//! Execute: the plan's resources as Vulkan objects, its passes and barriers as commands.
+use super::{Barrier, Graph, Handle, Kind, MemoryRequirement, Plan, ResourceInfo};
+use crate::Result;
+use crate::vulkan::{self, Commands, Device, Frames, ImageShape, Memory, VulkanError};
+use ash::vk;
+use std::sync::Arc;
+
+/// What a pass records when it runs.
+pub type Work<'a> = Box<dyn Fn(&mut Commands, &Resources<'_>) -> std::result::Result<(), VulkanError> + 'a>;
+
+/// The Vulkan object behind a resource of the plan.
+enum Object {
+    Image(vulkan::Image),
+    Buffer(Arc<vulkan::Buffer>),
+}
+
+/// The objects behind the handles of a graph.
+pub struct Resources<'r> {
+    objects: &'r [Object],
+    index_of: &'r [Option<usize>],
+}
+
+impl Resources<'_> {
+    /// The image behind `handle`, which a pass that runs has declared.
+    pub fn image(&self, handle: super::Image) -> &vulkan::Image {
+        match self.object(handle.into()) {
+            Some(Object::Image(image)) => image,
+            _ => unreachable!("a pass that runs asks for images that it declared"),
+        }
+    }
+
+    /// The buffer behind `handle`, which a pass that runs has declared.
+    pub fn buffer(&self, handle: super::Buffer) -> &vulkan::Buffer {
+        match self.object(handle.into()) {
+            Some(Object::Buffer(buffer)) => buffer,
+            _ => unreachable!("a pass that runs asks for buffers that it declared"),
+        }
+    }
+
+    fn object(&self, handle: Handle) -> Option<&Object> {
+        self.objects.get(self.index_of.get(handle.resource).copied().flatten()?)
+    }
+}
+
+/// A compiled frame with its resources: executed as often as wanted.
+pub struct Executable<'a> {
+    /// What it does.
+    pub plan: Plan<Work<'a>>,
+    objects: Vec<Object>,
+}
+
+impl<'a> Executable<'a> {
+    /// Compiles `graph` and makes its transient resources; `imports` are the objects behind its imported buffers.
+    ///
+    /// # Errors
+    /// A wrong graph, no device memory left.
+    pub fn new(
+        device: &Arc<Device>,
+        graph: Graph<Work<'a>>,
+        imports: &[(super::Buffer, Arc<vulkan::Buffer>)],
+    ) -> Result<Self> {
+        // Vulkan tells what memory an object needs only once the object exists.
+        let mut made = std::collections::HashMap::new();
+        let mut failure = None;
+        let plan = graph.compile(&mut |info| match make(device, info) {
+            Ok((object, requirement)) => {
+                made.insert(info.name.clone(), object);
+                requirement
+            }
+            Err(error) => {
+                failure.get_or_insert(error);
+                MemoryRequirement { size_bytes: 1, alignment: 1, memory_type_bits: !0 }
+            }
+        })?;
+        if let Some(error) = failure {
+            return Err(error.into());
+        }
+        let memory = memory_of(device, &plan)?;
+        let mut objects = Vec::new();
+        for (index, resource) in plan.resources.iter().enumerate() {
+            let object = match (made.remove(&resource.info.name), resource.placement) {
+                (Some(Object::Image(mut image)), Some(at)) => {
+                    image.bind(&memory[at.block], at.offset_bytes)?;
+                    Object::Image(image)
+                }
+                (Some(Object::Buffer(buffer)), Some(at)) => {
+                    let mut buffer = Arc::into_inner(buffer).expect("just made, with no other owner");
+                    buffer.bind(&memory[at.block], at.offset_bytes)?;
+                    Object::Buffer(Arc::new(buffer))
+                }
+                _ => {
+                    let import = imports.iter().find(|(handle, _)| plan.find(*handle) == Some(index));
+                    let (_, buffer) = import.expect("whoever imports a resource brings it");
+                    Object::Buffer(buffer.clone())
+                }
+            };
+            objects.push(object);
+        }
+        Ok(Self { plan, objects })
+    }
+
+    /// Records and submits one frame.
+    ///
+    /// # Errors
+    /// Whatever Vulkan refuses.
+    pub fn execute(&self, frames: &mut Frames) -> Result<()> {
+        let resources = Resources { objects: &self.objects, index_of: &self.plan.index_of };
+        frames.record(|commands| {
+            for pass in &self.plan.passes {
+                self.record_barriers(commands, &pass.barriers);
+                commands.timed_pass(&pass.name, |commands| (pass.work)(commands, &resources))?;
+            }
+            self.record_barriers(commands, &self.plan.final_barriers);
+            Ok(())
+        })?;
+        Ok(())
+    }
+
+    fn record_barriers(&self, commands: &mut Commands, barriers: &[Barrier]) {
+        // Where memory changes hands, what was written through its last owner lies outside of the scope of a barrier on
+        // its next one, so a global barrier comes first.
+        let takeovers: Vec<_> = barriers.iter().filter(|barrier| barrier.is_aliasing()).map(memory_barrier).collect();
+        commands.barriers(&[], &[], &takeovers);
+        let mut images = Vec::new();
+        let mut buffers = Vec::new();
+        for barrier in barriers {
+            match &self.objects[barrier.resource] {
+                Object::Image(image) => images.push(
+                    Commands::image_barrier(image)
+                        .src_stage_mask(barrier.src_stage)
+                        .src_access_mask(barrier.src_access)
+                        .dst_stage_mask(barrier.dst_stage)
+                        .dst_access_mask(barrier.dst_access)
+                        .old_layout(barrier.old_layout)
+                        .new_layout(barrier.new_layout),
+                ),
+                Object::Buffer(buffer) => buffers.push(
+                    Commands::buffer_barrier(buffer)
+                        .src_stage_mask(barrier.src_stage)
+                        .src_access_mask(barrier.src_access)
+                        .dst_stage_mask(barrier.dst_stage)
+                        .dst_access_mask(barrier.dst_access),
+                ),
+            }
+        }
+        commands.barriers(&images, &buffers, &[]);
+    }
+}
+
+fn memory_barrier(barrier: &Barrier) -> vk::MemoryBarrier2<'static> {
+    vk::MemoryBarrier2::default()
+        .src_stage_mask(barrier.src_stage)
+        .src_access_mask(barrier.src_access)
+        .dst_stage_mask(barrier.dst_stage)
+        .dst_access_mask(barrier.dst_access)
+}
+
+/// A transient resource without memory, and what memory it needs.
+fn make(
+    device: &Arc<Device>,
+    info: &ResourceInfo,
+) -> std::result::Result<(Object, MemoryRequirement), VulkanError> {
+    let (object, needs) = match info.kind {
+        Kind::Image(desc) => {
+            let shape = ImageShape::plane(desc.format, desc.width, desc.height);
+            let image = vulkan::Image::unbound(device, &info.name, shape, info.image_usage)?;
+            let needs = image.requirements();
+            (Object::Image(image), needs)
+        }
+        Kind::Buffer(desc) => {
+            let buffer = vulkan::Buffer::unbound(device, &info.name, desc.size_bytes, info.buffer_usage)?;
+            let needs = buffer.requirements();
+            (Object::Buffer(Arc::new(buffer)), needs)
+        }
+    };
+    let vk::MemoryRequirements { size: size_bytes, alignment, memory_type_bits } = needs;
+    Ok((object, MemoryRequirement { size_bytes, alignment, memory_type_bits }))
+}
+
+/// The memory of each block of the plan.
+fn memory_of(device: &Arc<Device>, plan: &Plan<Work<'_>>) -> Result<Vec<Arc<Memory>>> {
+    let memory = plan.blocks.iter().enumerate().map(|(index, block)| {
+        let for_buffers = plan.resources.iter().any(|resource| {
+            resource.placement.is_some_and(|at| at.block == index) && matches!(resource.info.kind, Kind::Buffer(_))
+        });
+        let requirements = vk::MemoryRequirements {
+            size: block.size_bytes,
+            alignment: block.alignment,
+            memory_type_bits: block.memory_type_bits,
+        };
+        Ok(Memory::new(device, &format!("transient memory {index}"), requirements, for_buffers)?)
+    });
+    memory.collect()
+}

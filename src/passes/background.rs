@@ -1,0 +1,92 @@
+//! Puts the environment behind the surface.
+use super::{CameraRays, FrameGraph, View, tiles_of};
+use crate::Result;
+use crate::environment::Environment;
+use crate::graph::{Access, Image};
+use crate::vulkan::{
+    self, Bindings, ComputePipeline, Device, Groups, ImageShape, PipelineCache, Sampler, SamplerKind, compiled,
+};
+use ash::vk;
+use bytemuck::{Pod, Zeroable};
+use half::f16;
+use std::sync::Arc;
+
+/// What the pass is made of: only where a background is asked for is the map itself on the device.
+pub struct Background {
+    pipeline: ComputePipeline,
+    map: vulkan::Image,
+    sampler: Sampler,
+    radiance_scale: f32,
+}
+
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct Push {
+    camera: CameraRays,
+    size_px: [u32; 2],
+    rotation: [f32; 2],
+    radiance_scale: f32,
+    // The GLSL block's size is a multiple of its alignment, 16 bytes.
+    _padding: [u32; 3],
+}
+
+impl Background {
+    /// Compiles the shader and uploads the map.
+    ///
+    /// # Errors
+    /// No device memory left, or a map wider or higher than the device's images can be.
+    pub fn new(
+        device: &Arc<Device>,
+        cache: &PipelineCache,
+        environment: &Environment,
+        intensity: f64,
+    ) -> Result<Self> {
+        let largest = device.limits().max_image_dimension2_d as usize;
+        if environment.width.max(environment.height) > largest {
+            let (width, height) = (environment.width, environment.height);
+            return Err(crate::Error::input(
+                &environment.name,
+                format!("is {width} x {height} pixels, more than this device's images can have ({largest})"),
+                "scale it down, or leave the background out with --background none",
+            ));
+        }
+        // A sun as bright as the largest half float is white on any display, so here, unlike in shading, it is cut off.
+        let texel = |rgb: &[f32; 3]| [rgb[0], rgb[1], rgb[2], 1.0].map(|value| f16::from_f32(value.min(65504.0)));
+        let texels: Vec<[f16; 4]> = environment.texels.iter().map(texel).collect();
+        let (width, height) = (environment.width as u32, environment.height as u32);
+        let shape = ImageShape::plane(vk::Format::R16G16B16A16_SFLOAT, width, height);
+        let bytes = bytemuck::cast_slice(&texels).to_vec();
+        Ok(Self {
+            pipeline: ComputePipeline::new(device, cache, &compiled::BACKGROUND, &[])?,
+            map: vulkan::Image::with_texels(device, "environment map", shape, &[bytes])?,
+            sampler: Sampler::new(device, "environment map", SamplerKind::WrappedLinear)?,
+            radiance_scale: intensity as f32,
+        })
+    }
+}
+
+/// Adds the environment where `radiance` is not wholly covered.
+pub fn background<'a>(
+    graph: &mut FrameGraph<'a>,
+    background: &'a Background,
+    radiance: Image,
+    view: &'a View,
+) -> Image {
+    let mut pass = graph.pass("background");
+    let radiance = pass.modify(radiance, Access::StorageWriteCompute);
+    pass.record(Box::new(move |commands, resources| {
+        let Background { pipeline, map, sampler, radiance_scale } = background;
+        let bindings = Bindings::new()
+            .image("radiance", resources.image(radiance))
+            .sampled("environment_map", map, sampler);
+        let push = Push {
+            camera: view.camera_rays(),
+            size_px: [view.width, view.height],
+            rotation: view.rotation(),
+            radiance_scale: *radiance_scale,
+            _padding: [0; 3],
+        };
+        commands.dispatch(pipeline, &bindings, bytemuck::bytes_of(&push), Groups::Direct(tiles_of(view)))
+    }));
+    radiance
+}

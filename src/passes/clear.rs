@@ -1,0 +1,14 @@
+//! Sets a buffer to zero before others count in it.
+use super::FrameGraph;
+use crate::graph::{Access, Buffer};
+
+/// Fills `buffer` with zeros.
+pub fn clear(graph: &mut FrameGraph<'_>, name: &str, buffer: Buffer) -> Buffer {
+    let mut pass = graph.pass(name);
+    let cleared = pass.write(buffer, Access::TransferWrite);
+    pass.record(Box::new(move |commands, resources| {
+        commands.clear_buffer(resources.buffer(cleared));
+        Ok(())
+    }));
+    cleared
+}

@@ -1,0 +1,162 @@
+//! Pass 1 of the paper (section 4.1): normal and material of what is seen, at sub-pixel resolution.
+use super::{FrameGraph, View};
+use crate::Result;
+use crate::graph::{Access, Image, ImageDesc};
+use crate::scene::Mesh;
+use crate::vulkan::{
+    Buffer, ColorTarget, DepthTarget, Device, GraphicsPipeline, GraphicsState, PipelineCache, compiled,
+};
+use ash::vk;
+use bytemuck::{Pod, Zeroable};
+use glam::{DAffine3, DVec3, Vec3};
+use std::sync::Arc;
+
+/// Normal in 2 x 16 bits, material index plus one: see glsl/packing.glsl.
+const GEOMETRY_FORMAT: vk::Format = vk::Format::R32G32_UINT;
+const DEPTH_FORMAT: vk::Format = vk::Format::D32_SFLOAT;
+
+/// The triangles of a mesh on the device.
+pub struct DeviceMesh {
+    positions: Buffer,
+    normals: Buffer,
+    indices: Buffer,
+    index_count: u32,
+    /// Bounding sphere in object space: centre and radius.
+    bounds: (Vec3, f32),
+}
+
+impl DeviceMesh {
+    /// Uploads `mesh`.
+    ///
+    /// # Errors
+    /// No device memory left.
+    pub fn new(device: &Arc<Device>, name: &str, mesh: &Mesh) -> Result<Self> {
+        let vertex = vk::BufferUsageFlags::VERTEX_BUFFER;
+        let upload = |part, usage, bytes: &[u8]| Buffer::with_contents(device, &format!("{name} {part}"), usage, bytes);
+        Ok(Self {
+            positions: upload("positions", vertex, bytemuck::cast_slice(&mesh.positions))?,
+            normals: upload("normals", vertex, bytemuck::cast_slice(&mesh.normals))?,
+            indices: upload("indices", vk::BufferUsageFlags::INDEX_BUFFER, bytemuck::cast_slice(&mesh.indices))?,
+            index_count: mesh.indices.len() as u32,
+            bounds: mesh.bounding_sphere(),
+        })
+    }
+}
+
+/// A mesh in the scene.
+#[derive(Clone, Copy, Debug)]
+pub struct Object {
+    /// Which mesh.
+    pub mesh: usize,
+    /// Which material.
+    pub material: u32,
+    /// Object to world space.
+    pub to_world: DAffine3,
+}
+
+/// What the pass is made of.
+pub struct GeometryCache {
+    pipeline: GraphicsPipeline,
+    meshes: Vec<DeviceMesh>,
+    objects: Vec<Object>,
+}
+
+/// `Object` in glsl/geometry_cache.glsl.
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct Push {
+    to_eye: [[f32; 4]; 4],
+    right_over_extent: [f32; 4],
+    up_over_extent: [f32; 4],
+    forward: [f32; 4],
+    material: u32,
+}
+
+impl GeometryCache {
+    /// Compiles the shaders and takes what they are to draw.
+    ///
+    /// # Errors
+    /// A driver that cannot compile them.
+    pub fn new(
+        device: &Arc<Device>,
+        cache: &PipelineCache,
+        meshes: Vec<DeviceMesh>,
+        objects: Vec<Object>,
+    ) -> Result<Self> {
+        let state = GraphicsState {
+            attributes: &[(vk::Format::R32G32B32_SFLOAT, 12), (vk::Format::R32G32B32_SFLOAT, 12)],
+            colors: &[GEOMETRY_FORMAT],
+            depth: DEPTH_FORMAT,
+        };
+        let (vertex, fragment) = (&compiled::GEOMETRY_CACHE_VERT, &compiled::GEOMETRY_CACHE_FRAG);
+        let pipeline = GraphicsPipeline::new(device, cache, vertex, fragment, &state)?;
+        Ok(Self { pipeline, meshes, objects })
+    }
+
+    /// The push constants of every object that is drawn.
+    fn draws(&self, view: &View) -> Vec<(&DeviceMesh, Push)> {
+        let (right, up, forward) = view.camera.basis();
+        let eye = view.camera.eye;
+        let half_height = (view.camera.fov_y_deg.to_radians() / 2.0).tan();
+        let half_width = half_height * f64::from(view.width) / f64::from(view.height);
+        let pack = |v: DVec3, w: f64| v.extend(w).as_vec4().to_array();
+        let near = self.near_plane(view);
+        let draw = |object: &Object| {
+            let DAffine3 { matrix3, translation } = object.to_world;
+            let column = |column: DVec3| pack(column, 0.0);
+            let push = Push {
+                to_eye: [
+                    column(matrix3.x_axis),
+                    column(matrix3.y_axis),
+                    column(matrix3.z_axis),
+                    // Subtracted in double precision: far from the origin the difference is what counts.
+                    column(translation - eye),
+                ],
+                right_over_extent: pack(right / half_width, 0.0),
+                up_over_extent: pack(up / half_height, 0.0),
+                forward: pack(forward, near),
+                material: object.material,
+            };
+            (&self.meshes[object.mesh], push)
+        };
+        self.objects.iter().map(draw).collect()
+    }
+
+    /// Distance of the near plane: with reversed, infinite depth it costs no precision to keep it tiny. A millionth of
+    /// the way to the far side of the scene is nearer than any surface that a camera outside of it sees.
+    fn near_plane(&self, view: &View) -> f64 {
+        let far_side = |object: &Object| {
+            let (center, radius) = self.meshes[object.mesh].bounds;
+            let m = object.to_world.matrix3;
+            let scale = m.x_axis.length().max(m.y_axis.length()).max(m.z_axis.length());
+            let center = object.to_world.transform_point3(center.as_dvec3());
+            center.distance(view.camera.eye) + scale * f64::from(radius)
+        };
+        let farthest = self.objects.iter().map(far_side).fold(0.0, f64::max);
+        // An object that is a single point at the eye leaves 0, which would divide depth by zero.
+        if farthest > 0.0 { farthest * 1e-6 } else { 1e-6 }
+    }
+}
+
+/// Draws every object into the geometry cache.
+pub fn geometry_cache<'a>(graph: &mut FrameGraph<'a>, cache: &'a GeometryCache, view: &'a View) -> Image {
+    let [width, height] = view.cache_size();
+    let geometry = graph.image("geometry", ImageDesc { format: GEOMETRY_FORMAT, width, height });
+    let depth = graph.image("depth", ImageDesc { format: DEPTH_FORMAT, width, height });
+    let mut pass = graph.pass("geometry_cache");
+    let geometry = pass.write(geometry, Access::ColorAttachment);
+    let depth = pass.write(depth, Access::DepthAttachment);
+    pass.record(Box::new(move |commands, resources| {
+        let color = ColorTarget { image: resources.image(geometry), clear: [0; 4] };
+        let depth = DepthTarget { image: resources.image(depth), clear: 0.0 };
+        commands.render(&color, &depth, |commands| {
+            for (mesh, push) in cache.draws(view) {
+                let vertices = [&mesh.positions, &mesh.normals];
+                let push = bytemuck::bytes_of(&push);
+                commands.draw(&cache.pipeline, push, &vertices, &mesh.indices, mesh.index_count)?;
+            }
+            Ok(())
+        })
+    }));
+    geometry
+}

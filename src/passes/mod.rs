@@ -1,0 +1,31 @@
+//! The passes of a frame: a function each, handles in and handles out, in the order in which they run.
+//!
+//! What a pass needs besides its handles (pipeline, meshes, tables) is made once, in a struct beside the function.
+
+mod background;
+mod classify;
+mod clear;
+mod geometry_cache;
+mod readback;
+mod shade;
+mod tone_map;
+mod view;
+
+pub use background::{Background, background};
+pub use classify::{Classify, Counters, Tiles, classify};
+pub use clear::clear;
+pub use geometry_cache::{DeviceMesh, GeometryCache, Object, geometry_cache};
+pub use readback::{read_buffer, read_image};
+pub use shade::{DeviceLight, DeviceMaterials, Shade, shade};
+pub use tone_map::{ToneMap, tone_map};
+pub use view::{CameraRays, View};
+
+use crate::graph::{Graph, Work};
+
+/// The graph that these passes declare themselves in.
+pub type FrameGraph<'a> = Graph<Work<'a>>;
+
+/// Workgroups of 8 x 8 that cover an image.
+fn tiles_of(view: &View) -> [u32; 3] {
+    [view.width.div_ceil(8), view.height.div_ceil(8), 1]
+}

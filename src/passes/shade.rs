@@ -1,0 +1,253 @@
+//! Pass 2 of the paper (section 4.2): the radiance of every listed pixel, by its partition of the sample threads.
+use super::{CameraRays, Counters, FrameGraph, Tiles, View};
+use crate::brdf::Brdf;
+use crate::environment::Pyramid;
+use crate::graph::{Access, Image};
+use crate::method::Method;
+use crate::threads::ThreadTable;
+use crate::vulkan::{
+    self, Bindings, Buffer, ComputePipeline, Device, Groups, ImageShape, PipelineCache, Sampler, SamplerKind,
+};
+use crate::{Error, Result};
+use ash::vk;
+use bytemuck::{Pod, Zeroable};
+use std::sync::Arc;
+
+/// A BRDF and its threads.
+pub type Material = (Brdf, ThreadTable);
+
+/// `Material` in glsl/material.glsl.
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct MaterialRecord {
+    parameters: [f32; 12],
+    model: u32,
+    first_thread: u32,
+    thread_count: u32,
+    row_count: u32,
+}
+
+/// Materials, their threads and their tables on the device.
+pub struct DeviceMaterials {
+    records: Buffer,
+    threads: Buffer,
+    tables: vulkan::Image,
+    table_sampler: Sampler,
+    /// Bit i: some material has model i.
+    models_used: u32,
+}
+
+impl DeviceMaterials {
+    /// Uploads `materials`, in the order of the indices that objects have.
+    ///
+    /// # Errors
+    /// No device memory left, or more measured tables than a 3D image of the device holds.
+    pub fn new(device: &Arc<Device>, materials: &[Material]) -> Result<Self> {
+        let mut records = Vec::new();
+        let mut threads: Vec<[f32; 4]> = Vec::new();
+        let mut tables = TableAtlas::default();
+        let mut models_used = 0;
+        for (brdf, table) in materials {
+            let mut parameters = brdf.gpu_parameters();
+            if let Some(table) = brdf.table() {
+                // glsl/brdf/merl.glsl reads its place in the atlas from a.xy.
+                parameters[..2].copy_from_slice(&tables.add(device, table.texels())?.map(|texels| texels as f32));
+            }
+            models_used |= 1 << brdf.model_index();
+            records.push(MaterialRecord {
+                parameters,
+                model: brdf.model_index(),
+                first_thread: threads.len() as u32,
+                thread_count: table.count as u32,
+                row_count: table.rows as u32,
+            });
+            threads.extend(table.samples.iter().map(|sample| sample.direction().as_vec3().extend(sample.p).to_array()));
+        }
+        let storage = vk::BufferUsageFlags::STORAGE_BUFFER;
+        Ok(Self {
+            records: Buffer::with_contents(device, "materials", storage, bytemuck::cast_slice(&records))?,
+            threads: Buffer::with_contents(device, "threads", storage, bytemuck::cast_slice(&threads))?,
+            tables: tables.upload(device)?,
+            table_sampler: Sampler::new(device, "brdf tables", SamplerKind::WrappedLinear)?,
+            models_used,
+        })
+    }
+}
+
+/// All measured tables in one 3D image: side by side along theta_d (y) and theta_h (z), since phi_d (x) repeats.
+#[derive(Default)]
+struct TableAtlas<'a>(Vec<&'a [glam::Vec4]>);
+
+/// Texels of a table along phi_d, and along each of theta_d and theta_h.
+const TABLE_WIDTH: usize = crate::brdf::merl::PHI_D_BINS;
+const TABLE_SIDE: usize = crate::brdf::merl::THETA_D_BINS;
+
+impl<'a> TableAtlas<'a> {
+    /// Adds a table; returns its offset in y and z, in texels.
+    fn add(&mut self, device: &Device, texels: &'a [glam::Vec4]) -> Result<[usize; 2]> {
+        let per_axis = device.limits().max_image_dimension3_d as usize / TABLE_SIDE;
+        let index = self.0.len();
+        if index >= per_axis * per_axis {
+            let problem = format!("has more measured materials than the {} that this device holds", per_axis * per_axis);
+            return Err(Error::input("the scene", problem, "use fewer"));
+        }
+        self.0.push(texels);
+        Ok([index % per_axis, index / per_axis].map(|place| place * TABLE_SIDE))
+    }
+
+    /// The image; a single empty texel if there is no table, since the shader's binding needs something.
+    fn upload(&self, device: &Arc<Device>) -> Result<vulkan::Image> {
+        let single = vk::Format::R32G32B32A32_SFLOAT;
+        let format = if device.filters_linearly(single) { single } else { vk::Format::R16G16B16A16_SFLOAT };
+        let per_axis = device.limits().max_image_dimension3_d as usize / TABLE_SIDE;
+        let (columns, rows) = (self.0.len().min(per_axis), self.0.len().div_ceil(per_axis));
+        let extent = match self.0.len() {
+            0 => [1, 1, 1],
+            _ => [TABLE_WIDTH, TABLE_SIDE * columns, TABLE_SIDE * rows],
+        };
+        let mut texels = vec![glam::Vec4::ZERO; extent.iter().product()];
+        for (index, table) in self.0.iter().enumerate() {
+            let (y_0, z_0) = (index % per_axis * TABLE_SIDE, index / per_axis * TABLE_SIDE);
+            for (line, source) in table.chunks_exact(TABLE_WIDTH).enumerate() {
+                let (y, z) = (y_0 + line % TABLE_SIDE, z_0 + line / TABLE_SIDE);
+                let start = TABLE_WIDTH * (y + extent[1] * z);
+                texels[start..start + TABLE_WIDTH].copy_from_slice(source);
+            }
+        }
+        let bytes = if format == single {
+            bytemuck::cast_slice(&texels).to_vec()
+        } else {
+            let half = texels.iter().flat_map(|texel| texel.to_array().map(half::f16::from_f32)).collect::<Vec<_>>();
+            bytemuck::cast_slice(&half).to_vec()
+        };
+        let extent = extent.map(|size| size as u32);
+        let shape = ImageShape { format, extent, levels: 1, cube: false };
+        Ok(vulkan::Image::with_texels(device, "brdf tables", shape, &[bytes])?)
+    }
+}
+
+/// The environment's pyramid on the device.
+pub struct DeviceLight {
+    pyramid: vulkan::Image,
+    sampler: Sampler,
+    face_size: u32,
+    /// Radiance of a texel of value 1: the intensity, and what keeps suns within half floats.
+    radiance_scale: f32,
+}
+
+impl DeviceLight {
+    /// Uploads `pyramid`, as half floats where they hold it, and applies `intensity` to it.
+    ///
+    /// # Errors
+    /// No device memory left.
+    pub fn new(device: &Arc<Device>, pyramid: &Pyramid, intensity: f64) -> Result<Self> {
+        let single = vk::Format::R32G32B32A32_SFLOAT;
+        let use_single = !pyramid.fits_half() && device.filters_linearly(single);
+        let scale = if use_single { 1.0 } else { pyramid.radiance_scale() };
+        let level = |level| -> Vec<u8> {
+            if use_single {
+                bytemuck::cast_slice(&pyramid.texels_rgba32f(level)).to_vec()
+            } else {
+                bytemuck::cast_slice(&pyramid.texels_rgba16f(level, scale)).to_vec()
+            }
+        };
+        let levels: Vec<_> = (0..pyramid.levels.len()).map(level).collect();
+        let face_size = pyramid.face_size as u32;
+        let shape = ImageShape {
+            format: if use_single { single } else { vk::Format::R16G16B16A16_SFLOAT },
+            extent: [face_size, face_size, 1],
+            levels: levels.len() as u32,
+            cube: true,
+        };
+        Ok(Self {
+            pyramid: vulkan::Image::with_texels(device, "environment pyramid", shape, &levels)?,
+            sampler: Sampler::new(device, "environment pyramid", SamplerKind::Trilinear)?,
+            face_size,
+            radiance_scale: scale * intensity as f32,
+        })
+    }
+}
+
+/// What the pass is made of.
+pub struct Shade {
+    pipeline: ComputePipeline,
+    materials: DeviceMaterials,
+    light: DeviceLight,
+}
+
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct Push {
+    camera: CameraRays,
+    size_px: [u32; 2],
+    kind: u32,
+    face_size: f32,
+    rotation: [f32; 2],
+    radiance_scale: f32,
+    // The GLSL block's size is a multiple of its alignment, 16 bytes; a vec4 inside of it sets that.
+    _padding: u32,
+}
+
+impl Shade {
+    /// Compiles the variant of the shader for `method`, with the models that `materials` use.
+    ///
+    /// # Errors
+    /// A driver that cannot compile it.
+    pub fn new(
+        device: &Arc<Device>,
+        cache: &PipelineCache,
+        method: Method,
+        subpixels: u32,
+        materials: DeviceMaterials,
+        light: DeviceLight,
+    ) -> Result<Self> {
+        let constants = [("SUBPIXELS", subpixels), ("MODELS_USED", materials.models_used)];
+        let pipeline = ComputePipeline::new(device, cache, method.shader(), &constants)?;
+        Ok(Self { pipeline, materials, light })
+    }
+}
+
+/// Shades the pixels that `tiles` lists: interior ones with one sum shared by all sub-pixels, then those at edges.
+pub fn shade<'a>(
+    graph: &mut FrameGraph<'a>,
+    shade: &'a Shade,
+    geometry: Image,
+    tiles: &Tiles,
+    view: &'a View,
+) -> Image {
+    let Tiles { counters, pixels, radiance } = *tiles;
+    let mut pass = graph.pass("shade");
+    pass.read(geometry, Access::SampledCompute);
+    pass.read(counters, Access::Indirect);
+    pass.read(counters, Access::StorageReadCompute);
+    pass.read(pixels, Access::StorageReadCompute);
+    let radiance = pass.modify(radiance, Access::StorageWriteCompute);
+    pass.record(Box::new(move |commands, resources| {
+        let Shade { pipeline, materials, light } = shade;
+        let counters = resources.buffer(counters);
+        let bindings = Bindings::new()
+            .image("geometry", resources.image(geometry))
+            .buffer("counters", counters)
+            .buffer("pixel_list", resources.buffer(pixels))
+            .image("radiance", resources.image(radiance))
+            .sampled("environment_pyramid", &light.pyramid, &light.sampler)
+            .buffer("Materials", &materials.records)
+            .sampled("brdf_tables", &materials.tables, &materials.table_sampler)
+            .buffer("Threads", &materials.threads);
+        for kind in [0, 1] {
+            let push = Push {
+                camera: view.camera_rays(),
+                size_px: [view.width, view.height],
+                kind,
+                face_size: light.face_size as f32,
+                rotation: view.rotation(),
+                radiance_scale: light.radiance_scale,
+                _padding: 0,
+            };
+            let groups = Groups::Indirect(counters, Counters::arguments_of(kind));
+            commands.dispatch(pipeline, &bindings, bytemuck::bytes_of(&push), groups)?;
+        }
+        Ok(())
+    }));
+    radiance
+}

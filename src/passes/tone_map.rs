@@ -1,0 +1,48 @@
+//! Linear radiance to 8-bit display values: exposure, clamp, gamma.
+use super::{FrameGraph, View, tiles_of};
+use crate::Result;
+use crate::graph::{Access, Image, ImageDesc};
+use crate::vulkan::{Bindings, ComputePipeline, Device, Groups, PipelineCache, compiled};
+use ash::vk;
+use bytemuck::{Pod, Zeroable};
+use std::sync::Arc;
+
+/// What the pass is made of.
+pub struct ToneMap {
+    pipeline: ComputePipeline,
+}
+
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct Push {
+    size_px: [u32; 2],
+    exposure: f32,
+    inverse_gamma: f32,
+}
+
+impl ToneMap {
+    /// Compiles the shader.
+    ///
+    /// # Errors
+    /// A driver that cannot compile it.
+    pub fn new(device: &Arc<Device>, cache: &PipelineCache) -> Result<Self> {
+        Ok(Self { pipeline: ComputePipeline::new(device, cache, &compiled::TONE_MAP, &[])? })
+    }
+}
+
+/// Makes the picture to look at out of `radiance`: RGBA, 8 bits each.
+pub fn tone_map<'a>(graph: &mut FrameGraph<'a>, tone_map: &'a ToneMap, radiance: Image, view: &'a View) -> Image {
+    let (width, height) = (view.width, view.height);
+    let display = graph.image("display", ImageDesc { format: vk::Format::R8G8B8A8_UNORM, width, height });
+    let mut pass = graph.pass("tone_map");
+    pass.read(radiance, Access::StorageReadCompute);
+    let display = pass.write(display, Access::StorageWriteCompute);
+    pass.record(Box::new(move |commands, resources| {
+        let bindings = Bindings::new()
+            .image("radiance", resources.image(radiance))
+            .image("display", resources.image(display));
+        let push = Push { size_px: [width, height], exposure: view.exposure, inverse_gamma: 1.0 / view.gamma };
+        commands.dispatch(&tone_map.pipeline, &bindings, bytemuck::bytes_of(&push), Groups::Direct(tiles_of(view)))
+    }));
+    display
+}

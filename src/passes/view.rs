@@ -1,0 +1,68 @@
+//! What all passes know of the view: camera, resolution, rotation of the environment.
+use crate::scene::Camera;
+use bytemuck::{Pod, Zeroable};
+use glam::{Vec2, Vec3};
+
+/// The camera as shaders see it (`Camera` in glsl/camera.glsl): right and up scaled to the edges of the image.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct CameraRays {
+    right: [f32; 4],
+    up: [f32; 4],
+    forward: [f32; 4],
+}
+
+impl CameraRays {
+    /// The rays of `camera` for images of this width over height.
+    pub fn new(camera: &Camera, aspect: f64) -> Self {
+        let (right, up, forward) = camera.basis();
+        let half_height = (camera.fov_y_deg.to_radians() / 2.0).tan();
+        let pack = |v: glam::DVec3| v.as_vec3().extend(0.0).to_array();
+        Self { right: pack(right * (half_height * aspect)), up: pack(up * half_height), forward: pack(forward) }
+    }
+
+    /// Direction from the eye through `position`, in [0, 1] from the top left corner; not normalised.
+    /// Twin of `camera_ray` in glsl/camera.glsl.
+    pub fn ray(&self, position: Vec2) -> Vec3 {
+        let offset = Vec2::new(2.0, -2.0) * position + Vec2::new(-1.0, 1.0);
+        let [right, up, forward] = [self.right, self.up, self.forward].map(|v| Vec3::new(v[0], v[1], v[2]));
+        forward + offset.x * right + offset.y * up
+    }
+}
+
+/// Camera, resolution and display settings of one frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct View {
+    /// Where the eye is.
+    pub camera: Camera,
+    /// Width of the image in pixels.
+    pub width: u32,
+    /// Height of the image in pixels.
+    pub height: u32,
+    /// Sub-pixels per axis, 1 to 4.
+    pub subpixels: u32,
+    /// The environment is turned by this angle about +Y, counter-clockwise seen from above.
+    pub rotation_deg: f64,
+    /// Factor on radiance before display.
+    pub exposure: f32,
+    /// Display values are radiance to the power of 1/gamma.
+    pub gamma: f32,
+}
+
+impl View {
+    /// Rays through the image.
+    pub fn camera_rays(&self) -> CameraRays {
+        CameraRays::new(&self.camera, f64::from(self.width) / f64::from(self.height))
+    }
+
+    /// Cosine and sine of the environment's rotation.
+    pub fn rotation(&self) -> [f32; 2] {
+        let (sin, cos) = self.rotation_deg.to_radians().sin_cos();
+        [cos as f32, sin as f32]
+    }
+
+    /// Size of the geometry cache.
+    pub fn cache_size(&self) -> [u32; 2] {
+        [self.width * self.subpixels, self.height * self.subpixels]
+    }
+}

@@ -1,0 +1,417 @@
+//! The device: which one, its queue, its submissions, and the queue of objects waiting to be destroyed.
+use super::commands::Commands;
+use super::error::{During, VulkanError};
+use super::instance::Instance;
+use super::{Frames, Result};
+use ash::{ext, khr, vk};
+use gpu_allocator::vulkan::{Allocation, Allocator, AllocatorCreateDesc};
+use std::ffi::CStr;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// What a device is, in the order in which one is preferred when none is named.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum DeviceKind {
+    /// A GPU with memory of its own.
+    Discrete,
+    /// A GPU that shares the CPU's memory.
+    Integrated,
+    /// A GPU handed through by a hypervisor.
+    Virtual,
+    /// A software implementation such as lavapipe.
+    Cpu,
+    /// Anything else.
+    Other,
+}
+
+/// A physical device, as `threadlight devices` lists it.
+#[derive(Clone, Debug)]
+pub struct DeviceDescription {
+    /// Position in the loader's list: what `--device INDEX` means.
+    pub index: usize,
+    /// Name as the driver gives it.
+    pub name: String,
+    /// Driver name and version, e.g. `llvmpipe (Mesa 22.3.6)`.
+    pub driver: String,
+    /// What it is.
+    pub kind: DeviceKind,
+    /// Vulkan version, e.g. `1.3.230`.
+    pub api_version: String,
+    /// What it lacks for Threadlight; empty if it can be used.
+    pub lacks: Vec<&'static str>,
+}
+
+impl DeviceDescription {
+    /// Whether `--device asked` means this device: its index, or part of its name or its driver's, in any case.
+    fn answers_to(&self, asked: &str) -> bool {
+        let asked = asked.to_lowercase();
+        match asked.parse::<usize>() {
+            Ok(index) => index == self.index,
+            Err(_) => {
+                let driver = self.driver.to_lowercase();
+                // Mesa's software driver calls itself llvmpipe; everybody else calls it lavapipe.
+                self.name.to_lowercase().contains(&asked)
+                    || driver.contains(&asked)
+                    || (asked == "lavapipe" && driver.starts_with("llvmpipe"))
+            }
+        }
+    }
+}
+
+/// A physical device and what was found out about it.
+struct Candidate {
+    description: DeviceDescription,
+    physical: vk::PhysicalDevice,
+    properties: vk::PhysicalDeviceProperties,
+    queue_family: u32,
+    timestamp_valid_bits: u32,
+    extensions: Vec<&'static CStr>,
+}
+
+/// The devices that the loader offers, usable or not.
+///
+/// # Errors
+/// No driver at all, or a failing query.
+pub fn describe_devices(instance: &Instance) -> Result<Vec<DeviceDescription>> {
+    Ok(candidates(instance)?.into_iter().map(|candidate| candidate.description).collect())
+}
+
+fn candidates(instance: &Instance) -> Result<Vec<Candidate>> {
+    // SAFETY: plain query of a live instance.
+    let physical_devices = unsafe { instance.raw.enumerate_physical_devices() };
+    let physical_devices = match physical_devices {
+        Err(vk::Result::ERROR_INITIALIZATION_FAILED) => Vec::new(),
+        other => other.during("vkEnumeratePhysicalDevices", "instance")?,
+    };
+    if physical_devices.is_empty() {
+        return Err(VulkanError::NoDriver);
+    }
+    physical_devices.into_iter().enumerate().map(|(index, physical)| candidate(instance, index, physical)).collect()
+}
+
+fn candidate(instance: &Instance, index: usize, physical: vk::PhysicalDevice) -> Result<Candidate> {
+    let mut driver = vk::PhysicalDeviceDriverProperties::default();
+    let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut driver);
+    // SAFETY: `physical` comes from this instance.
+    unsafe { instance.raw.get_physical_device_properties2(physical, &mut properties) };
+    let properties = properties.properties;
+    let name = text(properties.device_name_as_c_str());
+    let driver_text = format!("{} ({})", text(driver.driver_name_as_c_str()), text(driver.driver_info_as_c_str()));
+
+    let mut lacks = Vec::new();
+    let version = properties.api_version;
+    if version < vk::API_VERSION_1_2 {
+        lacks.push("Vulkan 1.2");
+    }
+    // SAFETY: as above.
+    let available = unsafe { instance.raw.enumerate_device_extension_properties(physical) }
+        .during("vkEnumerateDeviceExtensionProperties", &name)?;
+    let mut extensions = Vec::new();
+    let mut has = |wanted: &'static CStr| {
+        let found = available.iter().any(|extension| extension.extension_name_as_c_str() == Ok(wanted));
+        if found {
+            extensions.push(wanted);
+        }
+        found
+    };
+    // The extensions are asked for even where Vulkan 1.3 has them in its core: their entry points are the same ones.
+    let has_synchronization2 = has(khr::synchronization2::NAME);
+    let has_dynamic_rendering = has(khr::dynamic_rendering::NAME);
+    // A portability driver insists on this one being enabled.
+    has(khr::portability_subset::NAME);
+    if !has_synchronization2 {
+        lacks.push("VK_KHR_synchronization2");
+    }
+    if !has_dynamic_rendering {
+        lacks.push("VK_KHR_dynamic_rendering");
+    }
+
+    // SAFETY: as above.
+    let families = unsafe { instance.raw.get_physical_device_queue_family_properties(physical) };
+    let wanted = vk::QueueFlags::GRAPHICS | vk::QueueFlags::COMPUTE;
+    let queue_family = families.iter().position(|family| family.queue_flags.contains(wanted));
+    if queue_family.is_none() {
+        lacks.push("a queue for both graphics and compute");
+    }
+    let queue_family = queue_family.unwrap_or(0);
+    let timestamp_valid_bits = families.get(queue_family).map_or(0, |family| family.timestamp_valid_bits);
+
+    let kind = match properties.device_type {
+        vk::PhysicalDeviceType::DISCRETE_GPU => DeviceKind::Discrete,
+        vk::PhysicalDeviceType::INTEGRATED_GPU => DeviceKind::Integrated,
+        vk::PhysicalDeviceType::VIRTUAL_GPU => DeviceKind::Virtual,
+        vk::PhysicalDeviceType::CPU => DeviceKind::Cpu,
+        _ => DeviceKind::Other,
+    };
+    let api_version = format!(
+        "{}.{}.{}",
+        vk::api_version_major(version),
+        vk::api_version_minor(version),
+        vk::api_version_patch(version)
+    );
+    let description = DeviceDescription { index, name, driver: driver_text, kind, api_version, lacks };
+    let queue_family = queue_family as u32;
+    Ok(Candidate { description, physical, properties, queue_family, timestamp_valid_bits, extensions })
+}
+
+/// A name in a fixed-size array of the driver's; empty if it is not terminated.
+fn text<E>(name: std::result::Result<&CStr, E>) -> String {
+    name.map(|name| name.to_string_lossy().into_owned()).unwrap_or_default()
+}
+
+/// A handle whose last use may still be in flight.
+pub(super) enum Garbage {
+    Buffer(vk::Buffer),
+    Image(vk::Image),
+    ImageView(vk::ImageView),
+    Sampler(vk::Sampler),
+    Pipeline(vk::Pipeline),
+    PipelineLayout(vk::PipelineLayout),
+    DescriptorSetLayout(vk::DescriptorSetLayout),
+    DescriptorPool(vk::DescriptorPool),
+    CommandPool(vk::CommandPool),
+    QueryPool(vk::QueryPool),
+    Memory(Allocation),
+}
+
+/// A logical device with one queue for everything.
+pub struct Device {
+    pub(super) raw: ash::Device,
+    pub(super) synchronization2: khr::synchronization2::Device,
+    pub(super) dynamic_rendering: khr::dynamic_rendering::Device,
+    pub(super) debug: Option<ext::debug_utils::Device>,
+    pub(super) physical: vk::PhysicalDevice,
+    pub(super) queue_family: u32,
+    pub(super) properties: vk::PhysicalDeviceProperties,
+    pub(super) timestamp_valid_bits: u32,
+    description: DeviceDescription,
+    queue: Mutex<vk::Queue>,
+    // Counts submissions: the n-th signals the value n when it has finished.
+    timeline: vk::Semaphore,
+    submitted: AtomicU64,
+    // `None` only while the device is being dropped: the allocator has to go first.
+    allocator: Mutex<Option<Allocator>>,
+    deletions: Mutex<Vec<(u64, Garbage)>>,
+    pub(super) instance: Arc<Instance>,
+}
+
+impl Device {
+    /// Opens the device that `asked` names (index, or part of its name), or the best one: discrete, then integrated,
+    /// then CPU.
+    ///
+    /// # Errors
+    /// No driver, no device of that name, or one that lacks what the renderer needs.
+    pub fn new(instance: &Arc<Instance>, asked: Option<&str>) -> Result<Arc<Self>> {
+        let mut candidates = candidates(instance)?;
+        if let Some(asked) = asked {
+            let list = candidates.iter().map(|c| format!("{} \"{}\"", c.description.index, c.description.name));
+            let available = list.collect::<Vec<_>>().join(", ");
+            candidates.retain(|candidate| candidate.description.answers_to(asked));
+            if candidates.is_empty() {
+                return Err(VulkanError::NoSuchDevice { asked: asked.to_owned(), available });
+            }
+        }
+        // Stable sort: among equals the loader's order decides, which VK_LOADER_* and the user's settings shape.
+        candidates.sort_by_key(|candidate| (!candidate.description.lacks.is_empty(), candidate.description.kind));
+        let chosen = candidates.into_iter().next().ok_or(VulkanError::NoDriver)?;
+        if !chosen.description.lacks.is_empty() {
+            let feature = chosen.description.lacks.join(" and ");
+            return Err(VulkanError::Unsuitable { device: chosen.description.name, feature });
+        }
+        Self::open(instance, chosen)
+    }
+
+    fn open(instance: &Arc<Instance>, chosen: Candidate) -> Result<Arc<Self>> {
+        let name = &chosen.description.name;
+        let priorities = [1.0];
+        let queues = [vk::DeviceQueueCreateInfo::default()
+            .queue_family_index(chosen.queue_family)
+            .queue_priorities(&priorities)];
+        let extensions: Vec<_> = chosen.extensions.iter().map(|extension| extension.as_ptr()).collect();
+        let mut timeline_semaphore = vk::PhysicalDeviceTimelineSemaphoreFeatures::default().timeline_semaphore(true);
+        let mut synchronization2 = vk::PhysicalDeviceSynchronization2Features::default().synchronization2(true);
+        let mut dynamic_rendering = vk::PhysicalDeviceDynamicRenderingFeatures::default().dynamic_rendering(true);
+        let info = vk::DeviceCreateInfo::default()
+            .queue_create_infos(&queues)
+            .enabled_extension_names(&extensions)
+            .push_next(&mut timeline_semaphore)
+            .push_next(&mut synchronization2)
+            .push_next(&mut dynamic_rendering);
+        // SAFETY: the physical device is this instance's; `info` and all it points to outlive the call.
+        let raw =
+            unsafe { instance.raw.create_device(chosen.physical, &info, None) }.during("vkCreateDevice", name)?;
+        let allocator = Allocator::new(&AllocatorCreateDesc {
+            instance: instance.raw.clone(),
+            device: raw.clone(),
+            physical_device: chosen.physical,
+            debug_settings: Default::default(),
+            buffer_device_address: false,
+            allocation_sizes: Default::default(),
+        })
+        .map_err(|cause| VulkanError::Memory { object: name.clone(), cause: cause.to_string() })?;
+        let mut kind =
+            vk::SemaphoreTypeCreateInfo::default().semaphore_type(vk::SemaphoreType::TIMELINE).initial_value(0);
+        let info = vk::SemaphoreCreateInfo::default().push_next(&mut kind);
+        // SAFETY: the timeline feature was enabled above.
+        let timeline = unsafe { raw.create_semaphore(&info, None) }.during("vkCreateSemaphore", "timeline")?;
+        // SAFETY: one queue of this family was asked for above.
+        let queue = unsafe { raw.get_device_queue(chosen.queue_family, 0) };
+        tracing::info!("device {}: {name}, {}", chosen.description.index, chosen.description.driver);
+        Ok(Arc::new(Self {
+            synchronization2: khr::synchronization2::Device::new(&instance.raw, &raw),
+            dynamic_rendering: khr::dynamic_rendering::Device::new(&instance.raw, &raw),
+            debug: instance.debug_names.then(|| ext::debug_utils::Device::new(&instance.raw, &raw)),
+            physical: chosen.physical,
+            queue_family: chosen.queue_family,
+            properties: chosen.properties,
+            timestamp_valid_bits: chosen.timestamp_valid_bits,
+            description: chosen.description,
+            queue: Mutex::new(queue),
+            timeline,
+            submitted: AtomicU64::new(0),
+            allocator: Mutex::new(Some(allocator)),
+            deletions: Mutex::new(Vec::new()),
+            instance: instance.clone(),
+            raw,
+        }))
+    }
+
+    /// Name, driver and kind.
+    pub fn description(&self) -> &DeviceDescription {
+        &self.description
+    }
+
+    /// Limits, as the driver states them.
+    pub fn limits(&self) -> &vk::PhysicalDeviceLimits {
+        &self.properties.limits
+    }
+
+    /// Whether images of `format` can be sampled with linear filtering.
+    pub fn filters_linearly(&self, format: vk::Format) -> bool {
+        // SAFETY: plain query about this instance's physical device.
+        let properties = unsafe { self.instance.raw.get_physical_device_format_properties(self.physical, format) };
+        properties.optimal_tiling_features.contains(vk::FormatFeatureFlags::SAMPLED_IMAGE_FILTER_LINEAR)
+    }
+
+    /// Bytes of device memory handed out to buffers and images at this moment.
+    pub fn allocated_bytes(&self) -> u64 {
+        lock(&self.allocator).as_ref().map_or(0, |allocator| allocator.generate_report().total_allocated_bytes)
+    }
+
+    /// Records commands, submits them and waits until they are done: for uploads and tests, not for frames.
+    ///
+    /// # Errors
+    /// Whatever recording or submission fails with.
+    pub fn submit_and_wait<T>(
+        self: &Arc<Self>,
+        name: &str,
+        record: impl FnOnce(&mut Commands) -> Result<T>,
+    ) -> Result<T> {
+        let mut frames = Frames::new(self, name, 1)?;
+        let result = frames.record(record)?;
+        frames.wait()?;
+        Ok(result)
+    }
+
+    /// Hands `commands` to the queue; the returned value is reached when they have finished.
+    pub(super) fn submit(&self, commands: vk::CommandBuffer, name: &str) -> Result<u64> {
+        let queue = lock(&self.queue);
+        let value = self.submitted.load(Ordering::Acquire) + 1;
+        let buffers = [vk::CommandBufferSubmitInfo::default().command_buffer(commands)];
+        let signals = [vk::SemaphoreSubmitInfo::default()
+            .semaphore(self.timeline)
+            .value(value)
+            .stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)];
+        let info = vk::SubmitInfo2::default().command_buffer_infos(&buffers).signal_semaphore_infos(&signals);
+        // SAFETY: the queue is held exclusively; the command buffer is complete and kept until `value` is reached.
+        unsafe { self.synchronization2.queue_submit2(*queue, &[info], vk::Fence::null()) }
+            .during("vkQueueSubmit2", name)?;
+        self.submitted.store(value, Ordering::Release);
+        Ok(value)
+    }
+
+    /// Blocks until submission number `value` has finished, then destroys what was waiting for it.
+    pub(super) fn wait_for(&self, value: u64) -> Result<()> {
+        let (semaphores, values) = ([self.timeline], [value]);
+        let info = vk::SemaphoreWaitInfo::default().semaphores(&semaphores).values(&values);
+        // SAFETY: the timeline lives as long as the device; `value` has been submitted or is 0.
+        unsafe { self.raw.wait_semaphores(&info, u64::MAX) }.during("vkWaitSemaphores", "timeline")?;
+        self.collect_garbage(value);
+        Ok(())
+    }
+
+    /// Destroys `garbage` when everything submitted so far has finished.
+    pub(super) fn delete_later(&self, garbage: Garbage) {
+        let last_use = self.submitted.load(Ordering::Acquire);
+        lock(&self.deletions).push((last_use, garbage));
+    }
+
+    fn collect_garbage(&self, finished: u64) {
+        let ready: Vec<_> = {
+            let mut deletions = lock(&self.deletions);
+            let (ready, waiting) = deletions.drain(..).partition(|(last_use, _)| *last_use <= finished);
+            *deletions = waiting;
+            ready
+        };
+        for (_, garbage) in ready {
+            // SAFETY: each handle was made by this device, is owned by the queue alone since its owner was dropped,
+            // and the last submission that could use it has finished.
+            unsafe {
+                match garbage {
+                    Garbage::Buffer(handle) => self.raw.destroy_buffer(handle, None),
+                    Garbage::Image(handle) => self.raw.destroy_image(handle, None),
+                    Garbage::ImageView(handle) => self.raw.destroy_image_view(handle, None),
+                    Garbage::Sampler(handle) => self.raw.destroy_sampler(handle, None),
+                    Garbage::Pipeline(handle) => self.raw.destroy_pipeline(handle, None),
+                    Garbage::PipelineLayout(handle) => self.raw.destroy_pipeline_layout(handle, None),
+                    Garbage::DescriptorSetLayout(handle) => self.raw.destroy_descriptor_set_layout(handle, None),
+                    Garbage::DescriptorPool(handle) => self.raw.destroy_descriptor_pool(handle, None),
+                    Garbage::CommandPool(handle) => self.raw.destroy_command_pool(handle, None),
+                    Garbage::QueryPool(handle) => self.raw.destroy_query_pool(handle, None),
+                    Garbage::Memory(allocation) => self.free(allocation),
+                }
+            }
+        }
+    }
+
+    pub(super) fn with_allocator<T>(&self, act: impl FnOnce(&mut Allocator) -> T) -> Option<T> {
+        lock(&self.allocator).as_mut().map(act)
+    }
+
+    fn free(&self, allocation: Allocation) {
+        if let Some(Err(cause)) = self.with_allocator(|allocator| allocator.free(allocation)) {
+            tracing::error!("device memory could not be freed: {cause}");
+        }
+    }
+
+    /// Gives `handle` the name that validation messages and frame debuggers show.
+    pub(super) fn set_name<T: vk::Handle>(&self, handle: T, name: &str) {
+        let (Some(debug), Ok(name)) = (&self.debug, std::ffi::CString::new(name)) else { return };
+        let info = vk::DebugUtilsObjectNameInfoEXT::default().object_handle(handle).object_name(&name);
+        // SAFETY: the handle is alive and made by this device.
+        if let Err(result) = unsafe { debug.set_debug_utils_object_name(&info) } {
+            tracing::debug!("vkSetDebugUtilsObjectNameEXT failed for {name:?}: {result}");
+        }
+    }
+}
+
+impl Drop for Device {
+    fn drop(&mut self) {
+        // SAFETY: the last owner of the device is here, so no other thread uses its queue.
+        if let Err(result) = unsafe { self.raw.device_wait_idle() } {
+            tracing::error!("vkDeviceWaitIdle failed for {}: {result}", self.description.name);
+        }
+        self.collect_garbage(u64::MAX);
+        drop(lock(&self.allocator).take());
+        // SAFETY: the device is idle and everything made by it is gone: all owners held an `Arc` of it.
+        unsafe {
+            self.raw.destroy_semaphore(self.timeline, None);
+            self.raw.destroy_device(None);
+        }
+    }
+}
+
+/// A panic elsewhere leaves these plain lists intact, so a poisoned lock is no reason to stop.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}

@@ -1,0 +1,76 @@
+//! What Vulkan refused, with the call and the object's name kept.
+use ash::vk;
+
+/// An error of the Vulkan layer.
+#[derive(Debug, thiserror::Error)]
+pub enum VulkanError {
+    /// The loader library is not on this machine.
+    #[error("no Vulkan loader: {cause}; install it (Debian, Ubuntu: apt-get install libvulkan1 mesa-vulkan-drivers)")]
+    NoLoader {
+        /// What the dynamic linker said.
+        cause: String,
+    },
+    /// The loader found no driver.
+    #[error(
+        "no Vulkan driver: the loader found no usable device; install your GPU's driver, or the CPU one (Debian, Ubuntu: apt-get install mesa-vulkan-drivers), and check VK_DRIVER_FILES if it is set"
+    )]
+    NoDriver,
+    /// Validation was asked for, but its layer is not installed.
+    #[error(
+        "validation: the layer VK_LAYER_KHRONOS_validation is not installed; install it (Debian, Ubuntu: apt-get install vulkan-validationlayers) or leave out --validate"
+    )]
+    NoValidationLayer,
+    /// `--device` names none of the devices.
+    #[error("--device {asked}: no such Vulkan device; name one of: {available}")]
+    NoSuchDevice {
+        /// The name or index that was asked for.
+        asked: String,
+        /// The devices there are, with their indices.
+        available: String,
+    },
+    /// The device lacks something that the renderer needs.
+    #[error("{device}: lacks {feature}, which Threadlight needs; update its driver or choose another with --device")]
+    Unsuitable {
+        /// Device name.
+        device: String,
+        /// What is missing.
+        feature: String,
+    },
+    /// A Vulkan call failed.
+    #[error("{call} failed for {object}: {result}")]
+    Call {
+        /// The Vulkan function.
+        call: &'static str,
+        /// Debug name of the object concerned.
+        object: String,
+        /// What it returned.
+        result: vk::Result,
+    },
+    /// Memory for an object could not be had.
+    #[error("no memory for {object}: {cause}; a smaller --size or fewer --subpixels needs less")]
+    Memory {
+        /// Debug name of the object concerned.
+        object: String,
+        /// What the allocator said.
+        cause: String,
+    },
+    /// A shader and its caller disagree.
+    #[error("shader {shader}: {problem}")]
+    Shader {
+        /// Name of the shader.
+        shader: String,
+        /// What does not match.
+        problem: String,
+    },
+}
+
+/// Attaches the call and the object's name to a bare `vk::Result`.
+pub(super) trait During<T> {
+    fn during(self, call: &'static str, object: &str) -> Result<T, VulkanError>;
+}
+
+impl<T> During<T> for ash::prelude::VkResult<T> {
+    fn during(self, call: &'static str, object: &str) -> Result<T, VulkanError> {
+        self.map_err(|result| VulkanError::Call { call, object: object.to_owned(), result })
+    }
+}

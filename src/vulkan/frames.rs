@@ -1,0 +1,183 @@
+//! Frames in flight: each has its command pool, descriptors and timestamps, and is reused when the GPU is done with it.
+use super::Result;
+use super::commands::Commands;
+use super::device::{Device, Garbage};
+use super::error::During;
+use ash::vk;
+use std::sync::Arc;
+
+/// How long one pass took on the GPU.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PassTime {
+    /// Name of the pass.
+    pub name: String,
+    /// Milliseconds between the timestamps before and after it.
+    pub gpu_ms: f64,
+}
+
+/// Passes that a frame can time; more are recorded, but not timed.
+const MAX_TIMED_PASSES: u32 = 64;
+
+/// What one frame in flight owns.
+struct Slot {
+    command_pool: vk::CommandPool,
+    commands: vk::CommandBuffer,
+    descriptor_pool: vk::DescriptorPool,
+    queries: Option<vk::QueryPool>,
+    /// Names of the timed passes of the frame that was recorded last.
+    timed: Vec<String>,
+    /// Value of the device's timeline at which that frame has finished; 0: never submitted.
+    finished_at: u64,
+}
+
+/// A ring of frames: while the GPU works on one, the next is recorded.
+pub struct Frames {
+    slots: Vec<Slot>,
+    next: usize,
+    name: String,
+    device: Arc<Device>,
+}
+
+impl Frames {
+    /// A ring of `count` frames in flight.
+    ///
+    /// # Errors
+    /// No memory left for pools.
+    pub fn new(device: &Arc<Device>, name: &str, count: usize) -> Result<Self> {
+        let slots = (0..count.max(1)).map(|_| Slot::new(device, name)).collect::<Result<_>>()?;
+        Ok(Self { slots, next: 0, name: name.to_owned(), device: device.clone() })
+    }
+
+    /// Waits until the oldest frame has left the GPU, records the next one in its place, and submits it.
+    ///
+    /// # Errors
+    /// What `record` returns, or a failing submission.
+    pub fn record<T>(&mut self, record: impl FnOnce(&mut Commands) -> Result<T>) -> Result<T> {
+        let slot = &mut self.slots[self.next];
+        self.device.wait_for(slot.finished_at)?;
+        slot.begin(&self.device, &self.name)?;
+        let mut commands = Commands::new(&self.device, slot.commands, slot.descriptor_pool, slot.queries);
+        let result = record(&mut commands)?;
+        slot.timed = commands.into_timed_passes();
+        // SAFETY: the command buffer is in the recording state.
+        unsafe { self.device.raw.end_command_buffer(slot.commands) }.during("vkEndCommandBuffer", &self.name)?;
+        slot.finished_at = self.device.submit(slot.commands, &self.name)?;
+        self.next = (self.next + 1) % self.slots.len();
+        Ok(result)
+    }
+
+    /// Blocks until every frame has left the GPU.
+    ///
+    /// # Errors
+    /// A lost device.
+    pub fn wait(&self) -> Result<()> {
+        let last = self.slots.iter().map(|slot| slot.finished_at).max().unwrap_or(0);
+        self.device.wait_for(last)
+    }
+
+    /// GPU time of each pass of the frame recorded last, which is waited for. Empty where the device has no timestamps.
+    ///
+    /// # Errors
+    /// A lost device.
+    pub fn pass_times(&self) -> Result<Vec<PassTime>> {
+        let slot = &self.slots[(self.next + self.slots.len() - 1) % self.slots.len()];
+        self.device.wait_for(slot.finished_at)?;
+        let Some(queries) = slot.queries.filter(|_| !slot.timed.is_empty()) else { return Ok(Vec::new()) };
+        let mut ticks = vec![0_u64; 2 * slot.timed.len()];
+        let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;
+        // SAFETY: both timestamps of every timed pass were written by the frame that was waited for.
+        unsafe { self.device.raw.get_query_pool_results(queries, 0, &mut ticks, flags) }
+            .during("vkGetQueryPoolResults", &self.name)?;
+        // Timestamps count modulo the valid bits of the queue.
+        let mask = u64::MAX >> (64 - self.device.timestamp_valid_bits.clamp(1, 64));
+        let ms_per_tick = f64::from(self.device.limits().timestamp_period) * 1e-6;
+        let times = slot.timed.iter().zip(ticks.chunks_exact(2)).map(|(name, ticks)| PassTime {
+            name: name.clone(),
+            gpu_ms: (ticks[1].wrapping_sub(ticks[0]) & mask) as f64 * ms_per_tick,
+        });
+        Ok(times.collect())
+    }
+}
+
+impl Slot {
+    fn new(device: &Arc<Device>, name: &str) -> Result<Self> {
+        let info = vk::CommandPoolCreateInfo::default()
+            .flags(vk::CommandPoolCreateFlags::TRANSIENT)
+            .queue_family_index(device.queue_family);
+        // SAFETY: plain creation; destroyed through the deletion queue, as all below.
+        let command_pool =
+            unsafe { device.raw.create_command_pool(&info, None) }.during("vkCreateCommandPool", name)?;
+        let info = vk::CommandBufferAllocateInfo::default().command_pool(command_pool).command_buffer_count(1);
+        // SAFETY: the pool is alive; the buffer goes with it.
+        let commands = unsafe { device.raw.allocate_command_buffers(&info) }
+            .during("vkAllocateCommandBuffers", name)?[0];
+        device.set_name(commands, name);
+
+        // Room for far more passes than a frame has; running out is an error that says so.
+        let (sets, each) = (64, 128);
+        let sizes = [
+            vk::DescriptorType::STORAGE_BUFFER,
+            vk::DescriptorType::UNIFORM_BUFFER,
+            vk::DescriptorType::COMBINED_IMAGE_SAMPLER,
+            vk::DescriptorType::SAMPLED_IMAGE,
+            vk::DescriptorType::STORAGE_IMAGE,
+        ]
+        .map(|kind| vk::DescriptorPoolSize::default().ty(kind).descriptor_count(each));
+        let info = vk::DescriptorPoolCreateInfo::default().max_sets(sets).pool_sizes(&sizes);
+        // SAFETY: plain creation.
+        let descriptor_pool =
+            unsafe { device.raw.create_descriptor_pool(&info, None) }.during("vkCreateDescriptorPool", name)?;
+
+        let queries = if device.timestamp_valid_bits > 0 {
+            let info = vk::QueryPoolCreateInfo::default()
+                .query_type(vk::QueryType::TIMESTAMP)
+                .query_count(2 * MAX_TIMED_PASSES);
+            // SAFETY: plain creation.
+            Some(unsafe { device.raw.create_query_pool(&info, None) }.during("vkCreateQueryPool", name)?)
+        } else {
+            None
+        };
+        Ok(Self { command_pool, commands, descriptor_pool, queries, timed: Vec::new(), finished_at: 0 })
+    }
+
+    /// Empties the pools, whose earlier contents the GPU has finished with, and starts recording.
+    fn begin(&mut self, device: &Device, name: &str) -> Result<()> {
+        self.timed.clear();
+        // SAFETY: the caller waited for `finished_at`: nothing of these pools is in use.
+        unsafe {
+            device
+                .raw
+                .reset_command_pool(self.command_pool, vk::CommandPoolResetFlags::empty())
+                .during("vkResetCommandPool", name)?;
+            device
+                .raw
+                .reset_descriptor_pool(self.descriptor_pool, vk::DescriptorPoolResetFlags::empty())
+                .during("vkResetDescriptorPool", name)?;
+        }
+        let info = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
+        // SAFETY: the command buffer was just reset.
+        unsafe { device.raw.begin_command_buffer(self.commands, &info) }.during("vkBeginCommandBuffer", name)?;
+        if let Some(queries) = self.queries {
+            // SAFETY: recorded outside of rendering, before any timestamp.
+            unsafe { device.raw.cmd_reset_query_pool(self.commands, queries, 0, 2 * MAX_TIMED_PASSES) };
+        }
+        Ok(())
+    }
+}
+
+impl Drop for Frames {
+    fn drop(&mut self) {
+        for slot in &self.slots {
+            self.device.delete_later(Garbage::CommandPool(slot.command_pool));
+            self.device.delete_later(Garbage::DescriptorPool(slot.descriptor_pool));
+            if let Some(queries) = slot.queries {
+                self.device.delete_later(Garbage::QueryPool(queries));
+            }
+        }
+    }
+}
+
+/// Whether the `index`-th pass of a frame is timed.
+pub(super) fn is_timed(index: usize) -> bool {
+    index < MAX_TIMED_PASSES as usize
+}

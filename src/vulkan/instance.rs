@@ -1,0 +1,154 @@
+//! The Vulkan instance: loader, validation layer, and the messages it sends.
+use super::error::{During, VulkanError};
+use super::Result;
+use ash::{ext, khr, vk};
+use std::ffi::{CStr, c_void};
+use std::sync::{Arc, Mutex, PoisonError};
+
+const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
+
+/// Messages of the validation layer, shared between the instance and whoever reports them.
+#[derive(Clone, Default)]
+pub struct Messages(Arc<Mutex<Vec<String>>>);
+
+impl Messages {
+    /// Every message so far, oldest first.
+    pub fn all(&self) -> Vec<String> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    fn push(&self, message: String) {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).push(message);
+    }
+}
+
+/// A Vulkan instance, 1.3 where the loader has it, else 1.2.
+pub struct Instance {
+    pub(super) raw: ash::Instance,
+    pub(super) debug_names: bool,
+    messenger: Option<(ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,
+    messages: Messages,
+    // The callback's user data: at one address for as long as the messenger lives.
+    _user_data: Box<Messages>,
+    // Unloads the loader when dropped: last.
+    _entry: ash::Entry,
+}
+
+impl Instance {
+    /// Loads the Vulkan loader and makes an instance, with core and synchronisation validation when `validate` is set.
+    ///
+    /// # Errors
+    /// No loader, no driver, or no validation layer where one was asked for; each says what to install.
+    pub fn new(validate: bool) -> Result<Arc<Self>> {
+        // SAFETY: loads the system's Vulkan loader; it is unloaded after every object made through it (field order).
+        let entry = unsafe { ash::Entry::load() }.map_err(|cause| VulkanError::NoLoader { cause: cause.to_string() })?;
+        let name = "instance";
+        // SAFETY: plain query of the loader.
+        let loader_version = unsafe { entry.try_enumerate_instance_version() }
+            .during("vkEnumerateInstanceVersion", name)?
+            .unwrap_or(vk::API_VERSION_1_0);
+        // SAFETY: plain query of the loader.
+        let layers = unsafe { entry.enumerate_instance_layer_properties() }
+            .during("vkEnumerateInstanceLayerProperties", name)?;
+        let has_validation = layers.iter().any(|layer| layer.layer_name_as_c_str() == Ok(VALIDATION_LAYER));
+        if validate && !has_validation {
+            return Err(VulkanError::NoValidationLayer);
+        }
+        let layer_names: Vec<_> = validate.then_some(VALIDATION_LAYER.as_ptr()).into_iter().collect();
+
+        // SAFETY: plain query of the loader.
+        let available = unsafe { entry.enumerate_instance_extension_properties(None) }
+            .during("vkEnumerateInstanceExtensionProperties", name)?;
+        let has = |wanted: &CStr| available.iter().any(|extension| extension.extension_name_as_c_str() == Ok(wanted));
+        let mut extensions = Vec::new();
+        let mut flags = vk::InstanceCreateFlags::empty();
+        // Names and labels cost nothing without a tool that listens, and are what a frame debugger shows.
+        let debug_names = validate || has(ext::debug_utils::NAME);
+        if debug_names {
+            extensions.push(ext::debug_utils::NAME.as_ptr());
+        }
+        // MoltenVK is a portability driver: invisible unless the application says that it can cope.
+        if has(khr::portability_enumeration::NAME) {
+            extensions.push(khr::portability_enumeration::NAME.as_ptr());
+            flags |= vk::InstanceCreateFlags::ENUMERATE_PORTABILITY_KHR;
+        }
+
+        let application = vk::ApplicationInfo::default()
+            .application_name(c"threadlight")
+            .engine_name(c"threadlight")
+            .api_version(if loader_version >= vk::API_VERSION_1_3 { vk::API_VERSION_1_3 } else { vk::API_VERSION_1_2 });
+        let messages = Messages::default();
+        let user_data = Box::new(messages.clone());
+        let mut messenger_info = messenger_info(&user_data);
+        let enabled = [vk::ValidationFeatureEnableEXT::SYNCHRONIZATION_VALIDATION];
+        let mut features = vk::ValidationFeaturesEXT::default().enabled_validation_features(&enabled);
+        let mut info = vk::InstanceCreateInfo::default()
+            .flags(flags)
+            .application_info(&application)
+            .enabled_layer_names(&layer_names)
+            .enabled_extension_names(&extensions);
+        if validate {
+            info = info.push_next(&mut features).push_next(&mut messenger_info);
+        }
+        // SAFETY: `info` and all it points to outlive the call; the user data outlives the instance (field order).
+        let raw = match unsafe { entry.create_instance(&info, None) } {
+            Err(vk::Result::ERROR_INCOMPATIBLE_DRIVER) => return Err(VulkanError::NoDriver),
+            other => other.during("vkCreateInstance", name)?,
+        };
+        let messenger = if validate {
+            let functions = ext::debug_utils::Instance::new(&entry, &raw);
+            let info = self::messenger_info(&user_data);
+            // SAFETY: the instance was made with VK_EXT_debug_utils; the user data outlives the messenger.
+            let messenger = unsafe { functions.create_debug_utils_messenger(&info, None) }
+                .during("vkCreateDebugUtilsMessengerEXT", name)?;
+            Some((functions, messenger))
+        } else {
+            None
+        };
+        Ok(Arc::new(Self { raw, debug_names, messenger, messages, _user_data: user_data, _entry: entry }))
+    }
+
+    /// What the validation layer has said so far; stays readable after the instance is gone.
+    pub fn messages(&self) -> Messages {
+        self.messages.clone()
+    }
+}
+
+impl Drop for Instance {
+    fn drop(&mut self) {
+        if let Some((functions, messenger)) = self.messenger.take() {
+            // SAFETY: made by this instance, destroyed once, before it.
+            unsafe { functions.destroy_debug_utils_messenger(messenger, None) };
+        }
+        // SAFETY: every device holds an `Arc` of this instance, so none is left.
+        unsafe { self.raw.destroy_instance(None) };
+    }
+}
+
+/// Validation and performance warnings and errors, sent to `messages`.
+fn messenger_info(messages: &Messages) -> vk::DebugUtilsMessengerCreateInfoEXT<'static> {
+    use vk::{DebugUtilsMessageSeverityFlagsEXT as Severity, DebugUtilsMessageTypeFlagsEXT as Type};
+    vk::DebugUtilsMessengerCreateInfoEXT::default()
+        .message_severity(Severity::WARNING | Severity::ERROR)
+        .message_type(Type::VALIDATION | Type::PERFORMANCE)
+        .pfn_user_callback(Some(on_message))
+        .user_data(std::ptr::from_ref(messages).cast_mut().cast())
+}
+
+/// Called by the validation layer, possibly from any thread.
+unsafe extern "system" fn on_message(
+    _severity: vk::DebugUtilsMessageSeverityFlagsEXT,
+    _kind: vk::DebugUtilsMessageTypeFlagsEXT,
+    data: *const vk::DebugUtilsMessengerCallbackDataEXT<'_>,
+    user_data: *mut c_void,
+) -> vk::Bool32 {
+    // SAFETY: the layer passes a valid structure for the time of the call, and the user data given at creation,
+    // which is the `Messages` that the instance keeps alive.
+    let (text, messages) = unsafe {
+        let text = (*data).message_as_c_str().map(|text| text.to_string_lossy().into_owned());
+        (text.unwrap_or_default(), &*user_data.cast::<Messages>())
+    };
+    tracing::error!("validation: {text}");
+    messages.push(text);
+    vk::FALSE
+}

@@ -1,0 +1,113 @@
+//! A compiled shader and what its SPIR-V declares: bindings by name, size of the push constants.
+use super::Result;
+use super::error::VulkanError;
+use ash::vk;
+use spirq::prelude::{DescriptorType, ReflectConfig, Variable};
+use std::collections::BTreeMap;
+
+/// The stage that a shader is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stage {
+    /// Vertex shader.
+    Vertex,
+    /// Fragment shader.
+    Fragment,
+    /// Compute shader.
+    Compute,
+}
+
+impl Stage {
+    pub(super) fn flags(self) -> vk::ShaderStageFlags {
+        match self {
+            Self::Vertex => vk::ShaderStageFlags::VERTEX,
+            Self::Fragment => vk::ShaderStageFlags::FRAGMENT,
+            Self::Compute => vk::ShaderStageFlags::COMPUTE,
+        }
+    }
+}
+
+/// A shader compiled at build time; the build script makes one constant of this type for each.
+#[derive(Clone, Copy, Debug)]
+pub struct Shader {
+    /// Name of the GLSL file, with its variant.
+    pub name: &'static str,
+    /// Its stage.
+    pub stage: Stage,
+    /// SPIR-V, little-endian words.
+    pub spirv: &'static [u8],
+}
+
+/// One descriptor that a shader declares.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Binding {
+    pub index: u32,
+    pub kind: vk::DescriptorType,
+}
+
+/// What a shader expects from its caller.
+#[derive(Debug, Default)]
+pub(super) struct Interface {
+    /// Descriptors of set 0, by their name in GLSL.
+    pub bindings: BTreeMap<String, Binding>,
+    pub push_constant_bytes: u32,
+    /// Indices of specialisation constants, by their name in GLSL.
+    pub constants: BTreeMap<String, u32>,
+}
+
+impl Shader {
+    pub(super) fn words(&self) -> Vec<u32> {
+        self.spirv.chunks_exact(4).map(|word| u32::from_le_bytes([word[0], word[1], word[2], word[3]])).collect()
+    }
+
+    pub(super) fn refuse(&self, problem: impl ToString) -> VulkanError {
+        VulkanError::Shader { shader: self.name.to_owned(), problem: problem.to_string() }
+    }
+
+    /// Reads the interface out of the SPIR-V.
+    pub(super) fn reflect(&self) -> Result<Interface> {
+        let entry_points = ReflectConfig::new()
+            .spv(self.words())
+            .ref_all_rscs(true)
+            .combine_img_samplers(true)
+            .reflect()
+            .map_err(|cause| self.refuse(format!("SPIR-V reflection failed: {cause}")))?;
+        let mut interface = Interface::default();
+        for variable in entry_points.into_iter().flat_map(|entry| entry.vars) {
+            match variable {
+                Variable::Descriptor { name, desc_bind, desc_ty, ty, .. } => {
+                    // A block without an instance name is known by the name of its type.
+                    let name = name.filter(|name| !name.is_empty()).or_else(|| {
+                        ty.as_struct().and_then(|block| block.name.clone())
+                    });
+                    let name = name.ok_or_else(|| self.refuse("a binding has no name"))?;
+                    if desc_bind.set() != 0 {
+                        return Err(self.refuse(format!("{name} is not in descriptor set 0")));
+                    }
+                    let kind = match desc_ty {
+                        DescriptorType::StorageBuffer(_) => vk::DescriptorType::STORAGE_BUFFER,
+                        DescriptorType::UniformBuffer() => vk::DescriptorType::UNIFORM_BUFFER,
+                        DescriptorType::CombinedImageSampler() => vk::DescriptorType::COMBINED_IMAGE_SAMPLER,
+                        DescriptorType::SampledImage() => vk::DescriptorType::SAMPLED_IMAGE,
+                        DescriptorType::StorageImage(_) => vk::DescriptorType::STORAGE_IMAGE,
+                        other => return Err(self.refuse(format!("{name} is a {other:?}, which nothing here binds"))),
+                    };
+                    interface.bindings.insert(name, Binding { index: desc_bind.bind(), kind });
+                }
+                Variable::PushConstant { ty, .. } => {
+                    interface.push_constant_bytes = ty.nbyte().unwrap_or(0) as u32;
+                }
+                Variable::SpecConstant { name: Some(name), spec_id, .. } => {
+                    interface.constants.insert(name, spec_id);
+                }
+                _ => {}
+            }
+        }
+        Ok(interface)
+    }
+}
+
+/// Every shader of `glsl/`, compiled.
+pub mod compiled {
+    use super::{Shader, Stage};
+    include!(concat!(env!("OUT_DIR"), "/shaders.rs"));
+}
