@@ -1,0 +1,199 @@
+//! Barriers: what must finish, and be visible to whom, before a pass touches a resource (synchronization2).
+//!
+//! The uses of a resource in plan order fall into *spans*: one write, or all reads in one layout until the next write. A
+//! barrier stands before each span but says nothing within one, so it takes a single rule to derive them all: it waits
+//! for the stages of the span before, makes visible what that span wrote, and changes the layout if the two differ.
+//!
+//! | span before, span after | what the barrier promises |
+//! |---|---|
+//! | write, reads | the writes are visible to every read of the span, also to those of later passes: these get no barrier |
+//! | write, write | the first write is finished and does not land after the second |
+//! | reads, write | all reads, in whatever stages, are finished: execution only, no memory access in the source |
+//! | reads, reads in another layout | all reads are finished, then the layout changes; the contents stay |
+//!
+//! Why the span before is enough: its own barrier waited for the one before it, and so on; each barrier's source stages
+//! are the destination stages of the one before, which is what Vulkan calls an execution dependency chain.
+//!
+//! Before the first span of a resource stands what happened to it earlier:
+//! - *Imported with an access before*: that access. No barrier if it already covers the span's reads.
+//! - *Imported without*: unknown, hence everything earlier on the queue, and its memory writes.
+//! - *Transient*: the last span of every resource that shares bytes with it, itself included. Those of the same frame ran
+//!   before it, those later in the plan ran a frame ago: frames in flight share one set of transient memory, which is
+//!   sound because a barrier also waits for earlier submissions to the same queue. The image's layout is then `UNDEFINED`: the
+//!   contents are gone. Sparing a wait where the order implies it would save nothing: there is one barrier either way.
+//!
+//! What the barriers do not promise: anything between queues, between two plans whose memory overlaps, or to the CPU
+//! beyond making writes available to it (it still has to wait for the frame's fence).
+use super::access::Access;
+use super::declare::{Graph, Kind};
+use super::plan::PlannedResource;
+use ash::vk::{AccessFlags2, ImageLayout, PipelineStageFlags2};
+
+/// One dependency, in the terms of `VkMemoryBarrier2` and `VkImageMemoryBarrier2` over a whole resource.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Barrier {
+    /// Index of the resource in the plan.
+    pub resource: usize,
+    /// Stages that must have finished.
+    pub src_stage: PipelineStageFlags2,
+    /// Writes of these stages that must be made available; empty where execution is all that is waited for.
+    pub src_access: AccessFlags2,
+    /// Stages that wait.
+    pub dst_stage: PipelineStageFlags2,
+    /// Accesses of these stages that memory is made visible to.
+    pub dst_access: AccessFlags2,
+    /// Layout before; `UNDEFINED` where the contents are not kept, and for buffers.
+    pub old_layout: ImageLayout,
+    /// Layout after; `UNDEFINED` for buffers. No transition if it is the old one.
+    pub new_layout: ImageLayout,
+    /// Empty but for the first use of transient memory, where these are the resources whose last accesses it waits for: all
+    /// that share bytes with it, in order, itself included.
+    pub takes_over: Vec<usize>,
+}
+
+impl Barrier {
+    /// Whether the source is (also) accesses made through other resources in the same memory.
+    ///
+    /// The access scope of an image or buffer barrier is that image or buffer, so `src_access` then belongs into a global
+    /// memory barrier; for an image, recorded before (not beside) the barrier that changes its layout.
+    pub fn is_aliasing(&self) -> bool {
+        self.takes_over.iter().any(|&other| other != self.resource)
+    }
+}
+
+/// Everything that writes memory, in all of [`Access`]; `MEMORY_WRITE` stands for an unknown past.
+const WRITES: AccessFlags2 = AccessFlags2::from_raw(
+    AccessFlags2::MEMORY_WRITE.as_raw()
+        | AccessFlags2::COLOR_ATTACHMENT_WRITE.as_raw()
+        | AccessFlags2::DEPTH_STENCIL_ATTACHMENT_WRITE.as_raw()
+        | AccessFlags2::SHADER_STORAGE_WRITE.as_raw()
+        | AccessFlags2::TRANSFER_WRITE.as_raw()
+        | AccessFlags2::HOST_WRITE.as_raw(),
+);
+
+/// One write, or all reads in one layout until the next write or change of layout.
+#[derive(Clone, Copy)]
+struct Span {
+    /// Position in the plan of the first pass; the number of passes for what an owner does after the frame.
+    first: usize,
+    stages: PipelineStageFlags2,
+    accesses: AccessFlags2,
+    layout: ImageLayout,
+    discards: bool,
+}
+
+/// A past that nothing is known about.
+const UNKNOWN: Span = Span {
+    first: 0,
+    stages: PipelineStageFlags2::ALL_COMMANDS,
+    accesses: AccessFlags2::MEMORY_WRITE,
+    layout: ImageLayout::UNDEFINED,
+    discards: false,
+};
+
+impl Span {
+    fn new(first: usize, access: Access, accesses: AccessFlags2, kind: &Kind, discards: bool) -> Self {
+        let info = access.info();
+        let layout = if matches!(kind, Kind::Image(_)) { info.layout } else { ImageLayout::UNDEFINED };
+        Self { first, stages: info.stages, accesses, layout, discards }
+    }
+
+    /// What the owner does with an imported resource before or after the frame.
+    fn by_owner(first: usize, access: Access, kind: &Kind) -> Self {
+        Self::new(first, access, access.info().reads | access.info().writes, kind, false)
+    }
+
+    fn only_reads(&self) -> bool {
+        !self.accesses.intersects(WRITES)
+    }
+
+    /// Whether both are reads in the same layout.
+    fn reads_with(&self, next: &Self) -> bool {
+        self.only_reads() && next.only_reads() && self.layout == next.layout
+    }
+
+    /// Whether what these reads see, those of `next` see too.
+    fn covers(&self, next: &Self) -> bool {
+        self.reads_with(next) && self.stages.contains(next.stages) && self.accesses.contains(next.accesses)
+    }
+}
+
+/// The barriers before each pass of the plan, and those after the last one; each list in the order of the resources.
+pub(super) fn barriers<W>(
+    graph: &Graph<W>,
+    order: &[usize],
+    resources: &[PlannedResource],
+) -> (Vec<Vec<Barrier>>, Vec<Barrier>) {
+    let spans: Vec<Vec<Span>> = resources.iter().map(|resource| spans(graph, order, resource.declared)).collect();
+    let mut barriers: Vec<Vec<Barrier>> = vec![Vec::new(); order.len() + 1];
+    for (resource, own) in spans.iter().enumerate() {
+        let declared = &graph.resources[resources[resource].declared];
+        let (mut past, takes_over) = match &declared.import {
+            Some(import) => (past_of_import(import.before, &declared.kind), Vec::new()),
+            None => past_of_memory(resource, resources, &spans),
+        };
+        for (index, span) in own.iter().enumerate() {
+            if index == 0 && past.covers(span) {
+                continue; // One with the past: whoever waits for it waits for both.
+            }
+            let takes_over = if index == 0 { takes_over.clone() } else { Vec::new() };
+            barriers[span.first].push(barrier(resource, &past, span, takes_over));
+            past = *span;
+        }
+    }
+    let final_barriers = barriers.pop().unwrap_or_default();
+    (barriers, final_barriers)
+}
+
+fn spans<W>(graph: &Graph<W>, order: &[usize], resource: usize) -> Vec<Span> {
+    let declared = &graph.resources[resource];
+    let mut spans: Vec<Span> = Vec::new();
+    let mut append = |span: Span| match spans.last_mut().filter(|last| last.reads_with(&span)) {
+        Some(last) => (last.stages, last.accesses) = (last.stages | span.stages, last.accesses | span.accesses),
+        None => spans.push(span),
+    };
+    let mut is_used = false;
+    for (position, &pass) in order.iter().enumerate() {
+        for use_ in graph.passes[pass].uses.iter().filter(|use_| use_.handle.resource == resource) {
+            let discards = use_.needs().is_none();
+            append(Span::new(position, use_.access, use_.mode.accesses(use_.access), &declared.kind, discards));
+            is_used = true;
+        }
+    }
+    let after = declared.import.as_ref().and_then(|import| import.after).filter(|_| is_used);
+    after.into_iter().for_each(|access| append(Span::by_owner(order.len(), access, &declared.kind)));
+    spans
+}
+
+fn past_of_import(before: Option<Access>, kind: &Kind) -> Span {
+    before.map_or(UNKNOWN, |access| Span::by_owner(0, access, kind))
+}
+
+/// The last spans, as one, of all resources that share bytes with a transient one; and which these are.
+fn past_of_memory(resource: usize, resources: &[PlannedResource], spans: &[Vec<Span>]) -> (Span, Vec<usize>) {
+    let shares = |other: &usize| match (resources[resource].placement, resources[*other].placement) {
+        (Some(own), Some(others)) => own.overlaps(others),
+        _ => false,
+    };
+    let sharing: Vec<usize> = (0..resources.len()).filter(shares).collect();
+    let mut past = Span { stages: PipelineStageFlags2::NONE, accesses: AccessFlags2::NONE, ..UNKNOWN };
+    for last in sharing.iter().filter_map(|&other| spans[other].last()) {
+        past.stages |= last.stages;
+        past.accesses |= last.accesses;
+    }
+    (past, sharing)
+}
+
+fn barrier(resource: usize, past: &Span, next: &Span, takes_over: Vec<usize>) -> Barrier {
+    let is_transition = past.layout != next.layout;
+    Barrier {
+        resource,
+        src_stage: past.stages,
+        src_access: past.accesses & WRITES,
+        dst_stage: next.stages,
+        dst_access: next.accesses,
+        old_layout: if next.discards && is_transition { ImageLayout::UNDEFINED } else { past.layout },
+        new_layout: next.layout,
+        takes_over,
+    }
+}

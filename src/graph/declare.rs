@@ -1,0 +1,234 @@
+//! Declare: the graph as the passes describe it, resources by version, nothing checked yet.
+use super::access::{Access, Mode};
+use ash::vk;
+
+/// An image of one layer, one mip level and one sample per pixel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ImageDesc {
+    /// Texel format.
+    pub format: vk::Format,
+    /// Width in texels, at least 1.
+    pub width: u32,
+    /// Height in texels, at least 1.
+    pub height: u32,
+}
+
+/// A buffer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct BufferDesc {
+    /// Size in bytes, at least 1.
+    pub size_bytes: u64,
+}
+
+/// What a resource is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// An image.
+    Image(ImageDesc),
+    /// A buffer.
+    Buffer(BufferDesc),
+}
+
+/// One version of one resource of one graph: the contents between one write and the next.
+///
+/// Version 0 is what the resource holds when the frame begins: nothing for a transient one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Handle {
+    pub(super) resource: usize,
+    pub(super) version: u32,
+}
+
+impl Handle {
+    /// The version that a write to this one makes.
+    pub(super) fn next(self) -> Self {
+        Self { version: self.version + 1, ..self }
+    }
+}
+
+/// A version of an image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Image(Handle);
+
+/// A version of a buffer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Buffer(Handle);
+
+/// [`Image`] or [`Buffer`]: writing one gives the next version of the same type.
+pub trait Versioned: Copy + Into<Handle> + From<Handle> {}
+impl Versioned for Image {}
+impl Versioned for Buffer {}
+
+impl From<Image> for Handle {
+    fn from(image: Image) -> Self {
+        image.0
+    }
+}
+
+impl From<Buffer> for Handle {
+    fn from(buffer: Buffer) -> Self {
+        buffer.0
+    }
+}
+
+impl From<Handle> for Image {
+    fn from(handle: Handle) -> Self {
+        Self(handle)
+    }
+}
+
+impl From<Handle> for Buffer {
+    fn from(handle: Handle) -> Self {
+        Self(handle)
+    }
+}
+
+/// A frame as it is being declared. `W` is what a pass has to record: a closure in the renderer, `()` in tests.
+pub struct Graph<W> {
+    pub(super) resources: Vec<Resource>,
+    pub(super) passes: Vec<Pass<W>>,
+    pub(super) outputs: Vec<Handle>,
+}
+
+/// A declared resource.
+pub(super) struct Resource {
+    pub name: String,
+    pub kind: Kind,
+    /// `None` for a transient resource.
+    pub import: Option<Import>,
+}
+
+/// What the owner of an imported resource says about it.
+pub(super) struct Import {
+    pub before: Option<Access>,
+    pub after: Option<Access>,
+}
+
+/// A declared pass.
+pub(super) struct Pass<W> {
+    pub name: String,
+    pub uses: Vec<Use>,
+    pub work: Option<W>,
+}
+
+/// One use of a resource by a pass. `handle` is the version found; a write leaves the next one.
+#[derive(Clone, Copy)]
+pub(super) struct Use {
+    pub handle: Handle,
+    pub access: Access,
+    pub mode: Mode,
+}
+
+impl Use {
+    /// The version whose contents the pass depends on.
+    pub fn needs(self) -> Option<Handle> {
+        (self.mode != Mode::Write).then_some(self.handle)
+    }
+
+    /// The version that the pass leaves behind.
+    pub fn makes(self) -> Option<Handle> {
+        (self.mode != Mode::Read).then_some(self.handle.next())
+    }
+}
+
+impl<W> Default for Graph<W> {
+    fn default() -> Self {
+        Self { resources: Vec::new(), passes: Vec::new(), outputs: Vec::new() }
+    }
+}
+
+impl<W> Graph<W> {
+    /// An empty frame.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// A transient image: it exists inside the frame only, and its memory may be shared with others.
+    pub fn image(&mut self, name: &str, desc: ImageDesc) -> Image {
+        self.resource(name, Kind::Image(desc), None).into()
+    }
+
+    /// A transient buffer: it exists inside the frame only, and its memory may be shared with others.
+    pub fn buffer(&mut self, name: &str, desc: BufferDesc) -> Buffer {
+        self.resource(name, Kind::Buffer(desc), None).into()
+    }
+
+    /// An image that someone else owns and keeps: a swapchain image, a geometry cache kept from the frame before.
+    ///
+    /// `before` is the access it was last used with; what was written must already be visible to that access. `None`: its
+    /// contents are undefined, and its first use waits for everything earlier on the queue. `after` is the access that it
+    /// is to be ready for when the frame ends; `None`: whatever the last pass left. A resource that no pass of the plan uses
+    /// is not in the plan and stays as it was.
+    pub fn import_image(
+        &mut self,
+        name: &str,
+        desc: ImageDesc,
+        before: Option<Access>,
+        after: Option<Access>,
+    ) -> Image {
+        self.resource(name, Kind::Image(desc), Some(Import { before, after })).into()
+    }
+
+    /// A buffer that someone else owns and keeps: see [`Graph::import_image`].
+    pub fn import_buffer(
+        &mut self,
+        name: &str,
+        desc: BufferDesc,
+        before: Option<Access>,
+        after: Option<Access>,
+    ) -> Buffer {
+        self.resource(name, Kind::Buffer(desc), Some(Import { before, after })).into()
+    }
+
+    fn resource(&mut self, name: &str, kind: Kind, import: Option<Import>) -> Handle {
+        self.resources.push(Resource { name: name.to_owned(), kind, import });
+        Handle { resource: self.resources.len() - 1, version: 0 }
+    }
+
+    /// Adds a pass; the builder says what it uses and what it records.
+    pub fn pass(&mut self, name: &str) -> PassBuilder<'_, W> {
+        let index = self.passes.len();
+        self.passes.push(Pass { name: name.to_owned(), uses: Vec::new(), work: None });
+        PassBuilder { pass: &mut self.passes[index] }
+    }
+
+    /// The frame exists for this: the newest version of an imported resource. Passes that no output needs are culled;
+    /// nothing else keeps a pass alive, not even a write to an imported resource.
+    pub fn output(&mut self, handle: impl Into<Handle>) {
+        self.outputs.push(handle.into());
+    }
+}
+
+/// Says what a pass uses and what it records.
+pub struct PassBuilder<'a, W> {
+    pass: &'a mut Pass<W>,
+}
+
+impl<W> PassBuilder<'_, W> {
+    /// The pass looks at `handle`. Several reads of one resource in one pass may differ in access, not in layout.
+    pub fn read(&mut self, handle: impl Into<Handle>, access: Access) -> &mut Self {
+        self.pass.uses.push(Use { handle: handle.into(), access, mode: Mode::Read });
+        self
+    }
+
+    /// The pass replaces all contents of the resource; earlier ones are lost. Returns the new version.
+    pub fn write<H: Versioned>(&mut self, handle: H, access: Access) -> H {
+        self.change(handle, access, Mode::Write)
+    }
+
+    /// The pass changes some contents of the resource, or reads and writes it; earlier ones must exist. Returns the new
+    /// version.
+    pub fn modify<H: Versioned>(&mut self, handle: H, access: Access) -> H {
+        self.change(handle, access, Mode::Modify)
+    }
+
+    fn change<H: Versioned>(&mut self, handle: H, access: Access, mode: Mode) -> H {
+        let handle = handle.into();
+        self.pass.uses.push(Use { handle, access, mode });
+        handle.next().into()
+    }
+
+    /// What the pass records when it runs.
+    pub fn record(&mut self, work: W) {
+        self.pass.work = Some(work);
+    }
+}

@@ -1,0 +1,48 @@
+//! Lifetimes: which resources the plan uses, for what, and from which pass to which.
+use super::access::Access;
+use super::declare::{Graph, Kind};
+use super::plan::{PlannedResource, ResourceInfo};
+use ash::vk;
+
+/// First and last position in the plan, both included.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Lifetime {
+    /// Position of the first pass that uses the resource.
+    pub first: usize,
+    /// Position of the last pass that uses the resource.
+    pub last: usize,
+}
+
+impl Lifetime {
+    /// Whether some pass of the plan is in both.
+    pub fn overlaps(self, other: Self) -> bool {
+        self.first <= other.last && other.first <= self.last
+    }
+}
+
+/// The resources that some pass of `order` uses, in order of declaration: no other is ever made.
+pub(super) fn lifetimes<W>(graph: &Graph<W>, order: &[usize]) -> Vec<PlannedResource> {
+    let planned = graph.resources.iter().enumerate().filter_map(|(declared, resource)| {
+        let uses = order.iter().enumerate().flat_map(|(position, &pass)| {
+            let of_resource = graph.passes[pass].uses.iter().filter(|use_| use_.handle.resource == declared);
+            of_resource.map(move |use_| (position, use_.access))
+        });
+        let lifetime = Lifetime { first: uses.clone().next()?.0, last: uses.clone().last()?.0 };
+        let import = resource.import.as_ref();
+        let by_owner = import.into_iter().flat_map(|import| [import.before, import.after]).flatten();
+        let mut info = ResourceInfo {
+            name: resource.name.clone(),
+            kind: resource.kind,
+            image_usage: vk::ImageUsageFlags::empty(),
+            buffer_usage: vk::BufferUsageFlags::empty(),
+        };
+        for access in uses.map(|(_, access)| access).chain(by_owner).map(Access::info) {
+            match info.kind {
+                Kind::Image(_) => info.image_usage |= access.image_usage.unwrap_or_default(),
+                Kind::Buffer(_) => info.buffer_usage |= access.buffer_usage.unwrap_or_default(),
+            }
+        }
+        Some(PlannedResource { info, imported: import.is_some(), lifetime, placement: None, declared })
+    });
+    planned.collect()
+}

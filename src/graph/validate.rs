@@ -1,0 +1,194 @@
+//! Validate: everything that makes a graph meaningless is an error that names the pass and the resource.
+use super::access::{Access, Mode, is_depth};
+use super::declare::{Graph, Handle, Kind, Pass, Resource, Use};
+use std::collections::{HashMap, HashSet};
+
+/// Why a graph has no plan.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[allow(missing_docs)] // The messages say what the fields are.
+pub enum GraphError {
+    #[error(
+        "pass `{pass}` reads `{resource}` before anything has written it; write it first, or import it with contents"
+    )]
+    ReadBeforeWrite { pass: String, resource: String },
+    #[error(
+        "passes `{first}` and `{second}` both write the same version of `{resource}`; give `{second}` the handle that `{first}` returns"
+    )]
+    TwoWriters { resource: String, first: String, second: String },
+    #[error("pass `{pass}` uses `{resource}` as {access:?}: {problem}")]
+    WrongUsage { pass: String, resource: String, access: Access, problem: &'static str },
+    #[error("`{resource}` is imported as {access:?}: {problem}")]
+    WrongImport { resource: String, access: Access, problem: &'static str },
+    #[error(
+        "pass `{pass}` uses `{resource}` as {first:?} and as {second:?}; only reads of one version in one layout go together"
+    )]
+    Conflict { pass: String, resource: String, first: Access, second: Access },
+    #[error("pass `{pass}` writes nothing, so it has no effect; declare what it writes or remove it")]
+    NoEffect { pass: String },
+    #[error("pass `{pass}` records nothing; call `record`")]
+    NoWork { pass: String },
+    #[error("`{user}` uses a handle that is not of this graph")]
+    UnknownHandle { user: String },
+    #[error("the graph has no output, so no pass is needed; call `output`")]
+    NoOutput,
+    #[error("output `{resource}` is never written; output the handle that the last pass to write it returns")]
+    OutputNotWritten { resource: String },
+    #[error("output `{resource}` is overwritten by pass `{pass}`; output the handle that this pass returns")]
+    OutputOverwritten { resource: String, pass: String },
+    #[error(
+        "output `{resource}` is transient, so nobody sees it after the frame; import it, or copy it to something imported"
+    )]
+    OutputTransient { resource: String },
+    #[error("`{resource}` has no size; all of its dimensions must be at least 1")]
+    ZeroSize { resource: String },
+    #[error("two {what} are named `{name}`; names must differ")]
+    DuplicateName { what: &'static str, name: String },
+    #[error("cycle: {}; read the newer version, or copy the older one first", steps.join(", "))]
+    Cycle { steps: Vec<String> },
+}
+
+/// Checks all passes, also those that will be culled: whether a graph is wrong does not depend on what is asked of it.
+pub(super) fn validate<W>(graph: &Graph<W>) -> Result<(), GraphError> {
+    distinct("resources", graph.resources.iter().map(|resource| &resource.name))?;
+    distinct("passes", graph.passes.iter().map(|pass| &pass.name))?;
+    graph.resources.iter().try_for_each(check_resource)?;
+    let writers = writers(graph)?;
+    for pass in &graph.passes {
+        check_pass(graph, pass, &writers)?;
+    }
+    check_outputs(graph, &writers)
+}
+
+/// Which pass makes which version.
+type Writers<'a> = HashMap<Handle, &'a str>;
+
+fn distinct<'a>(what: &'static str, names: impl Iterator<Item = &'a String>) -> Result<(), GraphError> {
+    let mut seen = HashSet::new();
+    for name in names {
+        if !seen.insert(name) {
+            return Err(GraphError::DuplicateName { what, name: name.clone() });
+        }
+    }
+    Ok(())
+}
+
+fn check_resource(resource: &Resource) -> Result<(), GraphError> {
+    let empty = match resource.kind {
+        Kind::Image(desc) => desc.width == 0 || desc.height == 0,
+        Kind::Buffer(desc) => desc.size_bytes == 0,
+    };
+    if empty {
+        return Err(GraphError::ZeroSize { resource: resource.name.clone() });
+    }
+    for access in resource.import.iter().flat_map(|import| [import.before, import.after]).flatten() {
+        misfit(access, &resource.kind).map_or(Ok(()), |problem| {
+            Err(GraphError::WrongImport { resource: resource.name.clone(), access, problem })
+        })?;
+    }
+    Ok(())
+}
+
+fn writers<W>(graph: &Graph<W>) -> Result<Writers<'_>, GraphError> {
+    let mut writers = Writers::new();
+    for pass in &graph.passes {
+        for made in pass.uses.iter().filter_map(|use_| use_.makes()) {
+            let first = writers.insert(made, &pass.name);
+            if let Some(first) = first.filter(|first| *first != pass.name) {
+                let resource = graph.resources.get(made.resource).map_or(String::new(), |r| r.name.clone());
+                return Err(GraphError::TwoWriters { resource, first: first.to_owned(), second: pass.name.clone() });
+            }
+        }
+    }
+    Ok(writers)
+}
+
+fn check_pass<W>(graph: &Graph<W>, pass: &Pass<W>, writers: &Writers) -> Result<(), GraphError> {
+    let name = || pass.name.clone();
+    for (index, use_) in pass.uses.iter().enumerate() {
+        let Some(resource) = existing(graph, use_.handle, writers) else {
+            return Err(GraphError::UnknownHandle { user: name() });
+        };
+        if let Some(problem) = wrong_usage(*use_, &resource.kind) {
+            let (pass, resource) = (name(), resource.name.clone());
+            return Err(GraphError::WrongUsage { pass, resource, access: use_.access, problem });
+        }
+        if let Some(other) = pass.uses[..index].iter().find(|other| !go_together(**other, *use_, &resource.kind)) {
+            let (pass, resource) = (name(), resource.name.clone());
+            return Err(GraphError::Conflict { pass, resource, first: other.access, second: use_.access });
+        }
+        if use_.mode != Mode::Write && !has_contents(use_.handle, resource) {
+            return Err(GraphError::ReadBeforeWrite { pass: name(), resource: resource.name.clone() });
+        }
+    }
+    if pass.uses.iter().all(|use_| use_.mode == Mode::Read) {
+        return Err(GraphError::NoEffect { pass: name() });
+    }
+    pass.work.as_ref().map_or(Err(GraphError::NoWork { pass: name() }), |_| Ok(()))
+}
+
+fn check_outputs<W>(graph: &Graph<W>, writers: &Writers) -> Result<(), GraphError> {
+    for output in &graph.outputs {
+        let Some(resource) = existing(graph, *output, writers) else {
+            return Err(GraphError::UnknownHandle { user: "output".to_owned() });
+        };
+        let name = resource.name.clone();
+        if resource.import.is_none() {
+            return Err(GraphError::OutputTransient { resource: name });
+        }
+        if let Some(pass) = writers.get(&output.next()) {
+            return Err(match output.version {
+                0 => GraphError::OutputNotWritten { resource: name },
+                _ => GraphError::OutputOverwritten { resource: name, pass: pass.to_string() },
+            });
+        }
+        if !has_contents(*output, resource) {
+            return Err(GraphError::OutputNotWritten { resource: name });
+        }
+    }
+    if graph.outputs.is_empty() { Err(GraphError::NoOutput) } else { Ok(()) }
+}
+
+fn existing<'a, W>(graph: &'a Graph<W>, handle: Handle, writers: &Writers) -> Option<&'a Resource> {
+    graph.resources.get(handle.resource).filter(|_| handle.version == 0 || writers.contains_key(&handle))
+}
+
+fn has_contents(handle: Handle, resource: &Resource) -> bool {
+    handle.version > 0 || resource.import.as_ref().is_some_and(|import| import.before.is_some())
+}
+
+/// Two uses of one resource in one pass are not ordered against each other, and an image has one layout at a time.
+fn go_together(a: Use, b: Use, kind: &Kind) -> bool {
+    let same_layout = matches!(kind, Kind::Buffer(_)) || a.access.info().layout == b.access.info().layout;
+    let reads = a.mode == Mode::Read && b.mode == Mode::Read;
+    a.handle.resource != b.handle.resource || (reads && a.handle == b.handle && same_layout)
+}
+
+fn wrong_usage(use_: Use, kind: &Kind) -> Option<&'static str> {
+    let writes = !use_.access.info().writes.is_empty();
+    if use_.access.is_outside_frame() {
+        Some("only the owner of an imported resource does that; say so when importing it")
+    } else if use_.mode == Mode::Read && writes {
+        Some("that access writes; declare a write or a modify")
+    } else if use_.mode != Mode::Read && !writes {
+        Some("that access only reads; declare a read")
+    } else {
+        misfit(use_.access, kind)
+    }
+}
+
+/// Why `access` cannot be made to such a resource.
+fn misfit(access: Access, kind: &Kind) -> Option<&'static str> {
+    let info = access.info();
+    match kind {
+        Kind::Buffer(_) => info.buffer_usage.is_none().then_some("that access is for images, and this is a buffer"),
+        Kind::Image(_) if info.image_usage.is_none() => Some("that access is for buffers, and this is an image"),
+        Kind::Image(desc) => match (access, is_depth(desc.format)) {
+            (Access::DepthAttachment, false) => Some("its format has no depth"),
+            (Access::ColorAttachment, true) => Some("its format is a depth format"),
+            (Access::StorageReadGraphics | Access::StorageReadCompute | Access::StorageWriteCompute, true) => {
+                Some("depth formats cannot be storage images")
+            }
+            _ => None,
+        },
+    }
+}
