@@ -41,6 +41,20 @@ impl Error {
     /// An [`Error::Input`] for a file that cannot be written.
     pub fn unwritable(path: impl Into<PathBuf>, cause: impl std::fmt::Display) -> Self {
         let path = path.into();
-        Self::in_file(&path, format!("cannot be written ({cause})"), "choose a folder that exists and may be written to")
+        Self::in_file(
+            &path,
+            format!("cannot be written ({cause})"),
+            "choose a folder that exists and may be written to",
+        )
+    }
+
+    /// The same error with `context` (a file, a section of it) in front of its subject.
+    pub fn within(self, context: impl std::fmt::Display) -> Self {
+        match self {
+            Self::Input { subject, problem, remedy } => {
+                Self::Input { subject: format!("{context}: {subject}"), problem, remedy }
+            }
+            other => other,
+        }
     }
 }
