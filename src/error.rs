@@ -17,6 +17,9 @@ pub enum Error {
         /// What the user can do about it, in half a sentence.
         remedy: String,
     },
+    /// The frame that was declared contradicts itself.
+    #[error("frame graph: {0}")]
+    Graph(#[from] crate::graph::GraphError),
     /// Vulkan refused something.
     #[error(transparent)]
     Vulkan(#[from] crate::vulkan::VulkanError),
@@ -49,5 +52,15 @@ impl Error {
             format!("cannot be written ({cause})"),
             "choose a folder that exists and may be written to",
         )
+    }
+
+    /// The same error with `context` (a file, a section of it) in front of its subject.
+    pub fn within(self, context: impl std::fmt::Display) -> Self {
+        match self {
+            Self::Input { subject, problem, remedy } => {
+                Self::Input { subject: format!("{context}: {subject}"), problem, remedy }
+            }
+            other => other,
+        }
     }
 }

@@ -1,0 +1,31 @@
+// MERL: a measured table over half and difference angles. Twin of src/brdf/merl.rs.
+// a.x, a.y: y and z offset of this table in the atlas of all tables, in texels.
+//
+// The including shader defines `vec4 brdf_table_texel(vec3 texel_coordinate)`: a trilinear fetch from the atlas at a position
+// in texels (centres at i + 0.5) whose x repeats every 180.
+#include "parameters.glsl"
+
+vec3 merl(BrdfParameters parameters, vec3 w_i, vec3 w_o) {
+    const float HALF_PI = 1.57079633;
+    if (!(w_i.z > 0.0 && w_o.z > 0.0)) return vec3(0.0);
+    vec3 h = normalize(w_i + w_o);
+    float sin_theta_h = length(h.xy);
+    // The azimuth of a half vector at the pole is arbitrary.
+    vec2 phi_h = sin_theta_h > 0.0 ? h.xy / sin_theta_h : vec2(1.0, 0.0);
+    // d: w_i seen from a frame with h as its pole.
+    vec3 d = vec3(h.z * dot(w_i.xy, phi_h) - sin_theta_h * w_i.z, w_i.y * phi_h.x - w_i.x * phi_h.y, dot(w_i, h));
+    // atan rather than acos, which has no digits left near the pole, just where bins are smallest.
+    float theta_h = atan(sin_theta_h, h.z);
+    float sin_theta_d = length(d.xy);
+    float theta_d = atan(sin_theta_d, d.z);
+    // atan(0, 0) is undefined in GLSL.
+    float phi_d = sin_theta_d > 0.0 ? atan(d.y, d.x) : 0.0;
+    if (phi_d < 0.0) phi_d += 2.0 * HALF_PI; // reciprocity
+
+    // Clamped by hand so that neighbours in the atlas never bleed in.
+    float x = 180.0 * phi_d / (2.0 * HALF_PI);
+    float y = clamp(90.0 * theta_d / HALF_PI, 0.5, 89.5) + parameters.a.x;
+    float z = clamp(90.0 * sqrt(theta_h / HALF_PI), 0.5, 89.5) + parameters.a.y;
+    vec4 texel = brdf_table_texel(vec3(x, y, z));
+    return texel.a > 0.0 ? texel.rgb / texel.a : vec3(0.0);
+}

@@ -1,0 +1,14 @@
+//! The materials that come with the program: assets/materials/<name>.toml.
+
+macro_rules! materials {
+    ($($name:literal)+) => {
+        /// (name, TOML text), in the order in which to list them.
+        pub(super) const MATERIALS: &[(&str, &str)] =
+            &[$(($name, include_str!(concat!("../../assets/materials/", $name, ".toml")))),+];
+    };
+}
+
+materials! {
+    "gold" "silver" "copper" "aluminium" "chrome" "tungsten" "titanium-nitride"
+    "red-plastic" "blue-plastic" "white-plastic" "billiard-ball" "clay"
+}

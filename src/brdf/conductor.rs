@@ -1,0 +1,47 @@
+//! Rough metal: f = F D G / (4 cos_theta_i cos_theta_o), exact conductor Fresnel. Twin: glsl/brdf/conductor.glsl.
+use glam::DVec3;
+
+use super::microfacet::{Distribution, fresnel_conductor};
+use super::{Model, Parameters, hash_numbers};
+use crate::error::Result;
+
+/// A rough metal surface.
+#[derive(Clone, Copy, Debug)]
+pub struct Conductor {
+    /// Distribution of microfacet normals.
+    pub distribution: Distribution,
+    /// Its roughness_alpha, 0.001 to 1, not squared.
+    pub alpha: f64,
+    /// Real part of the refractive index at the red, green and blue wavelengths.
+    pub eta: DVec3,
+    /// Imaginary part (extinction), not negative.
+    pub k: DVec3,
+}
+
+impl Model for Conductor {
+    fn evaluate(&self, w_i: DVec3, w_o: DVec3) -> DVec3 {
+        let h = (w_i + w_o).normalize();
+        fresnel_conductor(w_o.dot(h), self.eta, self.k) * self.distribution.rough_mirror(w_i, w_o, h, self.alpha)
+    }
+
+    fn from_parameters(parameters: &mut Parameters) -> Result<Self> {
+        let (distribution, alpha) = Distribution::from_parameters(parameters)?;
+        // No material is outside: the bounds only keep the Fresnel terms far from overflow in single precision.
+        let eta = parameters.colour("eta", 1e-3..=100.0)?;
+        let k = parameters.colour("k", 0.0..=100.0)?;
+        Ok(Self { distribution, alpha, eta, k })
+    }
+
+    fn gpu_parameters(&self) -> [f32; 12] {
+        let mut packed = [0.0; 12];
+        packed[0..4].copy_from_slice(&self.eta.as_vec3().extend(self.alpha as f32).to_array());
+        packed[4..8].copy_from_slice(&self.k.as_vec3().extend(self.distribution.gpu_id()).to_array());
+        packed
+    }
+
+    fn hash_content(&self, hasher: &mut blake3::Hasher) {
+        hash_numbers(hasher, [f64::from(self.distribution.gpu_id()), self.alpha]);
+        hash_numbers(hasher, self.eta.to_array());
+        hash_numbers(hasher, self.k.to_array());
+    }
+}
