@@ -5,8 +5,13 @@ pub mod brdf;
 pub mod environment;
 pub mod error;
 pub mod graph;
+pub mod method;
 pub mod output;
+pub mod passes;
+pub mod pipeline;
+pub mod prepare;
 pub mod scene;
+pub mod shading;
 pub mod threads;
 #[allow(unsafe_code)]
 pub mod vulkan;

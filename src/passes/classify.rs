@@ -100,3 +100,11 @@ pub fn classify<'a>(graph: &mut FrameGraph<'a>, classify: &'a Classify, geometry
     }));
     Tiles { counters, pixels, radiance }
 }
+
+impl Counters {
+    /// Lookups in the environment that shading makes with `threads` threads: all of them once in an interior pixel, and
+    /// once in every covered sub-pixel of an edge pixel.
+    pub fn lookups(&self, threads: u32) -> u64 {
+        u64::from(threads) * (u64::from(self.interior.count) + u64::from(self.covered_edge_subpixels))
+    }
+}

@@ -13,9 +13,6 @@ use ash::vk;
 use bytemuck::{Pod, Zeroable};
 use std::sync::Arc;
 
-/// A BRDF and its threads.
-pub type Material = (Brdf, ThreadTable);
-
 /// `Material` in glsl/material.glsl.
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
@@ -42,7 +39,10 @@ impl DeviceMaterials {
     ///
     /// # Errors
     /// No device memory left, or more measured tables than a 3D image of the device holds.
-    pub fn new(device: &Arc<Device>, materials: &[Material]) -> Result<Self> {
+    pub fn new<'m>(
+        device: &Arc<Device>,
+        materials: impl IntoIterator<Item = (&'m Brdf, &'m ThreadTable)>,
+    ) -> Result<Self> {
         let mut records = Vec::new();
         let mut threads: Vec<[f32; 4]> = Vec::new();
         let mut tables = TableAtlas::default();

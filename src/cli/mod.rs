@@ -1,0 +1,98 @@
+//! The command line: one file per subcommand.
+
+mod completions;
+mod devices;
+mod materials;
+mod progress;
+mod render;
+mod threads;
+
+use clap::{Parser, Subcommand};
+use std::io::IsTerminal;
+use std::path::{Path, PathBuf};
+use threadlight::brdf::Brdf;
+use threadlight::scene::{MaterialSource, Source};
+
+const EXAMPLES: &str = "\
+Examples:
+  threadlight render -o image.png
+  threadlight render --mesh dragon.obj --material gold.toml --environment studio.hdr -o dragon.png
+  threadlight render scene.toml --size 1920x1080 --subpixels 3 -o scene.exr
+  threadlight threads alumina-oxide.binary --count 100 -o alumina.threads --plot alumina.png
+  threadlight materials
+
+Exit codes: 0 done, 1 the machine could not, 2 the input was wrong, 130 cancelled.";
+
+/// Renders measured and analytic BRDFs under HDR environment light, in real time and without noise.
+#[derive(Parser)]
+#[command(version, after_help = EXAMPLES, infer_subcommands = true)]
+pub struct Arguments {
+    /// Say more: -v what is done, -vv in detail.
+    #[arg(short, long, global = true, action = clap::ArgAction::Count)]
+    pub verbose: u8,
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    Render(render::Render),
+    Threads(threads::Threads),
+    Materials(materials::Materials),
+    Devices(devices::Devices),
+    Completions(completions::Completions),
+}
+
+impl Arguments {
+    /// Does what was asked.
+    pub fn run(self) -> anyhow::Result<()> {
+        match self.command {
+            Command::Render(render) => render.run(),
+            Command::Threads(threads) => threads.run(),
+            Command::Materials(materials) => materials.run(),
+            Command::Devices(devices) => devices.run(),
+            Command::Completions(completions) => completions.run(),
+        }
+    }
+}
+
+/// Sends the library's log to standard error; RUST_LOG overrides the flag.
+pub fn start_logging(verbose: u8) {
+    let level = ["warn", "threadlight=info", "threadlight=debug"][usize::from(verbose.min(2))];
+    let filter = tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| level.into());
+    tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_writer(std::io::stderr)
+        .with_ansi(std::io::stderr().is_terminal())
+        .without_time()
+        .with_target(false)
+        .init();
+}
+
+/// A built-in's name if `text` is one of `names`, else a file (`./name` for a file that is called like a built-in).
+fn source_of(text: &str, names: impl IntoIterator<Item = impl AsRef<str>>) -> Source {
+    if names.into_iter().any(|name| name.as_ref() == text) {
+        Source::Builtin(text.to_owned())
+    } else {
+        Source::File(PathBuf::from(text))
+    }
+}
+
+/// The material that `text` names: built in, or a file. A name that is neither, and looks like no file, is an unknown
+/// built-in rather than a missing file.
+fn material_of(text: &str) -> MaterialSource {
+    match source_of(text, Brdf::builtin_names()) {
+        Source::File(path) if path.extension().is_some() || path.exists() => MaterialSource::File(path),
+        _ => MaterialSource::Builtin(text.to_owned()),
+    }
+}
+
+/// The folder that threads and pipelines are cached in; none with `--no-cache`.
+fn cache_folder(no_cache: bool) -> Option<PathBuf> {
+    (!no_cache).then(threadlight::threads::default_directory).flatten()
+}
+
+/// The last part of a path, without its extension.
+fn stem(path: &Path) -> String {
+    path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
+}

@@ -1,0 +1,44 @@
+//! The progress bar of a long computation, and Ctrl-C as the way out of it.
+use indicatif::{ProgressBar, ProgressStyle};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use threadlight::threads::Observer;
+
+/// A bar on a terminal (nothing elsewhere); Ctrl-C cancels what it shows.
+pub struct Progress {
+    bar: ProgressBar,
+    cancelled: Arc<AtomicBool>,
+}
+
+impl Progress {
+    /// A bar called `name`, hidden until something happens.
+    pub fn new(name: &'static str) -> anyhow::Result<Self> {
+        let cancelled = Arc::new(AtomicBool::new(false));
+        let flag = cancelled.clone();
+        ctrlc::set_handler(move || {
+            // A second Ctrl-C is for those who do not want to wait for the first.
+            if flag.swap(true, Ordering::Relaxed) {
+                std::process::exit(130);
+            }
+        })?;
+        let style = ProgressStyle::with_template("{prefix} {wide_bar} {pos}/{len} rows, {eta} left")?;
+        let bar = ProgressBar::no_length().with_style(style).with_prefix(name);
+        Ok(Self { bar, cancelled })
+    }
+
+    /// Takes the bar off the terminal.
+    pub fn finish(&self) {
+        self.bar.finish_and_clear();
+    }
+}
+
+impl Observer for Progress {
+    fn progress(&self, done: usize, total: usize) {
+        self.bar.set_length(total as u64);
+        self.bar.set_position(done as u64);
+    }
+
+    fn cancelled(&self) -> bool {
+        self.cancelled.load(Ordering::Relaxed)
+    }
+}

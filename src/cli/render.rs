@@ -1,0 +1,271 @@
+//! `threadlight render`: a picture of a scene.
+use super::progress::Progress;
+use super::{cache_folder, material_of, source_of};
+use anyhow::Context;
+use std::path::PathBuf;
+use threadlight::output::{self, ExrHeader, Format};
+use threadlight::pipeline::{Renderer, Rendering, Wanted};
+use threadlight::prepare::{Prepared, prepare};
+use threadlight::scene::{Background, MaterialSettings, Mesh, ObjectSettings, Scene};
+use threadlight::threads::CacheState;
+use threadlight::vulkan::{Device, Instance};
+use threadlight::{Error, environment};
+
+const EXAMPLES: &str = "\
+Examples:
+  threadlight render -o image.png                       the built-in scene
+  threadlight render --material silver --environment sun --size 1280x960 -o silver.png
+  threadlight render --mesh dragon.obj --material alumina-oxide.binary --environment lebombo.hdr -o dragon.exr
+  threadlight render scene.toml --repeat 20 --stats times.json
+  threadlight render --print-plan                       what a frame does, in which order, in which memory";
+
+/// Renders a scene to a PNG or EXR file. Flags override the scene file.
+#[derive(clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub struct Render {
+    /// Scene file (TOML); without one, the built-in scene: a gold sphere in a studio.
+    scene: Option<PathBuf>,
+    /// Mesh in place of the scene's objects: a built-in name or an OBJ file.
+    #[arg(long, value_name = "NAME|FILE")]
+    mesh: Option<String>,
+    /// Material of every object: a built-in name, a MERL .binary, or a .toml with a model and its parameters.
+    #[arg(long, value_name = "NAME|FILE")]
+    material: Option<String>,
+    /// Light from all directions: a built-in name, a Radiance .hdr or an .exr, latitude-longitude.
+    #[arg(long, value_name = "NAME|FILE")]
+    environment: Option<String>,
+    /// Shading method.
+    #[arg(long, value_name = "NAME")]
+    method: Option<String>,
+    /// Sample threads per pixel, 1 to 1024.
+    #[arg(long, value_name = "N")]
+    threads: Option<u32>,
+    /// Sub-pixels per axis, 1 to 4.
+    #[arg(long, value_name = "S")]
+    subpixels: Option<u32>,
+    /// Size of the picture in pixels.
+    #[arg(long, value_name = "WxH", value_parser = parse_size)]
+    size: Option<(u32, u32)>,
+    /// Factor on radiance before display.
+    #[arg(long, value_name = "X")]
+    exposure: Option<f64>,
+    /// Display values are radiance to the power of 1/X.
+    #[arg(long, value_name = "X")]
+    gamma: Option<f64>,
+    /// What is seen behind the objects.
+    #[arg(long, value_name = "environment|none")]
+    background: Option<String>,
+    /// Turns the environment about the vertical axis, counter-clockwise seen from above, in degrees.
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
+    rotation: Option<f64>,
+    /// Seed of everything random; the same seed gives the same bytes.
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+    /// Vulkan device: its index or part of its name, as `threadlight devices` lists them.
+    #[arg(long, value_name = "NAME|INDEX")]
+    device: Option<String>,
+    /// Turn on Vulkan's validation layer, with synchronisation validation; any message is a failure.
+    #[arg(long)]
+    validate: bool,
+    /// Render this often; times are medians.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    repeat: u32,
+    /// Write times, counts and memory as JSON.
+    #[arg(long, value_name = "FILE")]
+    stats: Option<PathBuf>,
+    /// Print the plan of the frame: passes, barriers, what was culled, memory.
+    #[arg(long)]
+    print_plan: bool,
+    /// Neither read nor write cached threads and pipelines.
+    #[arg(long)]
+    no_cache: bool,
+    /// Picture to write: .png (8 bit, display values) or .exr (32-bit float, linear radiance).
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+}
+
+/// What `--stats` writes.
+#[derive(serde::Serialize)]
+struct Stats<'a> {
+    version: &'a str,
+    device: &'a str,
+    method: &'a str,
+    threads: u32,
+    subpixels: u32,
+    width: u32,
+    height: u32,
+    /// Sub-pixels that see a surface.
+    covered_subpixels: u32,
+    /// Pixels that share one sum over the threads among their sub-pixels.
+    interior_pixels: u32,
+    /// Pixels that sum over all threads in each covered sub-pixel.
+    edge_pixels: u32,
+    /// Lookups in the environment that shading made.
+    lookups: u64,
+    passes: Vec<Pass<'a>>,
+    frame_ms: f64,
+    thread_generation_ms: f64,
+    thread_cache: &'a str,
+    device_memory_bytes: u64,
+    validation_messages: usize,
+}
+
+#[derive(serde::Serialize)]
+struct Pass<'a> {
+    name: &'a str,
+    gpu_ms: f64,
+}
+
+impl Render {
+    pub fn run(self) -> anyhow::Result<()> {
+        if self.output.is_none() && self.stats.is_none() && !self.print_plan {
+            let remedy = "name a picture with -o FILE.png, or ask for --stats or --print-plan";
+            return Err(Error::input("render", "has nothing to write", remedy).into());
+        }
+        if self.repeat == 0 {
+            return Err(Error::input("--repeat 0", "renders nothing", "use 1 or more").into());
+        }
+        // Whatever is wrong with the command is said before the work begins.
+        let format = self.output.as_deref().map(Format::of).transpose()?;
+        for path in self.output.iter() {
+            output::check_writable(path)?;
+        }
+        for path in self.stats.iter() {
+            output::check_folder(path)?;
+        }
+        let scene = self.scene()?;
+        let cache = cache_folder(self.no_cache);
+        let progress = Progress::new("threads")?;
+        let prepared = prepare(&scene, cache.as_deref(), &progress)?;
+        progress.finish();
+
+        let instance = Instance::new(self.validate).map_err(Error::from)?;
+        let messages = instance.messages();
+        let device = Device::new(&instance, self.device.as_deref()).map_err(Error::from)?;
+        drop(instance);
+        let device_name = device.description().name.clone();
+        let renderer = Renderer::new(&device, cache.as_deref(), &prepared)?;
+        let wanted = Wanted {
+            radiance: format == Some(Format::Exr),
+            display: format != Some(Format::Exr),
+            ..Wanted::default()
+        };
+        let rendering = renderer.render(wanted, self.repeat)?;
+        // Closing the device is part of what validation checks.
+        drop(renderer);
+        drop(device);
+
+        if self.print_plan {
+            print!("{}", rendering.plan);
+        }
+        if let Some(path) = &self.output {
+            let view = &prepared.view;
+            let transparent = scene.image.background == Background::None;
+            match format {
+                Some(Format::Exr) => {
+                    let header = self.exr_header(&scene, &prepared, &rendering, &device_name);
+                    output::write_exr(path, view.width, view.height, &rendering.radiance, transparent, &header)?;
+                }
+                _ => output::write_png(path, view.width, view.height, &rendering.display, transparent)?,
+            }
+        }
+        let messages = messages.all();
+        if let Some(path) = &self.stats {
+            let stats = stats(&scene, &prepared, &rendering, &device_name, messages.len());
+            let text = serde_json::to_string_pretty(&stats).context("--stats")? + "\n";
+            output::write_whole(path, text.as_bytes())?;
+        }
+        if let Some(first) = messages.first() {
+            anyhow::bail!("validation: {} messages, the first: {}", messages.len(), first.replace('\n', " "));
+        }
+        Ok(())
+    }
+
+    /// The scene file, or the built-in scene, with the flags laid over it.
+    fn scene(&self) -> threadlight::Result<Scene> {
+        let mut scene = match &self.scene {
+            Some(path) => Scene::load(path)?,
+            None => Scene::default(),
+        };
+        if let Some(material) = &self.material {
+            scene.materials = vec![MaterialSettings { name: material.clone(), source: material_of(material) }];
+            scene.objects.iter_mut().for_each(|object| object.material.clone_from(material));
+        }
+        if let Some(mesh) = &self.mesh {
+            let mesh = source_of(mesh, Mesh::builtin_names());
+            let material = scene.objects.first().map(|object| object.material.clone()).unwrap_or_default();
+            scene.objects = vec![ObjectSettings::new(mesh, material)];
+        }
+        if let Some(name) = &self.environment {
+            scene.environment.source = source_of(name, environment::builtin_names());
+        }
+        if let Some(background) = &self.background {
+            scene.image.background = background.parse()?;
+        }
+        if let Some((width, height)) = self.size {
+            (scene.image.width, scene.image.height) = (width, height);
+        }
+        fn lay<T: Clone>(flag: &Option<T>, setting: &mut T) {
+            if let Some(value) = flag {
+                *setting = value.clone();
+            }
+        }
+        lay(&self.method, &mut scene.shading.method);
+        lay(&self.threads, &mut scene.shading.threads);
+        lay(&self.seed, &mut scene.shading.seed);
+        lay(&self.subpixels, &mut scene.image.subpixels);
+        lay(&self.exposure, &mut scene.image.exposure);
+        lay(&self.gamma, &mut scene.image.gamma);
+        lay(&self.rotation, &mut scene.environment.rotation_deg);
+        scene.validate()?;
+        Ok(scene)
+    }
+
+    fn exr_header(&self, scene: &Scene, prepared: &Prepared, rendering: &Rendering, device: &str) -> ExrHeader {
+        let materials: Vec<_> = prepared.materials.iter().map(|material| material.name.as_str()).collect();
+        ExrHeader {
+            method: prepared.method.name().to_owned(),
+            threads: scene.shading.threads,
+            material: materials.join(", "),
+            environment: prepared.environment.name.clone(),
+            device: device.to_owned(),
+            seconds: rendering.frame_ms * 1e-3,
+            ..ExrHeader::default()
+        }
+    }
+}
+
+fn stats<'a>(
+    scene: &'a Scene,
+    prepared: &'a Prepared,
+    rendering: &'a Rendering,
+    device: &'a str,
+    validation_messages: usize,
+) -> Stats<'a> {
+    let counters = &rendering.counters;
+    Stats {
+        version: env!("CARGO_PKG_VERSION"),
+        device,
+        method: prepared.method.name(),
+        threads: scene.shading.threads,
+        subpixels: prepared.view.subpixels,
+        width: prepared.view.width,
+        height: prepared.view.height,
+        covered_subpixels: counters.covered_subpixels,
+        interior_pixels: counters.interior.count,
+        edge_pixels: counters.edge.count,
+        lookups: counters.lookups(scene.shading.threads),
+        passes: rendering.passes.iter().map(|pass| Pass { name: &pass.name, gpu_ms: pass.gpu_ms }).collect(),
+        frame_ms: rendering.frame_ms,
+        thread_generation_ms: prepared.thread_time.as_secs_f64() * 1e3,
+        thread_cache: if prepared.thread_cache == CacheState::Hit { "hit" } else { "miss" },
+        device_memory_bytes: rendering.device_memory_bytes,
+        validation_messages,
+    }
+}
+
+/// `640x480`.
+fn parse_size(text: &str) -> Result<(u32, u32), String> {
+    let sides = text.split_once(['x', 'X']).and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
+    sides.ok_or_else(|| "write width x height in pixels, such as 640x480".to_owned())
+}

@@ -1,0 +1,70 @@
+//! `threadlight threads`: makes, writes and draws the sample threads of a material.
+use super::progress::Progress;
+use super::{cache_folder, material_of, stem};
+use std::path::PathBuf;
+use threadlight::Error;
+use threadlight::output;
+use threadlight::prepare::load_material;
+use threadlight::scene::MaterialSource;
+use threadlight::threads::{self, CacheState, Settings};
+
+const EXAMPLES: &str = "\
+Examples:
+  threadlight threads gold --count 100 -o gold.threads
+  threadlight threads alumina-oxide.binary --count 16 --plot curves.png";
+
+/// Makes the sample threads of a material; writes them to a file, or draws them on the hemisphere.
+#[derive(clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub struct Threads {
+    /// A built-in name, a MERL .binary, or a .toml with a model and its parameters.
+    material: String,
+    /// Number of threads, 1 to 1024.
+    #[arg(long, value_name = "N", default_value_t = 100)]
+    count: u32,
+    /// Seed of everything random; the same seed gives the same bytes.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    seed: u64,
+    /// Neither read nor write cached threads.
+    #[arg(long)]
+    no_cache: bool,
+    /// Thread file to write.
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+    /// Picture of the threads to draw, as the paper's figures 7 and 8.
+    #[arg(long, value_name = "FILE.png")]
+    plot: Option<PathBuf>,
+}
+
+impl Threads {
+    pub fn run(self) -> anyhow::Result<()> {
+        if self.output.is_none() && self.plot.is_none() {
+            let remedy = "name a thread file with -o FILE, or a picture with --plot FILE.png";
+            return Err(Error::input("threads", "has nothing to write", remedy).into());
+        }
+        for path in self.output.iter().chain(&self.plot) {
+            output::check_folder(path)?;
+        }
+        let source = material_of(&self.material);
+        let name = match &source {
+            MaterialSource::File(path) => stem(path),
+            _ => self.material.clone(),
+        };
+        let brdf = load_material(&source)?;
+        let settings = Settings { count: self.count as usize, seed: self.seed, ..Default::default() };
+        let progress = Progress::new("threads")?;
+        let cache = cache_folder(self.no_cache);
+        let (mut table, state, time) = threads::load_or_generate(&brdf, &settings, cache.as_deref(), &progress)?;
+        progress.finish();
+        table.material = name;
+        let how = if state == CacheState::Hit { "read from the cache" } else { "made" };
+        eprintln!("{} threads x {} rows {how} in {:.2} s", table.count, table.rows, time.as_secs_f64());
+        if let Some(path) = &self.output {
+            threads::write(path, &table)?;
+        }
+        if let Some(path) = &self.plot {
+            threads::plot(&table, path)?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,204 @@
+//! The method on one screen: the frame as a graph of passes, and the renderer that runs it.
+use crate::environment::Pyramid;
+use crate::graph::{Access, Buffer, BufferDesc, Executable, Image};
+use crate::passes::*;
+use crate::prepare::Prepared;
+use crate::vulkan::{self, BufferUse, Device, Frames, PassTime, PipelineCache};
+use crate::{Error, Result};
+use ash::vk;
+use std::path::Path;
+use std::sync::Arc;
+
+/// Which results of a frame are wanted; what none of them needs is not computed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Wanted {
+    /// Linear radiance, for EXR.
+    pub radiance: bool,
+    /// Display values, for PNG.
+    pub display: bool,
+    /// The geometry cache, for the shader's CPU twin.
+    pub geometry: bool,
+}
+
+/// The frame: pass 1 and pass 2 of the paper and what surrounds them.
+fn declare<'a>(graph: &mut FrameGraph<'a>, renderer: &'a Renderer) -> Frame {
+    let view = &renderer.view;
+    let geometry = geometry_cache(graph, &renderer.geometry_cache, view); // pass 1 of the paper
+    let tiles = classify(graph, &renderer.classify, geometry, view);
+    let radiance = shade(graph, &renderer.shade, geometry, &tiles, view); // pass 2 of the paper
+    let radiance = match &renderer.background {
+        Some(environment) => background(graph, environment, radiance, view),
+        None => radiance,
+    };
+    let display = tone_map(graph, &renderer.tone_map, radiance, view);
+    Frame { geometry, counters: tiles.counters, radiance, display }
+}
+
+/// What a frame leaves.
+struct Frame {
+    geometry: Image,
+    counters: Buffer,
+    radiance: Image,
+    display: Image,
+}
+
+/// A scene on a device, ready to render.
+pub struct Renderer {
+    view: View,
+    geometry_cache: GeometryCache,
+    classify: Classify,
+    shade: Shade,
+    background: Option<Background>,
+    tone_map: ToneMap,
+    device: Arc<Device>,
+}
+
+/// Results of a rendering, as far as they were wanted.
+#[derive(Clone, Debug, Default)]
+pub struct Rendering {
+    /// RGBA, linear radiance times coverage, row by row from the top left.
+    pub radiance: Vec<[f32; 4]>,
+    /// RGBA, 8 bits each; colour not multiplied by alpha.
+    pub display: Vec<u8>,
+    /// Texels of the geometry cache, row by row at sub-pixel resolution.
+    pub geometry: Vec<[u32; 2]>,
+    /// What the classification counted.
+    pub counters: Counters,
+    /// Time on the GPU by pass, median over the repetitions; empty where the device cannot tell.
+    pub passes: Vec<PassTime>,
+    /// From the start of recording until the GPU is done, in milliseconds: median over the repetitions.
+    pub frame_ms: f64,
+    /// Device memory in use while rendering.
+    pub device_memory_bytes: u64,
+    /// The plan of the frame as text.
+    pub plan: String,
+}
+
+impl Renderer {
+    /// Uploads `prepared` and compiles the shaders that it needs.
+    ///
+    /// # Errors
+    /// No device memory left, or a limit of the device exceeded.
+    pub fn new(device: &Arc<Device>, cache_folder: Option<&Path>, prepared: &Prepared) -> Result<Self> {
+        let Prepared { view, method, intensity, environment, .. } = prepared;
+        let largest = device.limits().max_image_dimension2_d;
+        let [width, height] = view.cache_size();
+        if width.max(height) > largest {
+            let problem = format!("needs {width} x {height} sub-pixels, this device's images have at most {largest} a side");
+            return Err(Error::input("image size", problem, "use a smaller --size or fewer --subpixels"));
+        }
+        let cache = PipelineCache::new(device, cache_folder)?;
+        let meshes = prepared.meshes.iter().map(|(name, mesh)| DeviceMesh::new(device, name, mesh));
+        let meshes = meshes.collect::<Result<_>>()?;
+        let materials = DeviceMaterials::new(device, prepared.materials.iter().map(|m| (&m.brdf, &m.threads)))?;
+        let light = DeviceLight::new(device, &Pyramid::box_filtered(environment), *intensity)?;
+        let background = prepared.show_environment.then(|| Background::new(device, &cache, environment, *intensity));
+        Ok(Self {
+            view: view.clone(),
+            geometry_cache: GeometryCache::new(device, &cache, meshes, prepared.objects.clone())?,
+            classify: Classify::new(device, &cache, view.subpixels)?,
+            shade: Shade::new(device, &cache, *method, view.subpixels, materials, light)?,
+            background: background.transpose()?,
+            tone_map: ToneMap::new(device, &cache)?,
+            device: device.clone(),
+        })
+    }
+
+    /// Renders the frame `repeat` times and reads back what is `wanted`.
+    ///
+    /// # Errors
+    /// Whatever Vulkan refuses.
+    pub fn render(&self, wanted: Wanted, repeat: u32) -> Result<Rendering> {
+        let mut graph = FrameGraph::new();
+        let frame = declare(&mut graph, self);
+        let mut readbacks = Readbacks { graph, device: &self.device, imports: Vec::new() };
+        let counters = readbacks.buffer("read_counters", frame.counters, size_of::<Counters>() as u64)?;
+        let View { width, height, .. } = self.view;
+        let radiance = readbacks.image("read_radiance", frame.radiance, [width, height], 16, wanted.radiance)?;
+        let display = readbacks.image("read_display", frame.display, [width, height], 4, wanted.display)?;
+        let geometry = readbacks.image("read_geometry", frame.geometry, self.view.cache_size(), 8, wanted.geometry)?;
+        let Readbacks { graph, imports, .. } = readbacks;
+        let executable = Executable::new(&self.device, graph, &imports)?;
+
+        let mut frames = Frames::new(&self.device, "frame", 2)?;
+        let mut frame_ms = Vec::new();
+        let mut passes: Vec<Vec<PassTime>> = Vec::new();
+        for _ in 0..repeat.max(1) {
+            let start = std::time::Instant::now();
+            executable.execute(&mut frames)?;
+            frames.wait()?;
+            frame_ms.push(start.elapsed().as_secs_f64() * 1e3);
+            passes.push(frames.pass_times()?);
+        }
+        let pass_median = |index: usize| PassTime {
+            name: passes[0][index].name.clone(),
+            gpu_ms: median(passes.iter().map(|frame| frame[index].gpu_ms).collect()),
+        };
+        Ok(Rendering {
+            radiance: texels(radiance.as_deref()),
+            display: texels(display.as_deref()),
+            geometry: texels(geometry.as_deref()),
+            counters: texels(Some(&counters)).first().copied().unwrap_or_default(),
+            passes: (0..passes[0].len()).map(pass_median).collect(),
+            frame_ms: median(frame_ms),
+            device_memory_bytes: self.device.allocated_bytes(),
+            plan: executable.plan.to_string(),
+        })
+    }
+}
+
+/// Adds copies into host memory to a graph.
+struct Readbacks<'a, 'd> {
+    graph: FrameGraph<'a>,
+    device: &'d Arc<Device>,
+    imports: Vec<(Buffer, Arc<vulkan::Buffer>)>,
+}
+
+impl Readbacks<'_, '_> {
+    /// Imports a buffer that the CPU will read after the frame.
+    fn target(&mut self, name: &str, size_bytes: u64) -> Result<(Buffer, Arc<vulkan::Buffer>)> {
+        let usage = vk::BufferUsageFlags::TRANSFER_DST;
+        let target = Arc::new(vulkan::Buffer::new(self.device, name, size_bytes, usage, BufferUse::Readback)?);
+        let handle = self.graph.import_buffer(name, BufferDesc { size_bytes }, None, Some(Access::HostRead));
+        self.imports.push((handle, target.clone()));
+        Ok((handle, target))
+    }
+
+    fn buffer(&mut self, name: &str, source: Buffer, size_bytes: u64) -> Result<Arc<vulkan::Buffer>> {
+        let (handle, target) = self.target(&format!("{name}_target"), size_bytes)?;
+        let copied = read_buffer(&mut self.graph, name, source, handle);
+        self.graph.output(copied);
+        Ok(target)
+    }
+
+    fn image(
+        &mut self,
+        name: &str,
+        source: Image,
+        [width, height]: [u32; 2],
+        texel_bytes: u64,
+        wanted: bool,
+    ) -> Result<Option<Arc<vulkan::Buffer>>> {
+        if !wanted {
+            return Ok(None);
+        }
+        let (handle, target) =
+            self.target(&format!("{name}_target"), texel_bytes * u64::from(width) * u64::from(height))?;
+        let copied = read_image(&mut self.graph, name, source, handle);
+        self.graph.output(copied);
+        Ok(Some(target))
+    }
+}
+
+/// The contents of a buffer that was read back; empty if it was not wanted.
+fn texels<T: bytemuck::Pod>(buffer: Option<&vulkan::Buffer>) -> Vec<T> {
+    let bytes = buffer.and_then(|buffer| buffer.contents()).unwrap_or_default();
+    bytemuck::pod_collect_to_vec(bytes)
+}
+
+/// The middle value; of an even number, the mean of the two in the middle.
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    let middle = values.len() / 2;
+    if values.len() % 2 == 1 { values[middle] } else { (values[middle - 1] + values[middle]) / 2.0 }
+}

@@ -1,0 +1,172 @@
+//! Loads everything that a scene names, and makes the threads of its materials: all that the GPU will need.
+use crate::brdf::Brdf;
+use crate::environment::Environment;
+use crate::method::Method;
+use crate::passes::{Object, View};
+use crate::scene::{MaterialSource, Mesh, Scene, Source};
+use crate::threads::{self, CacheState, Observer, ThreadTable};
+use crate::{Error, Result};
+use glam::DVec3;
+use std::path::Path;
+use std::time::Duration;
+
+/// A scene with all its files read and its threads made.
+pub struct Prepared {
+    /// How to estimate radiance.
+    pub method: Method,
+    /// Camera, resolution and display settings.
+    pub view: View,
+    /// Whether the environment is seen behind the objects.
+    pub show_environment: bool,
+    /// Factor on the environment's radiance.
+    pub intensity: f64,
+    /// The light.
+    pub environment: Environment,
+    /// Each mesh once, however many objects have it.
+    pub meshes: Vec<(String, Mesh)>,
+    /// The objects.
+    pub objects: Vec<Object>,
+    /// Name, BRDF and threads of each material that an object has.
+    pub materials: Vec<PreparedMaterial>,
+    /// Time it took to make or load the threads.
+    pub thread_time: Duration,
+    /// Whether all threads came from the cache.
+    pub thread_cache: CacheState,
+}
+
+/// A material that some object has.
+pub struct PreparedMaterial {
+    /// Name in the scene.
+    pub name: String,
+    /// Its BRDF.
+    pub brdf: Brdf,
+    /// Its threads.
+    pub threads: ThreadTable,
+}
+
+/// Reads a material: a built-in's name, or a file.
+///
+/// # Errors
+/// Neither, or a file that cannot be used.
+pub fn load_material(source: &MaterialSource) -> Result<Brdf> {
+    match source {
+        MaterialSource::File(path) => Brdf::load(path),
+        MaterialSource::Builtin(name) => Brdf::builtin(name).ok_or_else(|| {
+            let known: Vec<_> = Brdf::builtin_names().collect();
+            Error::input(
+                format!("material \"{name}\""),
+                "is neither built in nor a file",
+                format!("name a .binary or .toml file or one of: {}", known.join(", ")),
+            )
+        }),
+        MaterialSource::Model { model, parameters } => Brdf::from_parameters(model, parameters.clone()),
+    }
+}
+
+/// Reads an environment: a built-in's name, or a file.
+///
+/// # Errors
+/// Neither, or a file that cannot be used.
+pub fn load_environment(source: &Source) -> Result<Environment> {
+    match source {
+        Source::File(path) => Environment::load(path),
+        Source::Builtin(name) => Environment::builtin(name),
+    }
+}
+
+/// Loads and makes everything; thread generation reports to `observer` and is cached in `cache` if that is a folder.
+///
+/// # Errors
+/// The first file or setting that cannot be used, or a cancelled generation.
+pub fn prepare(scene: &Scene, cache: Option<&Path>, observer: &dyn Observer) -> Result<Prepared> {
+    let method = Method::from_name(&scene.shading.method)?;
+    let mut meshes: Vec<(String, Mesh)> = Vec::new();
+    let mut objects = Vec::new();
+    let mut used_materials: Vec<&str> = Vec::new();
+    for object in &scene.objects {
+        let name = object.mesh.to_string();
+        let mesh = match meshes.iter().position(|(known, _)| *known == name) {
+            Some(known) => known,
+            None => {
+                let mesh = match &object.mesh {
+                    Source::File(path) => Mesh::load(path)?,
+                    Source::Builtin(name) => Mesh::builtin(name)?,
+                };
+                meshes.push((name, mesh));
+                meshes.len() - 1
+            }
+        };
+        let material = used_materials.iter().position(|known| *known == object.material).unwrap_or_else(|| {
+            used_materials.push(&object.material);
+            used_materials.len() - 1
+        });
+        objects.push(Object { mesh, material: material as u32, to_world: object.transform() });
+    }
+    let environment = load_environment(&scene.environment.source)?;
+    let camera = match scene.camera {
+        Some(camera) => camera,
+        None => crate::scene::Camera::framing(bounding_sphere(&meshes, &objects)),
+    };
+    let image = &scene.image;
+    let view = View {
+        camera,
+        width: image.width,
+        height: image.height,
+        subpixels: image.subpixels,
+        rotation_deg: scene.environment.rotation_deg,
+        exposure: image.exposure as f32,
+        gamma: image.gamma as f32,
+    };
+
+    let mut materials = Vec::new();
+    let mut thread_time = Duration::ZERO;
+    let mut thread_cache = CacheState::Hit;
+    for name in used_materials {
+        // The scene has checked that every material an object names is there.
+        let Some(settings) = scene.materials.iter().find(|material| material.name == name) else { continue };
+        let brdf = load_material(&settings.source).map_err(|error| match settings.source {
+            MaterialSource::Model { .. } => error.within(format!("material \"{name}\"")),
+            _ => error,
+        })?;
+        let settings = threads::Settings {
+            count: scene.shading.threads as usize,
+            seed: scene.shading.seed,
+            ..Default::default()
+        };
+        let (mut threads, state, time) = threads::load_or_generate(&brdf, &settings, cache, observer)?;
+        threads.material = name.to_owned();
+        thread_time += time;
+        if state == CacheState::Miss {
+            thread_cache = CacheState::Miss;
+        }
+        materials.push(PreparedMaterial { name: name.to_owned(), brdf, threads });
+    }
+    Ok(Prepared {
+        method,
+        view,
+        show_environment: image.background == crate::scene::Background::Environment,
+        intensity: scene.environment.intensity,
+        environment,
+        meshes,
+        objects,
+        materials,
+        thread_time,
+        thread_cache,
+    })
+}
+
+/// A sphere around the bounding spheres of all objects: centre of their box, and the radius that reaches the farthest.
+fn bounding_sphere(meshes: &[(String, Mesh)], objects: &[Object]) -> (DVec3, f64) {
+    let spheres = objects.iter().map(|object| {
+        let (center, radius) = meshes[object.mesh].1.bounding_sphere();
+        let m = object.to_world.matrix3;
+        let scale = m.x_axis.length().max(m.y_axis.length()).max(m.z_axis.length());
+        (object.to_world.transform_point3(center.as_dvec3()), f64::from(radius) * scale)
+    });
+    let spheres: Vec<_> = spheres.collect();
+    let low = spheres.iter().fold(DVec3::INFINITY, |low, (center, radius)| low.min(*center - *radius));
+    let high = spheres.iter().fold(DVec3::NEG_INFINITY, |high, (center, radius)| high.max(*center + *radius));
+    let middle = (low + high) / 2.0;
+    let reach = spheres.iter().map(|(center, radius)| center.distance(middle) + radius).fold(0.0, f64::max);
+    (middle, reach)
+}
