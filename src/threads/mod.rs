@@ -1,1 +1,141 @@
-//! placeholder
+//! Sample threads: where the k-th incident sample lies, for every view angle (Kim, Kyung and Lee 2010, section 3.2).
+//!
+//! | paper | module |
+//! |---|---|
+//! | equation (4), the pdf of one view | [`slice`] |
+//! | equations (5), (6), cones | [`cones`] |
+//! | equations (8) to (10), forces | [`forces`] |
+//! | 3.2.2, smoothing | [`smoothing`] |
+//! | 3.2.3, peaks | [`peaks`] |
+//! | the whole | [`generate`] |
+use std::f64::consts::FRAC_PI_2;
+
+use glam::{DVec3, dvec3};
+
+mod cache;
+pub mod cones;
+mod file;
+pub mod forces;
+mod generate;
+pub mod peaks;
+mod plot;
+pub mod slice;
+pub mod smoothing;
+#[cfg(test)]
+mod test_materials;
+
+pub use cache::{CacheState, default_directory, load_or_generate};
+pub use file::{FORMAT_VERSION, read, write};
+pub use generate::generate;
+pub use plot::plot;
+
+/// Lowest n . s of a sample: 0.006 degrees above the horizon, a thousand times what rounding theta to single precision moves
+/// it by, and far below what any view angle of a table needs.
+pub const MIN_COS: f64 = 1e-4;
+
+/// Most threads that a table can have.
+pub const MAX_COUNT: usize = 1024;
+
+/// What threads to make; together with the BRDF it determines the table to the last bit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Settings {
+    /// Number of threads m, 1 to [`MAX_COUNT`].
+    pub count: usize,
+    /// Number of view angles, evenly spaced from 0 to just below 90 degrees; at least 1, the paper's is 90.
+    pub rows: usize,
+    /// Where the first row's points start.
+    pub seed: u64,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self { count: 100, rows: 90, seed: 0 }
+    }
+}
+
+/// Watches a long computation and can end it.
+pub trait Observer: Sync {
+    /// `done` of `total` rows are finished.
+    fn progress(&self, done: usize, total: usize);
+    /// True ends the computation with [`Error::Cancelled`](crate::Error::Cancelled).
+    fn cancelled(&self) -> bool;
+}
+
+/// Neither watches nor cancels.
+impl Observer for () {
+    fn progress(&self, _done: usize, _total: usize) {}
+    fn cancelled(&self) -> bool {
+        false
+    }
+}
+
+/// One incident sample in the shading frame of its row.
+#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub struct Sample {
+    /// Angle to the normal in radians, less than pi / 2.
+    pub theta: f32,
+    /// Azimuth in radians, counted from the side of w_o; -pi to pi.
+    pub phi: f32,
+    /// pdf in 1/sr, positive.
+    pub p: f32,
+}
+
+impl Sample {
+    /// The sample at unit `direction` with pdf `p`.
+    pub fn new(direction: DVec3, p: f64) -> Self {
+        let theta = direction.x.hypot(direction.y).atan2(direction.z) as f32;
+        Self { theta, phi: direction.y.atan2(direction.x) as f32, p: p as f32 }
+    }
+
+    /// Unit direction w_i.
+    pub fn direction(&self) -> DVec3 {
+        let (sin_theta, cos_theta) = f64::from(self.theta).sin_cos();
+        let (sin_phi, cos_phi) = f64::from(self.phi).sin_cos();
+        dvec3(sin_theta * cos_phi, sin_theta * sin_phi, cos_theta)
+    }
+}
+
+/// The threads of one material: `rows` x `count` samples. Row r is for theta_o = r 90 deg / rows.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ThreadTable {
+    /// Number of view angles.
+    pub rows: usize,
+    /// Number of threads.
+    pub count: usize,
+    /// The seed it was made with.
+    pub seed: u64,
+    /// Name of the material, for people.
+    pub material: String,
+    /// Row by row: thread k of row r is `samples[r * count + k]`.
+    pub samples: Vec<Sample>,
+}
+
+impl ThreadTable {
+    /// View angle of `row` in radians.
+    pub fn theta_o(&self, row: usize) -> f64 {
+        theta_o(row, self.rows)
+    }
+
+    /// The samples of `row`, one per thread.
+    pub fn row(&self, row: usize) -> &[Sample] {
+        &self.samples[row * self.count..][..self.count]
+    }
+
+    /// Direction and pdf of `thread` seen from `theta_o` (radians), between rows: directions blend as unit vectors (a blend of
+    /// phi would break where it wraps), pdfs by their logarithm, which was measured to be nearer to the pdf in between
+    /// than a linear blend. Beyond the last row that row holds.
+    pub fn interpolate(&self, theta_o: f64, thread: usize) -> (DVec3, f64) {
+        let position = (theta_o / FRAC_PI_2 * self.rows as f64).clamp(0.0, (self.rows - 1) as f64);
+        let (low, t) = (position as usize, position.fract());
+        let (a, b) = (self.row(low)[thread], self.row((low + 1).min(self.rows - 1))[thread]);
+        let direction = a.direction().lerp(b.direction(), t).normalize();
+        let (p_a, p_b) = (f64::from(a.p), f64::from(b.p));
+        (direction, p_a * (p_b / p_a).powf(t))
+    }
+}
+
+/// View angle of `row` of `rows` in radians.
+fn theta_o(row: usize, rows: usize) -> f64 {
+    row as f64 / rows as f64 * FRAC_PI_2
+}

@@ -1,0 +1,248 @@
+//! The pdf of incident directions for one view angle, equation (4), with its integral, its CDF and the CDF's inverse.
+use std::f64::consts::{FRAC_1_PI, FRAC_PI_2, PI};
+
+use glam::{DVec2, DVec3, dvec3};
+
+use crate::brdf::{Brdf, luminance};
+
+/// Steps over theta_h and phi_h. Albedos come out within 1e-3 (tested), the CDF is finer than 1024 threads can tell.
+const THETA_STEPS: usize = 192;
+const PHI_STEPS: usize = 128;
+
+/// p(w) = f(w, w_o) (n.w) / integral of the same, in luminance, for one view angle.
+///
+/// It is tabulated over the half vector h: theta_h = 90 deg x^2 with x uniform, phi_h uniform over the whole circle (measured
+/// tables need not be mirror-symmetric about the plane of incidence). With w_i the reflection of w_o about h,
+/// dw_i = 4 (w_o . h) dw_h. A glossy lobe thus lies about x = 0 at every view angle, and the square resolves a narrow one.
+pub struct Slice<'a> {
+    brdf: &'a Brdf,
+    w_o: DVec3,
+    albedo: DVec3,
+    /// What `density` integrates to.
+    total: f64,
+    /// CDF over x: THETA_STEPS + 1 values from 0 to 1.
+    ring_cdf: Vec<f64>,
+    /// CDF over phi_h within each step of x: THETA_STEPS times PHI_STEPS + 1 values from 0 to 1.
+    azimuth_cdf: Vec<f64>,
+    peak: DVec3,
+}
+
+/// The direction that the facet `h` mirrors `w_o` into.
+fn reflect(w_o: DVec3, h: DVec3) -> DVec3 {
+    (2.0 * w_o.dot(h) * h - w_o).normalize()
+}
+
+/// Half vector at x in [0, 1] and phi in units of the circle, counted from -x.
+fn half_vector(x: f64, turn: f64) -> DVec3 {
+    let (sin_theta, cos_theta) = (FRAC_PI_2 * x * x).sin_cos();
+    (DVec2::from_angle(2.0 * PI * turn - PI) * sin_theta).extend(cos_theta)
+}
+
+impl<'a> Slice<'a> {
+    /// Tabulates `brdf` seen from `theta_o` (radians, less than pi / 2). Where it reflects nothing the pdf is that of a
+    /// diffuse surface, cos / pi: a thread then still has a direction, and its samples add up to the zero they should.
+    pub fn new(brdf: &'a Brdf, theta_o: f64) -> Self {
+        let w_o = dvec3(theta_o.sin(), 0.0, theta_o.cos());
+        let slice = Self::tabulate(brdf, w_o, |w_i| brdf.evaluate(w_i, w_o) * w_i.z);
+        if slice.total > 0.0 {
+            return slice;
+        }
+        Self { albedo: DVec3::ZERO, ..Self::tabulate(brdf, w_o, |w_i| DVec3::splat(w_i.z * FRAC_1_PI)) }
+    }
+
+    fn tabulate(brdf: &'a Brdf, w_o: DVec3, density: impl Fn(DVec3) -> DVec3) -> Self {
+        let mut albedo = DVec3::ZERO;
+        let mut ring_cdf = vec![0.0];
+        let mut azimuth_cdf = Vec::with_capacity(THETA_STEPS * (PHI_STEPS + 1));
+        // The mirror direction is where sharp lobes have their maximum, and no cell has it as its centre.
+        let mirror = dvec3(-w_o.x, 0.0, w_o.z);
+        let mut peak = (luminance(density(mirror)), 0.0, DVec3::Z);
+        for i in 0..THETA_STEPS {
+            let x = (i as f64 + 0.5) / THETA_STEPS as f64;
+            // sin(theta_h) dtheta_h dphi_h, dtheta_h = pi x dx, by 4 of the reflection.
+            let ring = 4.0 * (FRAC_PI_2 * x * x).sin() * PI * x / THETA_STEPS as f64 * 2.0 * PI / PHI_STEPS as f64;
+            let start = azimuth_cdf.len();
+            let mut sum = 0.0;
+            azimuth_cdf.push(0.0);
+            for j in 0..PHI_STEPS {
+                let h = half_vector(x, (j as f64 + 0.5) / PHI_STEPS as f64);
+                let cos_theta_d = w_o.dot(h);
+                let w_i = 2.0 * cos_theta_d * h - w_o;
+                if cos_theta_d > 0.0 && w_i.z > 0.0 {
+                    let rgb = density(w_i);
+                    let value = luminance(rgb);
+                    albedo += rgb * (cos_theta_d * ring);
+                    sum += value * cos_theta_d * ring;
+                    if value > peak.0 {
+                        peak = (value, x, h);
+                    }
+                }
+                azimuth_cdf.push(sum);
+            }
+            ring_cdf.push(ring_cdf[i] + sum);
+            normalise(&mut azimuth_cdf[start..]);
+        }
+        let total = ring_cdf[THETA_STEPS];
+        normalise(&mut ring_cdf);
+        let peak = climb(peak.2, FRAC_PI_2 * (2.0 * peak.1 + 1.0 / THETA_STEPS as f64) / THETA_STEPS as f64, |h| {
+            let w_i = reflect(w_o, h);
+            if w_i.z > 0.0 && w_o.dot(h) > 0.0 { luminance(density(w_i)) } else { 0.0 }
+        });
+        Self { brdf, w_o, albedo, total, ring_cdf, azimuth_cdf, peak: reflect(w_o, peak) }
+    }
+
+    /// The integral of f cos per channel: the directional albedo.
+    pub fn albedo(&self) -> DVec3 {
+        self.albedo
+    }
+
+    /// Equation (4): p(w_i) in 1/sr.
+    pub fn pdf(&self, w_i: DVec3) -> f64 {
+        if w_i.z <= 0.0 {
+            0.0
+        } else if self.albedo == DVec3::ZERO {
+            w_i.z * FRAC_1_PI
+        } else {
+            luminance(self.brdf.evaluate(w_i, self.w_o)) * w_i.z / self.total
+        }
+    }
+
+    /// Where the pdf is greatest.
+    pub fn peak(&self) -> DVec3 {
+        self.peak
+    }
+
+    /// Inverse CDF: the unit square onto the hemisphere, equal areas onto equal masses.
+    pub fn direction(&self, uv: DVec2) -> DVec3 {
+        let (i, x) = invert(&self.ring_cdf, uv.x);
+        let (j, turn) = invert(self.azimuths(i), uv.y);
+        let h = half_vector((i as f64 + x) / THETA_STEPS as f64, (j as f64 + turn) / PHI_STEPS as f64);
+        reflect(self.w_o, h)
+    }
+
+    /// CDF: the point of the unit square that `direction` maps to `w_i`.
+    pub fn coordinate(&self, w_i: DVec3) -> DVec2 {
+        let h = (w_i + self.w_o).normalize();
+        let x = (h.x.hypot(h.y).atan2(h.z) / FRAC_PI_2).sqrt();
+        let turn = (h.y.atan2(h.x) + PI) / (2.0 * PI);
+        let (i, u) = interpolate(&self.ring_cdf, x);
+        let (_, v) = interpolate(self.azimuths(i), turn);
+        DVec2::new(u, v)
+    }
+
+    /// `count` directions of equal mass: a Fibonacci lattice in the CDF's square.
+    pub fn points(&self, count: usize) -> impl Iterator<Item = DVec3> + '_ {
+        fibonacci_lattice(count).map(|uv| self.direction(uv))
+    }
+
+    fn azimuths(&self, ring: usize) -> &[f64] {
+        &self.azimuth_cdf[ring * (PHI_STEPS + 1)..][..PHI_STEPS + 1]
+    }
+}
+
+/// `count` evenly spread points of the unit square.
+pub fn fibonacci_lattice(count: usize) -> impl Iterator<Item = DVec2> {
+    const GOLDEN_RATIO_CONJUGATE: f64 = 0.618_033_988_749_894_9;
+    (0..count).map(move |i| DVec2::new((i as f64 + 0.5) / count as f64, (i as f64 * GOLDEN_RATIO_CONJUGATE).fract()))
+}
+
+/// Scales a cumulative sum to end at 1; one without mass becomes uniform.
+fn normalise(cdf: &mut [f64]) {
+    let (last, steps) = (cdf[cdf.len() - 1], cdf.len() - 1);
+    for (i, value) in cdf.iter_mut().enumerate() {
+        *value = if last > 0.0 { *value / last } else { i as f64 / steps as f64 };
+    }
+}
+
+/// The step of a piecewise linear CDF in which it reaches `mass`, and how far into the step.
+fn invert(cdf: &[f64], mass: f64) -> (usize, f64) {
+    let step = cdf.partition_point(|&value| value <= mass).clamp(1, cdf.len() - 1) - 1;
+    // `mass` beyond the last step with any mass lands in an empty one: go back to where the CDF rose last.
+    let step = if cdf[step + 1] > cdf[step] { step } else { cdf.partition_point(|&value| value < cdf[step]).max(1) - 1 };
+    (step, ((mass - cdf[step]) / (cdf[step + 1] - cdf[step])).clamp(0.0, 1.0))
+}
+
+/// The step in which `position` (0 to 1 over all steps) lies, and the value there of a piecewise linear CDF.
+fn interpolate(cdf: &[f64], position: f64) -> (usize, f64) {
+    let steps = cdf.len() - 1;
+    let scaled = position.clamp(0.0, 1.0) * steps as f64;
+    let step = (scaled as usize).min(steps - 1);
+    (step, cdf[step] + (scaled - step as f64) * (cdf[step + 1] - cdf[step]))
+}
+
+/// Walks a half vector uphill in `height` by steps that shrink from `step` (radians) until they are lost in rounding.
+fn climb(mut h: DVec3, mut step: f64, height: impl Fn(DVec3) -> f64) -> DVec3 {
+    let mut best = height(h);
+    while step > 1e-7 {
+        let tangent = h.any_orthonormal_vector();
+        let across = h.cross(tangent);
+        let up = [tangent, -tangent, across, -across].map(|side| (h + step * side).normalize());
+        match up.into_iter().find(|&next| height(next) > best) {
+            Some(next) => (h, best) = (next, height(next)),
+            None => step *= 0.5,
+        }
+    }
+    h
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::threads::test_materials;
+
+    #[test]
+    fn albedo_agrees_with_independent_quadrature() {
+        for (name, brdf) in test_materials::all() {
+            for theta_o_deg in [0.0f64, 30.0, 60.0, 80.0, 88.0] {
+                let theta_o = theta_o_deg.to_radians();
+                let (slice, exact) = (Slice::new(&brdf, theta_o).albedo(), brdf.albedo(theta_o));
+                let error = ((slice - exact) / exact).abs().max_element();
+                assert!(error < 2e-3, "{name} at {theta_o_deg}: {slice}, {exact}");
+            }
+        }
+    }
+
+    #[test]
+    fn coordinate_inverts_direction() {
+        for (name, brdf) in test_materials::all() {
+            for theta_o_deg in [0.0f64, 45.0, 85.0] {
+                let slice = Slice::new(&brdf, theta_o_deg.to_radians());
+                for uv in fibonacci_lattice(101) {
+                    let back = slice.coordinate(slice.direction(uv));
+                    // v is periodic.
+                    let error = (back - uv).abs();
+                    assert!(error.x < 1e-6 && error.y.min(1.0 - error.y) < 1e-6, "{name} {theta_o_deg}: {uv} {back}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn points_of_equal_mass_give_the_albedo_as_a_monte_carlo_estimate() {
+        // The mean of 1 / p over points drawn with p is the solid angle of where p > 0: all of the hemisphere.
+        let brdf = Brdf::from_parameters("lambert", toml::toml! { reflectance = 0.5 }).unwrap();
+        for theta_o_deg in [0.0f64, 40.0, 70.0] {
+            let slice = Slice::new(&brdf, theta_o_deg.to_radians());
+            let (count, mut mean, mut square) = (20_000, DVec3::ZERO, 0.0);
+            for w_i in slice.points(count) {
+                mean += w_i / count as f64;
+                square += w_i.z * w_i.z / count as f64;
+            }
+            // Cosine-distributed directions: mean (0, 0, 2/3), mean of cos^2 1/2.
+            assert!((mean - dvec3(0.0, 0.0, 2.0 / 3.0)).length() < 2e-3, "{theta_o_deg}: {mean}");
+            assert!((square - 0.5).abs() < 2e-3, "{theta_o_deg}: {square}");
+        }
+    }
+
+    #[test]
+    fn peak_is_the_mirror_direction_of_a_narrow_lobe_and_the_normal_of_a_diffuse_one() {
+        for theta_o_deg in [0.0f64, 20.0, 50.0, 70.0] {
+            let theta_o = theta_o_deg.to_radians();
+            let mirror = dvec3(-theta_o.sin(), 0.0, theta_o.cos());
+            let narrow = Slice::new(test_materials::narrow(), theta_o).peak();
+            assert!(narrow.angle_between(mirror) < 2e-4, "{theta_o_deg}: {narrow}");
+            let diffuse = Slice::new(&Brdf::builtin("clay").unwrap(), theta_o).peak();
+            assert!(diffuse.angle_between(DVec3::Z) < 1e-3, "{theta_o_deg}: {diffuse}");
+        }
+    }
+}

@@ -1,0 +1,54 @@
+//! BRDFs that the tests of this module share.
+use std::path::PathBuf;
+use std::sync::LazyLock;
+
+use crate::brdf::{Brdf, MerlTable};
+
+static NARROW: LazyLock<Brdf> = LazyLock::new(|| conductor("ggx", 0.005));
+static ALUMINA_OXIDE: LazyLock<Option<Brdf>> = LazyLock::new(|| {
+    let data = std::env::var_os("THREADLIGHT_DATA").map_or("../shared/data".into(), PathBuf::from);
+    let path = data.join("merl/slices/alumina-oxide.slice");
+    let Ok(bytes) = std::fs::read(&path) else {
+        println!("skipped alumina-oxide: {} is not there", path.display());
+        return None;
+    };
+    let values: Vec<f32> = bytes.as_chunks().0.iter().map(|&value| f32::from_le_bytes(value)).collect();
+    Some(Brdf::MerlTable(MerlTable::from_bytes(&merl_from_slice(&values)).unwrap()))
+});
+
+/// A MERL file from measured values at phi_d = 90 degrees (rows theta_d, columns theta_h, RGB), the same at every phi_d.
+fn merl_from_slice(values: &[f32]) -> Vec<u8> {
+    let mut bytes: Vec<u8> = [90i32, 90, 180].iter().flat_map(|dim| dim.to_le_bytes()).collect();
+    for (channel, scale) in [1.0, 1.15, 1.66].into_iter().enumerate() {
+        for cell in 0..90 * 90 * 180 {
+            let (theta_h, theta_d) = (cell / 16200, cell / 180 % 90);
+            let f = f64::from(values[3 * (90 * theta_d + theta_h) + channel]);
+            bytes.extend((f * 1500.0 / scale).to_le_bytes());
+        }
+    }
+    bytes
+}
+
+fn conductor(distribution: &str, alpha: f64) -> Brdf {
+    let parameters = format!("distribution = '{distribution}'\nalpha = {alpha}\neta = [0.2, 0.924, 1.102]\nk = [3.912, 2.448, 2.142]");
+    Brdf::from_parameters("conductor", parameters.parse().unwrap()).unwrap()
+}
+
+/// A lobe of 0.3 degrees.
+pub fn narrow() -> &'static Brdf {
+    &NARROW
+}
+
+/// The kinds of material that threads have to work for, by name.
+pub fn all() -> Vec<(&'static str, Brdf)> {
+    let plastic = "distribution = 'ggx'\nalpha = 0.12\nior = 1.5\ndiffuse = [0.3, 0.08, 0.04]";
+    let mut all = vec![
+        ("lambert", Brdf::builtin("clay").unwrap()),
+        ("conductor 0.005", narrow().clone()),
+        ("conductor 0.1", conductor("ggx", 0.1)),
+        ("conductor 0.5", conductor("beckmann", 0.5)),
+        ("plastic", Brdf::from_parameters("plastic", plastic.parse().unwrap()).unwrap()),
+    ];
+    all.extend(ALUMINA_OXIDE.clone().map(|brdf| ("alumina-oxide", brdf)));
+    all
+}
