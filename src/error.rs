@@ -41,6 +41,10 @@ impl Error {
     /// An [`Error::Input`] for a file that cannot be written.
     pub fn unwritable(path: impl Into<PathBuf>, cause: impl std::fmt::Display) -> Self {
         let path = path.into();
-        Self::in_file(&path, format!("cannot be written ({cause})"), "choose a folder that exists and may be written to")
+        Self::in_file(
+            &path,
+            format!("cannot be written ({cause})"),
+            "choose a folder that exists and may be written to",
+        )
     }
 }
