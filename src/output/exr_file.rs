@@ -100,7 +100,29 @@ pub fn write_exr(
     });
     let mut bytes = Cursor::new(Vec::new());
     image.write().to_buffered(&mut bytes).map_err(|cause| Error::unwritable(path, cause))?;
-    write_whole(path, &bytes.into_inner())
+    let mut bytes = bytes.into_inner();
+    sort_attributes(&mut bytes);
+    write_whole(path, &bytes)
+}
+
+/// Puts the attributes in a single-part EXR's header into the order of their names. The crate keeps them in a hash map
+/// and writes them in a new order each time, but the same picture is to have the same bytes.
+fn sort_attributes(bytes: &mut [u8]) {
+    const MAGIC_AND_VERSION: usize = 8;
+    let text_end = |start: usize| bytes[start..].iter().position(|&byte| byte == 0).map(|length| start + length + 1);
+    let mut attributes = Vec::new();
+    let mut start = MAGIC_AND_VERSION;
+    // An attribute is its name and type, each ended by 0, the length of its value (u32), and the value; a 0 ends all.
+    while bytes.get(start).is_some_and(|&byte| byte != 0) {
+        let Some(value) = text_end(start).and_then(text_end) else { return };
+        let Some(length) = bytes.get(value..value + 4) else { return };
+        let end = value + 4 + u32::from_le_bytes([length[0], length[1], length[2], length[3]]) as usize;
+        let Some(attribute) = bytes.get(start..end) else { return };
+        attributes.push(attribute.to_vec());
+        start = end;
+    }
+    attributes.sort();
+    bytes[MAGIC_AND_VERSION..start].copy_from_slice(&attributes.concat());
 }
 
 /// Reads an EXR: the first layer with channels R, G and B (perhaps with a common prefix, such as `beauty.R`), or with
