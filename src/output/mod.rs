@@ -7,6 +7,7 @@ use crate::error::{Error, Result};
 mod exr_file;
 mod png_file;
 
+pub(crate) use exr_file::MAX_PIXELS;
 pub use exr_file::{ExrHeader, write_exr};
 pub use png_file::write_png;
 
