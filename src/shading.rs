@@ -77,14 +77,14 @@ pub fn paper(surface: &Surface, brdf: &Brdf, threads: &ThreadTable, light: &Pyra
     for k in (first..m).step_by(stride) {
         let [sample_0, sample_1] = [row_0, row_1].map(|row| {
             let sample = &threads.samples[row * m + k];
-            sample.direction().as_vec3().extend(sample.p)
+            sample.direction().as_vec3().extend(sample.p.log2())
         });
         let blend: Vec4 = sample_0.lerp(sample_1, t);
-        let (w_i, p) = (blend.truncate().normalize(), blend.w);
+        let (w_i, log2_p) = (blend.truncate().normalize(), blend.w);
         let direction = surface.frame * w_i;
-        let level = light.level_of(1.0 / (m as f32 * p), direction);
+        let level = light.level_of((-(m as f32).log2() - log2_p).exp2(), direction);
         let radiance = light.lookup(direction, level);
-        sum += brdf.evaluate(w_i.as_dvec3(), w_o).as_vec3() * radiance * (w_i.z / p);
+        sum += brdf.evaluate(w_i.as_dvec3(), w_o).as_vec3() * radiance * (w_i.z * (-log2_p).exp2());
     }
     sum / m as f32
 }

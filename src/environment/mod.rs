@@ -1,1 +1,223 @@
-//! placeholder
+//! Distant light from all directions: the lat-long environment, and the function of direction that is its ground truth.
+use std::f64::consts::{PI, TAU};
+
+use glam::DVec3;
+
+pub mod cube;
+mod load;
+mod procedural;
+pub mod pyramid;
+
+pub use load::RepairCounts;
+pub use procedural::builtin_names;
+pub use pyramid::Pyramid;
+
+/// Radiance from every direction, as a lat-long picture: linear, Rec. 709.
+///
+/// Column and row belong to angles phi = 2 pi (column + 0.5) / width about +Y and theta = pi (row + 0.5) / height from
+/// +Y, and these to the direction (sin theta sin phi, cos theta, -sin theta cos phi): the middle of the picture
+/// is +Z, its top row +Y.
+#[derive(Clone, Debug)]
+pub struct Environment {
+    /// The built-in's name, or the file's as it was given.
+    pub name: String,
+    /// Columns, at least 1.
+    pub width: usize,
+    /// Rows, at least 1.
+    pub height: usize,
+    /// Radiance at the pixel centres, row by row from the top; finite and not negative.
+    pub texels: Vec<[f32; 3]>,
+    /// What had to be repaired when the file was read.
+    pub repaired: RepairCounts,
+}
+
+impl Environment {
+    /// The radiance that arrives from `direction` (any length but 0): bilinear between pixel centres, wrapped in u,
+    /// clamped at the poles. This function is the environment; everything else approximates it.
+    pub fn radiance(&self, direction: DVec3) -> DVec3 {
+        let (x, y) = self.pixel(direction);
+        let (left, top) = (x.floor(), y.floor());
+        let row = |row: f64| {
+            self.texel(left as isize, row as isize).lerp(self.texel(left as isize + 1, row as isize), x - left)
+        };
+        row(top).lerp(row(top + 1.0), y - top)
+    }
+
+    /// The mean of [`Self::radiance`] over a box of `theta_rad` x `phi_rad` around `direction`, each angle counting the same:
+    /// exact, as each pixel's weight is a tent in each of the two.
+    fn mean_over_box(&self, direction: DVec3, theta_rad: f64, phi_rad: f64) -> DVec3 {
+        let (x, y) = self.pixel(direction);
+        let columns = tents_over(x, phi_rad / TAU * self.width as f64);
+        let (mut sum, mut weight_sum) = (DVec3::ZERO, 0.0);
+        for (row, row_weight) in tents_over(y, theta_rad / PI * self.height as f64) {
+            for (column, column_weight) in columns.clone() {
+                let weight = row_weight * column_weight;
+                sum += weight * self.texel(column, row);
+                weight_sum += weight;
+            }
+        }
+        sum / weight_sum
+    }
+
+    /// The direction of a pixel's centre, unit; fractions name points between the centres.
+    pub fn direction(&self, column: f64, row: f64) -> DVec3 {
+        let phi = TAU * (column + 0.5) / self.width as f64;
+        let theta = PI * (row + 0.5) / self.height as f64;
+        DVec3::new(theta.sin() * phi.sin(), theta.cos(), -theta.sin() * phi.cos())
+    }
+
+    /// The solid angle of one pixel of `row`, in sr; over the whole picture they sum to 4 pi.
+    pub fn solid_angle(&self, row: usize) -> f64 {
+        let edge = |row: usize| (PI * row as f64 / self.height as f64).cos();
+        TAU / self.width as f64 * (edge(row) - edge(row + 1))
+    }
+
+    /// The integral of a pixel's bilinear weight over the sphere, in sr: the share that a pixel of `row` has in the energy
+    /// of [`Self::radiance`]. It differs from [`Self::solid_angle`] where the sine of theta bends: most at the poles.
+    pub fn weight_solid_angle(&self, row: usize) -> f64 {
+        let centre = |row: usize| PI * (row as f64 + 0.5) / self.height as f64;
+        let step = PI / self.height as f64;
+        // Integrals of sin theta times a ramp from 0 to 1 (up) or 1 to 0 (down), by parts.
+        let up = |from: f64, to: f64| (to.sin() - from.sin()) / step - to.cos();
+        let down = |from: f64, to: f64| from.cos() - (to.sin() - from.sin()) / step;
+        let above = if row == 0 { 1.0 - centre(0).cos() } else { up(centre(row - 1), centre(row)) };
+        let below = if row + 1 == self.height { 1.0 + centre(row).cos() } else { down(centre(row), centre(row + 1)) };
+        TAU / self.width as f64 * (above + below)
+    }
+
+    /// The mean of [`Self::radiance`] over the sphere.
+    pub fn mean_radiance(&self) -> DVec3 {
+        let rows = self.texels.chunks_exact(self.width).enumerate();
+        rows.map(|(row, texels)| self.weight_solid_angle(row) * texels.iter().map(to_dvec3).sum::<DVec3>())
+            .sum::<DVec3>()
+            / (4.0 * PI)
+    }
+
+    /// The largest value of any channel.
+    pub fn max_radiance(&self) -> f64 {
+        f64::from(self.texels.iter().flatten().copied().fold(0.0, f32::max))
+    }
+
+    /// The pixel at `column`, wrapped, and `row`, clamped.
+    fn texel(&self, column: isize, row: isize) -> DVec3 {
+        let column = column.rem_euclid(self.width as isize) as usize;
+        let row = row.clamp(0, self.height as isize - 1) as usize;
+        to_dvec3(&self.texels[row * self.width + column])
+    }
+
+    /// Column and row of `direction`; whole numbers are pixel centres.
+    fn pixel(&self, direction: DVec3) -> (f64, f64) {
+        let phi = direction.x.atan2(-direction.z);
+        let theta = direction.x.hypot(direction.z).atan2(direction.y);
+        (phi / TAU * self.width as f64 - 0.5, theta / PI * self.height as f64 - 0.5)
+    }
+}
+
+/// The integrals over `centre` +- `extent` / 2 of the tents max(0, 1 - |x - k|) around those whole k that reach into it.
+fn tents_over(centre: f64, extent: f64) -> impl Iterator<Item = (isize, f64)> + Clone {
+    // The integral of the tent around 0 from minus infinity to x.
+    let integral = |x: f64| {
+        let x = x.clamp(-1.0, 1.0);
+        0.5 + x - 0.5 * x * x.abs()
+    };
+    let (from, to) = (centre - 0.5 * extent, centre + 0.5 * extent);
+    (from.floor() as isize..=to.ceil() as isize).map(move |k| (k, integral(to - k as f64) - integral(from - k as f64)))
+}
+
+fn to_dvec3(texel: &[f32; 3]) -> DVec3 {
+    DVec3::from_array(texel.map(f64::from))
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+
+    /// An environment of the given pixels, for tests.
+    pub(crate) fn environment(width: usize, height: usize, texel: impl Fn(usize, usize) -> [f32; 3]) -> Environment {
+        let texels = (0..width * height).map(|i| texel(i % width, i / width)).collect();
+        Environment { name: "test".into(), width, height, texels, repaired: RepairCounts::default() }
+    }
+
+    /// A file of the reference images' folder, or nothing where it is absent.
+    pub(crate) fn reference_environment(name: &str) -> Option<Environment> {
+        let data = std::env::var("THREADLIGHT_DATA").unwrap_or("../shared/data".into());
+        let path = std::path::Path::new(&data).join("../reference/env").join(name);
+        if !path.exists() {
+            println!("skipped: {} is not here", path.display());
+            return None;
+        }
+        Some(Environment::load(&path).unwrap())
+    }
+
+    #[test]
+    fn directions_follow_the_convention() {
+        let sky = environment(8, 4, |_, _| [1.0; 3]);
+        for (column, row, expected) in [
+            (3.5, 1.5, DVec3::Z),
+            (-0.5, 1.5, DVec3::NEG_Z),
+            (1.5, 1.5, DVec3::X),
+            (5.5, 1.5, DVec3::NEG_X),
+            (2.0, -0.5, DVec3::Y),
+            (2.0, 3.5, DVec3::NEG_Y),
+        ] {
+            assert!((sky.direction(column, row) - expected).length() < 1e-15, "{column} {row}");
+        }
+    }
+
+    #[test]
+    fn radiance_at_a_pixel_centre_is_the_pixel_and_between_them_bilinear() {
+        let map = environment(7, 5, |column, row| [column as f32, row as f32, 1.0]);
+        for row in 0..5 {
+            for column in 0..7 {
+                let radiance = map.radiance(map.direction(column as f64, row as f64));
+                assert!((radiance - DVec3::new(column as f64, row as f64, 1.0)).length() < 1e-12);
+            }
+        }
+        let between = map.radiance(map.direction(2.25, 1.75));
+        assert!((between - DVec3::new(2.25, 1.75, 1.0)).length() < 1e-12);
+        let wrapped = map.radiance(map.direction(6.5, 2.0));
+        assert!((wrapped - DVec3::new(3.0, 2.0, 1.0)).length() < 1e-12);
+        let pole = map.radiance(map.direction(3.0, -0.4));
+        assert!((pole - DVec3::new(3.0, 0.0, 1.0)).length() < 1e-9);
+    }
+
+    #[test]
+    fn solid_angles_sum_to_the_sphere() {
+        for (width, height) in [(1, 1), (3, 2), (7, 5), (64, 32), (1, 9)] {
+            let map = environment(width, height, |_, _| [1.0; 3]);
+            let sum = |solid_angle: &dyn Fn(usize) -> f64| width as f64 * (0..height).map(solid_angle).sum::<f64>();
+            assert!((sum(&|row| map.solid_angle(row)) - 4.0 * PI).abs() < 1e-12);
+            assert!((sum(&|row| map.weight_solid_angle(row)) - 4.0 * PI).abs() < 1e-12);
+            assert!((map.mean_radiance() - DVec3::ONE).length() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn mean_radiance_is_the_integral_of_radiance() {
+        let map =
+            environment(5, 4, |column, row| [(column * row) as f32, row as f32, if row == 0 { 9.0 } else { 0.0 }]);
+        let (mut sum, n) = (DVec3::ZERO, 800);
+        for i in 0..n {
+            for j in 0..n {
+                let (cos_theta, phi) = (2.0 * (i as f64 + 0.5) / n as f64 - 1.0, TAU * (j as f64 + 0.5) / n as f64);
+                let sin_theta = (1.0 - cos_theta * cos_theta).sqrt();
+                sum += map.radiance(DVec3::new(sin_theta * phi.sin(), cos_theta, -sin_theta * phi.cos()));
+            }
+        }
+        assert!((sum / (n * n) as f64 - map.mean_radiance()).length() < 1e-4);
+    }
+
+    #[test]
+    fn radiance_matches_the_independent_renderer() {
+        for (name, direction, expected) in [
+            ("proc_sun.exr", [0.6, 0.64, 0.48], [0.245975, 0.332080, 0.559877]),
+            ("sunset.exr", [-0.48, 0.6, 0.64], [1.605060, 1.621292, 1.903696]),
+        ] {
+            let Some(map) = reference_environment(name) else { continue };
+            let error = map.radiance(DVec3::from_array(direction)) - DVec3::from_array(expected);
+            assert!(error.abs().max_element() < 5e-6, "{name} {error}");
+        }
+    }
+}
+#[cfg(test)]
+mod scratch;

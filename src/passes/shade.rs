@@ -61,7 +61,7 @@ impl DeviceMaterials {
                 thread_count: table.count as u32,
                 row_count: table.rows as u32,
             });
-            threads.extend(table.samples.iter().map(|sample| sample.direction().as_vec3().extend(sample.p).to_array()));
+            threads.extend(table.samples.iter().map(|sample| sample.direction().as_vec3().extend(sample.p.log2()).to_array()));
         }
         let storage = vk::BufferUsageFlags::STORAGE_BUFFER;
         Ok(Self {

@@ -44,7 +44,7 @@ impl PipelineCache {
         if std::fs::read(file).is_ok_and(|old| old == contents) {
             return;
         }
-        if let Err(cause) = crate::output::write_atomically(file, &contents) {
+        if let Err(cause) = crate::output::write_whole(file, &contents) {
             tracing::warn!("the pipeline cache was not saved: {cause}");
         }
     }

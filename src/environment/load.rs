@@ -1,0 +1,211 @@
+//! Reads environments from Radiance HDR and OpenEXR files and repairs pixels that are no radiance.
+use std::fs::File;
+use std::io::BufReader;
+use std::path::Path;
+
+use image::codecs::hdr::HdrDecoder;
+use image::{DynamicImage, ImageDecoder};
+
+use super::{Environment, procedural};
+use crate::error::{Error, Result};
+use crate::output;
+
+/// How many pixels of a file were no radiance, by the worst that was wrong with each.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct RepairCounts {
+    /// Pixels with a NaN: replaced by the mean of those of their eight neighbours that were whole, or by black.
+    pub nan: usize,
+    /// Pixels with an infinite channel: set to the largest finite value in the file.
+    pub infinite: usize,
+    /// Pixels with a negative channel (colours outside Rec. 709, or ringing): set to 0.
+    pub negative: usize,
+}
+
+impl Environment {
+    /// Reads a lat-long `.hdr` or `.exr` of any size. EXR needs channels R, G, B or only Y; alpha is ignored. Pixels that are
+    /// NaN, infinite or negative are repaired and reported as a warning.
+    pub fn load(path: &Path) -> Result<Self> {
+        let (width, height, texels) = match path.extension().map(|extension| extension.to_ascii_lowercase()) {
+            Some(extension) if extension == "hdr" => read_hdr(path)?,
+            Some(extension) if extension == "exr" => {
+                let picture = output::read_image(path)?;
+                let texels = picture.rgba.iter().map(|&[r, g, b, _]| [r, g, b]).collect();
+                (picture.width as usize, picture.height as usize, texels)
+            }
+            _ => {
+                let names = procedural::builtin_names().join(", ");
+                return Err(Error::in_file(
+                    path,
+                    "is no known kind of environment",
+                    format!("give a Radiance .hdr, an OpenEXR .exr, or a built-in: {names}"),
+                ));
+            }
+        };
+        if texels.is_empty() {
+            return Err(Error::in_file(path, "has no pixels", "give a lat-long picture of at least 1x1"));
+        }
+        Ok(Self::repaired(path.display().to_string(), width, height, texels))
+    }
+
+    /// An environment of pixels that may hold anything.
+    fn repaired(name: String, width: usize, height: usize, mut texels: Vec<[f32; 3]>) -> Self {
+        let repaired = repair(width, height, &mut texels);
+        if repaired != RepairCounts::default() {
+            let RepairCounts { nan, infinite, negative } = repaired;
+            tracing::warn!("{name}: repaired pixels: {nan} NaN, {infinite} infinite, {negative} negative");
+        }
+        Self { name, width, height, texels, repaired }
+    }
+}
+
+/// Width, height and pixels of a Radiance picture.
+fn read_hdr(path: &Path) -> Result<(usize, usize, Vec<[f32; 3]>)> {
+    let file = File::open(path).map_err(|cause| Error::unreadable(path, cause))?;
+    let broken = |cause: image::ImageError| {
+        let cause = cause.to_string().replace('\n', " ");
+        Error::in_file(path, format!("is not a whole Radiance HDR ({cause})"), "fetch or save it again")
+    };
+    let decoder = HdrDecoder::new(BufReader::new(file)).map_err(broken)?;
+    let (width, height) = decoder.dimensions();
+    if u64::from(width) * u64::from(height) > output::MAX_PIXELS as u64 {
+        return Err(Error::in_file(path, "says that it has more than 2^28 pixels", "make it smaller"));
+    }
+    let picture = DynamicImage::from_decoder(decoder).map_err(broken)?.into_rgb32f();
+    Ok((width as usize, height as usize, picture.pixels().map(|pixel| pixel.0).collect()))
+}
+
+/// Makes every value finite and not negative; counts the pixels by what was wrong.
+fn repair(width: usize, height: usize, texels: &mut [[f32; 3]]) -> RepairCounts {
+    let mut counts = RepairCounts::default();
+    let largest = texels.iter().flatten().copied().filter(|value| value.is_finite()).fold(0.0, f32::max);
+    let mut holes = Vec::new();
+    for (index, texel) in texels.iter_mut().enumerate() {
+        if texel.iter().any(|value| value.is_nan()) {
+            counts.nan += 1;
+            holes.push(index);
+            continue;
+        }
+        // Minus infinity counts as infinite, and is then as black as any negative value.
+        counts.infinite += usize::from(texel.iter().any(|value| value.is_infinite()));
+        counts.negative +=
+            usize::from(texel.iter().all(|value| value.is_finite()) && texel.iter().any(|&value| value < 0.0));
+        *texel = texel.map(|value| value.clamp(0.0, largest));
+    }
+    let filled: Vec<[f32; 3]> = holes.iter().map(|&hole| neighbours_mean(width, height, texels, hole)).collect();
+    for (hole, value) in holes.into_iter().zip(filled) {
+        texels[hole] = value;
+    }
+    counts
+}
+
+/// The mean of the neighbours (wrapped in u, cut off at the poles) without a NaN; black where there are none.
+fn neighbours_mean(width: usize, height: usize, texels: &[[f32; 3]], index: usize) -> [f32; 3] {
+    let (column, row) = (index % width, index / width);
+    let (mut sum, mut count) = ([0.0; 3], 0.0);
+    for row in row.saturating_sub(1)..(row + 2).min(height) {
+        for column in [column + width - 1, column, column + 1] {
+            let texel = texels[row * width + column % width];
+            if texel.iter().all(|value| !value.is_nan()) {
+                sum = std::array::from_fn(|channel| sum[channel] + f64::from(texel[channel]));
+                count += 1.0;
+            }
+        }
+    }
+    sum.map(|channel| if count > 0.0 { (channel / count) as f32 } else { 0.0 })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::output::{ExrHeader, write_exr};
+
+    /// A Radiance file of flat pixels: mantissas and shared exponent as given.
+    fn hdr(width: usize, height: usize, rgbe: [u8; 4]) -> Vec<u8> {
+        let mut bytes = format!("#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y {height} +X {width}\n").into_bytes();
+        bytes.extend(rgbe.repeat(width * height));
+        bytes
+    }
+
+    #[test]
+    fn an_hdr_of_any_size_reads() {
+        let folder = tempfile::tempdir().unwrap();
+        for (width, height) in [(1, 1), (3, 2), (7, 5)] {
+            let path = folder.path().join("small.HDR");
+            std::fs::write(&path, hdr(width, height, [128, 64, 32, 129])).unwrap();
+            let environment = Environment::load(&path).unwrap();
+            assert_eq!((environment.width, environment.height), (width, height));
+            assert!(environment.texels.iter().all(|texel| *texel == [1.0, 0.5, 0.25]));
+            assert_eq!(environment.repaired, RepairCounts::default());
+        }
+    }
+
+    #[test]
+    fn pixels_that_are_no_radiance_are_repaired_and_counted() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("sick.exr");
+        let mut pixels = vec![[2.0, 4.0, 6.0, 1.0]; 7 * 5];
+        pixels[0] = [f32::NAN, 1.0, f32::INFINITY, 1.0];
+        pixels[8] = [f32::INFINITY, 1.0, -1.0, 1.0];
+        pixels[16] = [-3.0, 1.0, 1.0, 1.0];
+        pixels[17] = [f32::NEG_INFINITY, 50.0, 1.0, 1.0];
+        write_exr(&path, 7, 5, &pixels, false, &ExrHeader::default()).unwrap();
+        let environment = Environment::load(&path).unwrap();
+        assert_eq!(environment.repaired, RepairCounts { nan: 1, infinite: 2, negative: 1 });
+        // Neighbours of (0, 0): three with [2, 4, 6] twice over the wrap, and the repaired infinite one.
+        assert_eq!(environment.texels[0], [(4.0 * 2.0 + 50.0) / 5.0, (4.0 * 4.0 + 1.0) / 5.0, 4.0 * 6.0 / 5.0]);
+        assert_eq!(environment.texels[8], [50.0, 1.0, 0.0]);
+        assert_eq!(environment.texels[16], [0.0, 1.0, 1.0]);
+        assert_eq!(environment.texels[17], [0.0, 50.0, 1.0]);
+    }
+
+    #[test]
+    fn a_file_of_nothing_but_nan_is_black() {
+        let mut texels = vec![[f32::NAN; 3]; 6];
+        assert_eq!(repair(3, 2, &mut texels).nan, 6);
+        assert_eq!(texels, [[0.0; 3]; 6]);
+    }
+
+    #[test]
+    fn broken_files_are_errors_that_name_the_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let whole = hdr(16, 8, [1, 2, 3, 128]);
+        for (name, bytes) in [
+            ("cut.hdr", &whole[..whole.len() - 9]),
+            ("header.hdr", &whole[..20]),
+            ("empty.hdr", &[]),
+            ("text.hdr", b"hello\n"),
+            ("huge.hdr", b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1000000 +X 1000000\n"),
+            ("none.hdr", b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 0 +X 0\n"),
+            ("text.exr", b"hello\n"),
+            ("picture.jpg", b"hello\n"),
+        ] {
+            let path = folder.path().join(name);
+            std::fs::write(&path, bytes).unwrap();
+            let error = Environment::load(&path).unwrap_err().to_string();
+            assert!(error.contains(name) && !error.contains('\n'), "{error}");
+        }
+        for name in ["missing.hdr", "missing.exr"] {
+            assert!(Environment::load(&folder.path().join(name)).unwrap_err().to_string().contains(name));
+        }
+    }
+
+    #[test]
+    fn an_exr_without_colour_is_an_error_that_lists_its_channels() {
+        use exr::prelude::*;
+        let folder = tempfile::tempdir().unwrap();
+        let write = |name: &str, names: &[&str]| {
+            let path = folder.path().join(name);
+            let channels =
+                names.iter().map(|&name| AnyChannel::new(name, FlatSamples::F16(vec![f16::ONE; 4]))).collect();
+            let layer =
+                Layer::new((2, 2), LayerAttributes::default(), Encoding::default(), AnyChannels::sort(channels));
+            Image::from_layer(layer).write().to_file(&path).unwrap();
+            Environment::load(&path)
+        };
+        let error = write("depth.exr", &["Z", "N.X"]).unwrap_err().to_string();
+        assert!(error.contains("depth.exr") && error.contains("N.X, Z"), "{error}");
+        for names in [&["R", "G", "B"][..], &["A", "R", "G", "B"], &["Y"], &["view.R", "view.G", "view.B", "view.Z"]] {
+            assert_eq!(write("colour.exr", names).unwrap().texels, [[1.0; 3]; 4], "{names:?}");
+        }
+    }
+}

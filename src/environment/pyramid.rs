@@ -1,0 +1,390 @@
+//! The box-filtered pyramid: the environment's mean over ever larger texels of a cube map, as the paper's method looks it
+//! up (Colbert and Krivanek 2007), with the CPU twin of the GPU's seamless trilinear fetch.
+use std::f64::consts::{PI, TAU};
+
+use glam::{DVec3, Vec3};
+use half::f16;
+use rayon::prelude::*;
+
+use super::cube::{self, direction_of, exact_texel_solid_angle, face_of, point_of};
+use super::{Environment, to_dvec3};
+
+/// Level 0 is no finer than this: 6 x 1024^2 texels of 16 bytes are 96 MiB.
+const MAX_FACE_SIZE: usize = 1024;
+
+/// Largest finite half float.
+const F16_MAX: f64 = 65504.0;
+
+/// A cube map with all its levels, each half the size of the one before, down to one texel a face.
+#[derive(Clone, Debug)]
+pub struct Pyramid {
+    /// Texels along the edge of a face at level 0; a power of two.
+    pub face_size: usize,
+    /// Radiance per level: six faces in the order +X -X +Y -Y +Z -Z, each row by row, oriented as Vulkan has them.
+    pub levels: Vec<Vec<[f32; 3]>>,
+}
+
+impl Pyramid {
+    /// The means of [`Environment::radiance`] over the solid angles of the texels. Constants stay constant to the bit,
+    /// and the energy of a single bright pixel arrives to better than 1e-3 wherever it is.
+    pub fn box_filtered(environment: &Environment) -> Self {
+        // A texel at the middle of a face then spans at most 2 pi / pi = 2 thirds of the angle of a pixel at the equator.
+        let pixels = (environment.width as f64 / PI).ceil() as usize;
+        let face_size = pixels.next_power_of_two().clamp(1, MAX_FACE_SIZE);
+        let mut levels = vec![finest_level(environment, face_size)];
+        for size in (0..face_size.ilog2()).rev().map(|log2| 1 << log2) {
+            levels.push(coarser_level(levels.last().expect("there is level 0"), size));
+        }
+        Self { face_size, levels }
+    }
+
+    /// Texels along the edge of a face at `level`.
+    pub fn size_of(&self, level: usize) -> usize {
+        self.face_size >> level
+    }
+
+    /// The CPU twin of a seamless trilinear cube map fetch: bilinear in each of the two nearest levels, across the edges of
+    /// faces too (the average of the three texels at a corner), and linear between the levels. `level` is clamped.
+    pub fn lookup(&self, direction: Vec3, level: f32) -> Vec3 {
+        let direction = direction.as_dvec3();
+        let level = f64::from(level).clamp(0.0, (self.levels.len() - 1) as f64);
+        let (finer, fraction) = (level as usize, level.fract());
+        let radiance = self.lookup_level(direction, finer);
+        if fraction == 0.0 {
+            return radiance.as_vec3();
+        }
+        radiance.lerp(self.lookup_level(direction, finer + 1), fraction).as_vec3()
+    }
+
+    /// The level whose texels around the unit `direction` have `solid_angle` (sr), clamped to those that there are.
+    pub fn level_of(&self, solid_angle: f32, direction: Vec3) -> f32 {
+        let texel = cube::texel_solid_angle(self.face_size, direction.as_dvec3());
+        let level = 0.5 * (f64::from(solid_angle) / texel).log2();
+        level.clamp(0.0, (self.levels.len() - 1) as f64) as f32
+    }
+
+    /// The power of two by which radiance is divided so that half floats can hold it; 1 where they can as it is.
+    pub fn radiance_scale(&self) -> f32 {
+        let max = f64::from(self.levels[0].iter().flatten().copied().fold(0.0, f32::max));
+        (max / F16_MAX).log2().ceil().max(0.0).exp2() as f32
+    }
+
+    /// Whether half floats serve: a scale beyond 64 would push dim light (below 0.004) into their subnormal numbers,
+    /// where steps become visible. Otherwise use [`Self::texels_rgba32f`].
+    pub fn fits_half(&self) -> bool {
+        self.radiance_scale() <= 64.0
+    }
+
+    /// Texels of a level divided by `scale` (see [`Self::radiance_scale`]), alpha 1, for the GPU.
+    pub fn texels_rgba16f(&self, level: usize, scale: f32) -> Vec<[f16; 4]> {
+        let encode = |value: f32| f16::from_f32(value / scale);
+        self.levels[level].par_iter().map(|&[r, g, b]| [encode(r), encode(g), encode(b), f16::ONE]).collect()
+    }
+
+    /// Texels of a level as they are, alpha 1, for the GPU.
+    pub fn texels_rgba32f(&self, level: usize) -> Vec<[f32; 4]> {
+        self.levels[level].par_iter().map(|&[r, g, b]| [r, g, b, 1.0]).collect()
+    }
+
+    /// Bilinear in one level.
+    fn lookup_level(&self, direction: DVec3, level: usize) -> DVec3 {
+        let size = self.size_of(level);
+        let (face, s, t) = face_of(direction);
+        let (x, y) = (s * size as f64 - 0.5, t * size as f64 - 0.5);
+        let (left, top) = (x.floor(), y.floor());
+        let taps = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)]
+            .map(|(right, down)| self.texel_across_edges(level, face, left + right, top + down));
+        // Beyond the corner of the cube there is no texel: the average of the other three stands for it.
+        let corner = taps.iter().flatten().sum::<DVec3>() / 3.0;
+        let [top_left, top_right, bottom_left, bottom_right] = taps.map(|tap| tap.unwrap_or(corner));
+        top_left.lerp(top_right, x - left).lerp(bottom_left.lerp(bottom_right, x - left), y - top)
+    }
+
+    /// The texel at whole coordinates that may lie one beyond the face; none beyond its corner.
+    fn texel_across_edges(&self, level: usize, face: usize, column: f64, row: f64) -> Option<DVec3> {
+        let size = self.size_of(level);
+        let inside = |coordinate: f64| (0.0..size as f64).contains(&coordinate);
+        let (face, column, row) = match (inside(column), inside(row)) {
+            (true, true) => (face, column as usize, row as usize),
+            (false, false) => return None,
+            _ => {
+                // One step beyond the edge in the plane of this face falls, seen from the centre, on the right texel of the
+                // neighbour: its coordinate along the edge shrinks by less than half a texel.
+                let centre = |coordinate: f64| (coordinate + 0.5) / size as f64;
+                let (face, s, t) = face_of(direction_of(face, centre(column), centre(row)));
+                let index = |coordinate: f64| ((coordinate * size as f64) as usize).min(size - 1);
+                (face, index(s), index(t))
+            }
+        };
+        Some(to_dvec3(&self.levels[level][(face * size + row) * size + column]))
+    }
+}
+
+/// Level 0: for each texel the mean of a grid of samples, each itself the exact mean of the bilinear environment over a box
+/// in theta and phi as large as the sample's share of the texel. Point samples would miss the energy of a single bright
+/// pixel by per cents, and near the poles, where pixels are slivers, altogether.
+pub(super) fn finest_level(environment: &Environment, face_size: usize) -> Vec<[f32; 3]> {
+    let row_rad = PI / environment.height as f64;
+    let texel_rad = 2.0 / face_size as f64;
+    // About as many as there are rows in the texel, and more towards the poles: a box in theta and phi is a good likeness of a
+    // sample that is small against its distance to the pole. With a 32nd of it a pixel's energy is right to 2e-4.
+    let samples_per_edge = |direction: DVec3| {
+        let sin_theta = direction.x.hypot(direction.z).max(0.25 * row_rad);
+        let count = (1.5 * texel_rad / row_rad).round().max((32.0 * texel_rad / sin_theta).ceil()) as usize;
+        // On a face of one texel an odd number would put a sample on the pole, where phi is undefined.
+        if face_size == 1 { count.next_multiple_of(2) } else { count.clamp(1, 512) }
+    };
+    (0..6 * face_size * face_size)
+        .into_par_iter()
+        .map(|texel| {
+            let (face, row, column) = (texel / face_size / face_size, texel / face_size % face_size, texel % face_size);
+            let middle = |index: usize| (index as f64 + 0.5) / face_size as f64;
+            let axes = [
+                point_of(face, 1.0, 0.0) - point_of(face, 0.0, 0.0),
+                point_of(face, 0.0, 1.0) - point_of(face, 0.0, 0.0),
+            ];
+            let count = samples_per_edge(direction_of(face, middle(column), middle(row)));
+            let samples_size = face_size * count;
+            let (mut sum, mut weight_sum) = (DVec3::ZERO, 0.0);
+            for sample in 0..count * count {
+                let s = ((column * count + sample % count) as f64 + 0.5) / samples_size as f64;
+                let t = ((row * count + sample / count) as f64 + 0.5) / samples_size as f64;
+                let point = point_of(face, s, t);
+                let solid_angle = cube::texel_solid_angle(samples_size, point.normalize());
+                let sides = axes.map(|axis| axis / samples_size as f64);
+                let (theta_rad, phi_rad) = box_around(point, sides);
+                sum += solid_angle * environment.mean_over_box(point, theta_rad, phi_rad);
+                weight_sum += solid_angle;
+            }
+            (sum / weight_sum).as_vec3().to_array()
+        })
+        .collect()
+}
+
+/// The extent in theta and phi of the box that has the second moments of the texel around the point `at` on the plane of
+/// a face, of which `sides` are the texel's.
+fn box_around(at: DVec3, sides: [DVec3; 2]) -> (f64, f64) {
+    let rho_squared = at.x * at.x + at.z * at.z;
+    let rho = rho_squared.sqrt();
+    // Derivatives of theta = atan2(rho, y) and phi = atan2(x, -z) along the sides.
+    let along_theta = |side: DVec3| (at.y * (at.x * side.x + at.z * side.z) / rho - rho * side.y) / at.length_squared();
+    let along_phi = |side: DVec3| (at.x * side.z - at.z * side.x) / rho_squared;
+    let both = |along: &dyn Fn(DVec3) -> f64| along(sides[0]).hypot(along(sides[1]));
+    (both(&along_theta), both(&along_phi).min(TAU))
+}
+
+/// The level of faces of `size` from the `finer` one of twice the size: means of four, weighed by solid angle.
+fn coarser_level(finer: &[[f32; 3]], size: usize) -> Vec<[f32; 3]> {
+    let solid_angles: Vec<f64> = (0..4 * size * size)
+        .into_par_iter()
+        .map(|texel| exact_texel_solid_angle(2 * size, texel % (2 * size), texel / (2 * size)))
+        .collect();
+    (0..6 * size * size)
+        .into_par_iter()
+        .map(|texel| {
+            let (face, row, column) = (texel / size / size, texel / size % size, texel % size);
+            let (mut sum, mut weight_sum) = (DVec3::ZERO, 0.0);
+            for (right, down) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
+                let child = (2 * row + down) * 2 * size + 2 * column + right;
+                let weight = solid_angles[child];
+                sum += weight * to_dvec3(&finer[face * 4 * size * size + child]);
+                weight_sum += weight;
+            }
+            (sum / weight_sum).as_vec3().to_array()
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{environment, reference_environment};
+    use super::*;
+
+    /// The mean over the sphere of a level.
+    fn mean(pyramid: &Pyramid, level: usize) -> DVec3 {
+        let size = pyramid.size_of(level);
+        let texels = pyramid.levels[level].iter().enumerate();
+        texels
+            .map(|(i, texel)| exact_texel_solid_angle(size, i % size, i / size % size) * to_dvec3(texel))
+            .sum::<DVec3>()
+            / (4.0 * PI)
+    }
+
+    fn assert_energy(environment: &Environment, tolerance: f64) {
+        let pyramid = Pyramid::box_filtered(environment);
+        let expected = environment.mean_radiance();
+        for level in 0..pyramid.levels.len() {
+            let error = ((mean(&pyramid, level) - expected) / expected).abs().max_element();
+            assert!(error < tolerance, "{}: level {level} misses {error:e} of the energy", environment.name);
+        }
+    }
+
+    #[test]
+    fn a_constant_stays_exactly_constant() {
+        for (width, height) in [(1, 1), (3, 2), (7, 5), (64, 32)] {
+            let pyramid = Pyramid::box_filtered(&environment(width, height, |_, _| [1.0, 0.1, 1e6]));
+            assert!(pyramid.levels.iter().flatten().all(|texel| *texel == [1.0, 0.1, 1e6]), "{width}x{height}");
+            for i in 0..1000 {
+                let direction = Vec3::new((i as f32).sin(), (1.7 * i as f32).cos(), (0.3 * i as f32).sin() + 0.01);
+                let radiance = pyramid.lookup(direction, i as f32 * 0.007 - 0.5);
+                assert!((radiance / Vec3::new(1.0, 0.1, 1e6) - 1.0).abs().max_element() < 2e-7);
+            }
+        }
+    }
+
+    #[test]
+    fn every_level_holds_the_energy_of_the_built_ins() {
+        for name in super::super::builtin_names() {
+            let mut full = Environment::builtin(name).unwrap();
+            // A quarter of the rows and columns: as hard, and faster.
+            let (width, height) = ((full.width / 4).max(1), (full.height / 4).max(1));
+            let step = full.width / width;
+            full.texels =
+                (0..width * height).map(|i| full.texels[(i / width * step) * full.width + i % width * step]).collect();
+            (full.width, full.height) = (width, height);
+            assert_energy(&full, 1e-4);
+        }
+    }
+
+    #[test]
+    fn every_level_holds_the_energy_of_real_environments() {
+        for name in ["proc_sun.exr", "sunset.exr"] {
+            if let Some(map) = reference_environment(name) {
+                assert_energy(&map, 1e-4);
+            }
+        }
+    }
+
+    #[test]
+    fn one_bright_pixel_keeps_its_energy_wherever_it_is() {
+        let (width, height) = (256, 128);
+        for (column, row) in [
+            (200, 90),
+            (255, 127),
+            (100, 124),
+            (64, 63),
+            (32, 40),
+            (0, 0),
+            (77, 0),
+            (5, 1),
+            (32, 31),
+            (16, 21),
+            (127, 40),
+            (48, 32),
+            (90, 62),
+            (3, 63),
+        ] {
+            let map = environment(width, height, |x, y| [if (x, y) == (column, row) { 1e6 } else { 0.0 }; 3]);
+            let pyramid = Pyramid::box_filtered(&map);
+            let error = mean(&pyramid, 0).x / map.mean_radiance().x - 1.0;
+            println!("{column} {row} {error:e}");
+            assert!(error.abs() < 1e-3, "pixel ({column}, {row}): {error:e}");
+        }
+    }
+
+    #[test]
+    fn level_0_follows_the_environment() {
+        let mut map = environment(64, 32, |_, _| [0.0; 3]);
+        for i in 0..64 * 32 {
+            let direction = map.direction((i % 64) as f64, (i / 64) as f64);
+            map.texels[i] = [1.0 + direction.x * direction.z, 1.0 + direction.y.powi(3), 0.5].map(|value| value as f32);
+        }
+        let pyramid = Pyramid::box_filtered(&map);
+        for i in 0..2000 {
+            let z: f64 = 1.0 - (f64::from(i) + 0.5) / 1000.0;
+            let angle = f64::from(i) * 2.4;
+            let direction = DVec3::new(angle.cos() * (1.0 - z * z).sqrt(), z, angle.sin() * (1.0 - z * z).sqrt());
+            let error = (pyramid.lookup(direction.as_vec3(), 0.0).as_dvec3() - map.radiance(direction)).abs();
+            // The means over texels of 0.06 rad, blurred once more by the lookup.
+            assert!(error.max_element() < 0.015, "{direction}: {error}");
+        }
+    }
+
+    #[test]
+    fn poles_and_axes_are_where_the_convention_says() {
+        let lit = |axis: DVec3| {
+            let mut map = environment(64, 32, |_, _| [0.0; 3]);
+            for i in 0..64 * 32 {
+                let direction = map.direction((i % 64) as f64, (i / 64) as f64);
+                map.texels[i] = [if direction.dot(axis) > 0.9 { 1.0 } else { 0.0 }; 3];
+            }
+            Pyramid::box_filtered(&map)
+        };
+        let axes = [DVec3::X, DVec3::NEG_X, DVec3::Y, DVec3::NEG_Y, DVec3::Z, DVec3::NEG_Z];
+        for (face, axis) in axes.into_iter().enumerate() {
+            let pyramid = lit(axis);
+            let coarsest = &pyramid.levels[pyramid.levels.len() - 1];
+            assert!((0..6).all(|other| (coarsest[other][0] > 0.1) == (other == face)), "{}", cube::FACE_NAMES[face]);
+            assert_eq!(pyramid.lookup(axis.as_vec3(), 0.0), Vec3::ONE);
+        }
+    }
+
+    #[test]
+    fn lookups_have_no_seam() {
+        let map = environment(32, 16, |x, y| [((x * 7 + y * 5) % 11) as f32, (x % 3) as f32, (y % 4) as f32]);
+        let pyramid = Pyramid::box_filtered(&map);
+        let corner = DVec3::ONE.normalize();
+        let axes = [
+            DVec3::X,
+            DVec3::Y,
+            DVec3::Z,
+            DVec3::new(1.0, 1.0, 0.0),
+            DVec3::new(1.0, -1.0, 0.0),
+            DVec3::new(0.0, 1.0, 1.0),
+            DVec3::new(1.0, 0.0, -1.0),
+            DVec3::new(0.3, 0.8, -0.4),
+        ];
+        let circle = |axis: DVec3, cos: f64, angle: f64| {
+            let (u, v) = axis.normalize().any_orthonormal_pair();
+            let sin = f64::sqrt(1.0 - cos * cos);
+            (cos * axis.normalize() + sin * (angle.cos() * u + angle.sin() * v)).as_vec3()
+        };
+        // Great circles cross edges, corners, poles and the wrap; small ones go round corners and poles.
+        for (axis, cos) in axes.map(|axis| (axis, 0.0)).into_iter().chain([(corner, 0.999), (DVec3::Y, 0.9999)]) {
+            for level in [0.0, 0.5, 1.0, 2.3, 3.0] {
+                let steps = 4000;
+                let step_rad = TAU / f64::from(steps) * f64::sqrt(1.0 - cos * cos);
+                let size = pyramid.face_size as f64 / f64::from(level).floor().exp2();
+                // Neighbouring texels differ by at most 11 over an angle of at least 1 / size, twice that diagonally.
+                let largest = 2.0 * 11.0 * step_rad * size * 3f64.sqrt() + 1e-5;
+                for i in 0..steps {
+                    let at = |i: i32| pyramid.lookup(circle(axis, cos, TAU * f64::from(i) / f64::from(steps)), level);
+                    let change = (at(i + 1) - at(i)).abs().max_element();
+                    assert!(f64::from(change) < largest, "axis {axis}, step {i}, level {level}: {change} > {largest}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn levels_and_solid_angles_are_inverse() {
+        let pyramid = Pyramid::box_filtered(&environment(256, 128, |_, _| [1.0; 3]));
+        assert_eq!((pyramid.face_size, pyramid.levels.len()), (128, 8));
+        for direction in [Vec3::X, Vec3::new(0.6, -0.8, 0.0), Vec3::splat(-1.0).normalize()] {
+            for level in 0..8 {
+                let solid_angle = cube::texel_solid_angle(pyramid.size_of(level), direction.as_dvec3()) as f32;
+                assert!((pyramid.level_of(solid_angle, direction) - level as f32).abs() < 1e-5);
+            }
+            assert_eq!(pyramid.level_of(0.0, direction), 0.0);
+            assert_eq!(pyramid.level_of(12.6, direction), 7.0);
+        }
+    }
+
+    #[test]
+    fn half_floats_never_overflow() {
+        for (value, scale, fits) in
+            [(0.0, 1.0, true), (65504.0, 1.0, true), (65505.0, 2.0, true), (1e6, 16.0, true), (1e30, 0.0, false)]
+        {
+            let pyramid = Pyramid::box_filtered(&environment(4, 2, |_, _| [value; 3]));
+            assert_eq!(pyramid.fits_half(), fits);
+            if scale > 0.0 {
+                assert_eq!(pyramid.radiance_scale(), scale);
+            }
+            let encoded = pyramid.texels_rgba16f(0, pyramid.radiance_scale())[0];
+            assert!(encoded[0].is_finite());
+            let decoded = encoded[0].to_f32() * pyramid.radiance_scale();
+            assert!((decoded - value).abs() <= value / 2048.0);
+            assert_eq!(pyramid.texels_rgba32f(0)[0], [value, value, value, 1.0]);
+        }
+    }
+}

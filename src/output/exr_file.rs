@@ -1,0 +1,221 @@
+//! Writes and reads OpenEXR pictures: 32-bit float, linear Rec. 709, the circumstances of the rendering in the header.
+use std::collections::BTreeMap;
+use std::io::Cursor;
+use std::path::Path;
+
+use exr::meta::MetaData;
+use exr::meta::attribute::{AttributeValue, Chromaticities, Text};
+use exr::prelude::{
+    AnyChannel, AnyChannels, Encoding, FlatImage, FlatSamples, Image, Layer, LayerAttributes, ReadChannels, ReadLayers,
+    Vec2, WritableImage,
+};
+
+use super::{Format, Picture, write_whole};
+use crate::error::{Error, Result};
+
+/// More pixels than any picture of use, few enough for memory: a damaged header must not ask for all of it.
+pub(crate) const MAX_PIXELS: usize = 1 << 28;
+
+/// How a picture was made: written to the header of an EXR, each field under its own name.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ExrHeader {
+    /// Shading method, such as `paper`.
+    pub method: String,
+    /// Threads, or samples of the other estimators.
+    pub threads: u32,
+    /// Name or file of the material, or of all of them, separated by commas.
+    pub material: String,
+    /// Name or file of the environment.
+    pub environment: String,
+    /// Name of the Vulkan device.
+    pub device: String,
+    /// Seconds the frame took.
+    pub seconds: f64,
+    /// Version of Threadlight, `threadlight_version` in the file.
+    pub version: String,
+    /// Anything else: name and value.
+    pub more: Vec<(String, String)>,
+}
+
+impl Default for ExrHeader {
+    /// Nothing known but the version, which is this one's.
+    fn default() -> Self {
+        Self {
+            method: String::new(),
+            threads: 0,
+            material: String::new(),
+            environment: String::new(),
+            device: String::new(),
+            seconds: 0.0,
+            version: env!("CARGO_PKG_VERSION").into(),
+            more: Vec::new(),
+        }
+    }
+}
+
+/// Writes an EXR of `width` x `height` pixels, rows from the top, colour multiplied by alpha as EXR has it; without
+/// `alpha` only R, G and B.
+///
+/// # Panics
+/// If `pixels` does not hold one for each pixel.
+pub fn write_exr(
+    path: &Path,
+    width: u32,
+    height: u32,
+    pixels: &[[f32; 4]],
+    alpha: bool,
+    header: &ExrHeader,
+) -> Result<()> {
+    assert_eq!(pixels.len(), width as usize * height as usize, "one value a pixel");
+    let channel = |(index, name): (usize, &str)| {
+        AnyChannel::new(name, FlatSamples::F32(pixels.iter().map(|pixel| pixel[index]).collect()))
+    };
+    let names: &[&str] = if alpha { &["R", "G", "B", "A"] } else { &["R", "G", "B"] };
+    let channels = AnyChannels::sort(names.iter().copied().enumerate().map(channel).collect());
+
+    let text = |value: &str| AttributeValue::Text(Text::new_or_none(value).unwrap_or_else(|| Text::from("?")));
+    let mut attributes = LayerAttributes::default();
+    attributes.software_name = Text::new_or_none(format!("Threadlight {}", header.version));
+    attributes.other.extend([
+        (Text::from("method"), text(&header.method)),
+        (Text::from("threads"), AttributeValue::I32(header.threads.try_into().unwrap_or(i32::MAX))),
+        (Text::from("material"), text(&header.material)),
+        (Text::from("environment"), text(&header.environment)),
+        (Text::from("device"), text(&header.device)),
+        (Text::from("seconds"), AttributeValue::F64(header.seconds)),
+        // `version` alone is a name that the format keeps for deep data.
+        (Text::from("threadlight_version"), text(&header.version)),
+    ]);
+    attributes
+        .other
+        .extend(header.more.iter().filter_map(|(name, value)| Some((Text::new_or_none(name)?, text(value)))));
+
+    let size = Vec2(width as usize, height as usize);
+    let mut image = Image::from_layer(Layer::new(size, attributes, Encoding::SMALL_LOSSLESS, channels));
+    image.attributes.chromaticities = Some(Chromaticities {
+        red: Vec2(0.64, 0.33),
+        green: Vec2(0.30, 0.60),
+        blue: Vec2(0.15, 0.06),
+        white: Vec2(0.3127, 0.3290),
+    });
+    let mut bytes = Cursor::new(Vec::new());
+    image.write().to_buffered(&mut bytes).map_err(|cause| Error::unwritable(path, cause))?;
+    let mut bytes = bytes.into_inner();
+    sort_attributes(&mut bytes);
+    write_whole(path, &bytes)
+}
+
+/// Puts the attributes in a single-part EXR's header into the order of their names. The crate keeps them in a hash map
+/// and writes them in a new order each time, but the same picture is to have the same bytes.
+fn sort_attributes(bytes: &mut [u8]) {
+    const MAGIC_AND_VERSION: usize = 8;
+    let text_end = |start: usize| bytes[start..].iter().position(|&byte| byte == 0).map(|length| start + length + 1);
+    let mut attributes = Vec::new();
+    let mut start = MAGIC_AND_VERSION;
+    // An attribute is its name and type, each ended by 0, the length of its value (u32), and the value; a 0 ends all.
+    while bytes.get(start).is_some_and(|&byte| byte != 0) {
+        let Some(value) = text_end(start).and_then(text_end) else { return };
+        let Some(length) = bytes.get(value..value + 4) else { return };
+        let end = value + 4 + u32::from_le_bytes([length[0], length[1], length[2], length[3]]) as usize;
+        let Some(attribute) = bytes.get(start..end) else { return };
+        attributes.push(attribute.to_vec());
+        start = end;
+    }
+    attributes.sort();
+    bytes[MAGIC_AND_VERSION..start].copy_from_slice(&attributes.concat());
+}
+
+/// Reads an EXR: the first layer with channels R, G and B (perhaps with a common prefix, such as `beauty.R`), or with
+/// only Y, which then stands for all three. Half, float and integer samples, any compression that the crate knows.
+pub(super) fn read(path: &Path) -> Result<Picture> {
+    let bytes = std::fs::read(path).map_err(|cause| Error::unreadable(path, cause))?;
+    let broken = |cause: exr::error::Error| {
+        Error::in_file(
+            path,
+            format!("is not an EXR that can be read ({cause})"),
+            "save it again, with channels R, G, B",
+        )
+    };
+    let meta = MetaData::read_from_buffered(Cursor::new(&bytes), false).map_err(broken)?;
+    let area = |size: Vec2<usize>| size.0.saturating_mul(size.1);
+    if meta.headers.iter().any(|header| area(header.layer_size) > MAX_PIXELS) {
+        return Err(Error::in_file(path, "says that it has more than 2^28 pixels", "make it smaller"));
+    }
+    let image: FlatImage = exr::prelude::read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .all_channels()
+        .all_layers()
+        .all_attributes()
+        .from_buffered(Cursor::new(&bytes))
+        .map_err(broken)?;
+
+    let (layer, prefix, names) = image.layer_data.iter().find_map(find_colour).ok_or_else(|| {
+        let names: Vec<String> = image
+            .layer_data
+            .iter()
+            .flat_map(|layer| layer.channel_data.list.iter().map(|channel| channel.name.to_string()))
+            .collect();
+        Error::in_file(
+            path,
+            format!("has no channels R, G, B, only {}", names.join(", ")),
+            "give an EXR with colour in R, G, B",
+        )
+    })?;
+    let mut rgba = vec![[1.0; 4]; area(layer.size)];
+    for (index, name) in names.iter().enumerate().chain([(3, &"A")]) {
+        if let Some(channel) = find_channel(layer, &prefix, name) {
+            rgba.iter_mut().zip(channel.sample_data.values_as_f32()).for_each(|(pixel, value)| pixel[index] = value);
+        }
+    }
+    Ok(Picture {
+        width: layer.size.0 as u32,
+        height: layer.size.1 as u32,
+        rgba,
+        alpha: find_channel(layer, &prefix, "A").is_some(),
+        format: Format::Exr,
+        attributes: attribute_texts(&image, layer),
+    })
+}
+
+type FlatLayer = Layer<AnyChannels<FlatSamples>>;
+
+/// The layer, the prefix before its channel names, and the names of its three colours; none where it has no colour.
+fn find_colour(layer: &FlatLayer) -> Option<(&FlatLayer, String, [&'static str; 3])> {
+    for names in [["R", "G", "B"], ["Y", "Y", "Y"]] {
+        // Channels are sorted, so names without a prefix come before others only by chance: look for them first.
+        let prefixes = layer.channel_data.list.iter().filter_map(|channel| {
+            channel.name.to_string().strip_suffix(names[0]).filter(|prefix| prefix.ends_with('.')).map(str::to_owned)
+        });
+        for prefix in std::iter::once(String::new()).chain(prefixes) {
+            if names.iter().all(|name| find_channel(layer, &prefix, name).is_some()) {
+                return Some((layer, prefix, names));
+            }
+        }
+    }
+    None
+}
+
+/// The channel of that name with one sample for each pixel (chroma of a luminance-chroma image has fewer).
+fn find_channel<'a>(layer: &'a FlatLayer, prefix: &str, name: &str) -> Option<&'a AnyChannel<FlatSamples>> {
+    layer.channel_data.list.iter().find(|channel| {
+        channel.name.to_string().strip_prefix(prefix) == Some(name)
+            && channel.sample_data.len() == layer.size.0 * layer.size.1
+    })
+}
+
+/// The texts and numbers among the attributes of image and layer that the format does not define.
+fn attribute_texts(image: &FlatImage, layer: &FlatLayer) -> BTreeMap<String, String> {
+    let all = image.attributes.other.iter().chain(&layer.attributes.other);
+    all.filter_map(|(name, value)| {
+        let value = match value {
+            AttributeValue::Text(text) => text.to_string(),
+            AttributeValue::I32(number) => number.to_string(),
+            AttributeValue::F32(number) => number.to_string(),
+            AttributeValue::F64(number) => number.to_string(),
+            _ => return None,
+        };
+        Some((name.to_string(), value))
+    })
+    .collect()
+}

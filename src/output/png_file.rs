@@ -1,0 +1,47 @@
+//! Writes and reads PNG pictures, 8 bits a channel.
+use std::path::Path;
+
+use image::codecs::png::PngEncoder;
+use image::{ExtendedColorType, ImageEncoder};
+
+use super::{Format, Picture, write_whole};
+use crate::error::{Error, Result};
+
+/// The bytes of a PNG before its first optional chunk: signature (8) and the IHDR chunk (25).
+const AFTER_HEADER: usize = 8 + 25;
+/// The chunk that says "these values are sRGB, perceptual intent": length 1, name, intent 0, CRC-32.
+const SRGB_CHUNK: [u8; 13] = [0, 0, 0, 1, b's', b'R', b'G', b'B', 0, 0xae, 0xce, 0x1c, 0xe9];
+
+/// Writes a PNG of `width` x `height` pixels, rows from the top, straight alpha; without `alpha` only RGB.
+///
+/// # Panics
+/// If `rgba8` does not hold 4 bytes for each pixel.
+pub fn write_png(path: &Path, width: u32, height: u32, rgba8: &[u8], alpha: bool) -> Result<()> {
+    assert_eq!(rgba8.len(), width as usize * height as usize * 4, "4 bytes a pixel");
+    let mut bytes = Vec::new();
+    let encoder = PngEncoder::new(&mut bytes);
+    let encoded = if alpha {
+        encoder.write_image(rgba8, width, height, ExtendedColorType::Rgba8)
+    } else {
+        let rgb8: Vec<u8> = rgba8.chunks_exact(4).flat_map(|pixel| [pixel[0], pixel[1], pixel[2]]).collect();
+        encoder.write_image(&rgb8, width, height, ExtendedColorType::Rgb8)
+    };
+    encoded.map_err(|cause| Error::unwritable(path, cause))?;
+    bytes.splice(AFTER_HEADER..AFTER_HEADER, SRGB_CHUNK);
+    write_whole(path, &bytes)
+}
+
+/// Reads a PNG as display values in [0, 1].
+pub(super) fn read(path: &Path) -> Result<Picture> {
+    let bytes = std::fs::read(path).map_err(|cause| Error::unreadable(path, cause))?;
+    let decoded = image::load_from_memory_with_format(&bytes, image::ImageFormat::Png)
+        .map_err(|cause| Error::in_file(path, format!("is not a whole PNG ({cause})"), "give another picture"))?;
+    Ok(Picture {
+        width: decoded.width(),
+        height: decoded.height(),
+        alpha: decoded.color().has_alpha(),
+        rgba: decoded.into_rgba32f().pixels().map(|pixel| pixel.0).collect(),
+        format: Format::Png,
+        attributes: Default::default(),
+    })
+}
