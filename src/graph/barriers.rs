@@ -15,12 +15,15 @@
 //! are the destination stages of the one before, which is what Vulkan calls an execution dependency chain.
 //!
 //! Before the first span of a resource stands what happened to it earlier:
-//! - *Imported with an access before*: that access. No barrier if it already covers the span's reads.
+//! - *Imported with an access before*: that access. No barrier if it already covers all reads of the span.
 //! - *Imported without*: unknown, hence everything earlier on the queue, and its memory writes.
 //! - *Transient*: the last span of every resource that shares bytes with it, itself included. Those of the same frame ran
 //!   before it, those later in the plan ran a frame ago: frames in flight share one set of transient memory, which is
 //!   sound because a barrier also waits for earlier submissions to the same queue. The image's layout is then `UNDEFINED`: the
 //!   contents are gone. Sparing a wait where the order implies it would save nothing: there is one barrier either way.
+//!
+//! After the last span of an imported resource stands the access that its owner wants it left for, as one more span. Its
+//! barrier is left out only if the stages are the very same: the owner waits for these later, and for no others.
 //!
 //! What the barriers do not promise: anything between queues, between two plans whose memory overlaps, or to the CPU
 //! beyond making writes available to it (it still has to wait for the frame's fence).
@@ -54,8 +57,9 @@ pub struct Barrier {
 impl Barrier {
     /// Whether the source is (also) accesses made through other resources in the same memory.
     ///
-    /// The access scope of an image or buffer barrier is that image or buffer, so `src_access` then belongs into a global
-    /// memory barrier; for an image, recorded before (not beside) the barrier that changes its layout.
+    /// An image or buffer barrier covers accesses through that image or buffer only, so this one must be recorded as a
+    /// global memory barrier. An image then gets its layout by a barrier of its own in a later command, from `dst_stage`
+    /// to `dst_stage`, which forms a chain with the first.
     pub fn is_aliasing(&self) -> bool {
         self.takes_over.iter().any(|&other| other != self.resource)
     }
@@ -74,7 +78,7 @@ const WRITES: AccessFlags2 = AccessFlags2::from_raw(
 /// One write, or all reads in one layout until the next write or change of layout.
 #[derive(Clone, Copy)]
 struct Span {
-    /// Position in the plan of the first pass; the number of passes for what an owner does after the frame.
+    /// Position in the plan of the first pass; of no meaning for what an owner does.
     first: usize,
     stages: PipelineStageFlags2,
     accesses: AccessFlags2,
@@ -125,23 +129,29 @@ pub(super) fn barriers<W>(
     resources: &[PlannedResource],
 ) -> (Vec<Vec<Barrier>>, Vec<Barrier>) {
     let spans: Vec<Vec<Span>> = resources.iter().map(|resource| spans(graph, order, resource.declared)).collect();
-    let mut barriers: Vec<Vec<Barrier>> = vec![Vec::new(); order.len() + 1];
+    let mut barriers: Vec<Vec<Barrier>> = vec![Vec::new(); order.len()];
+    let mut final_barriers = Vec::new();
     for (resource, own) in spans.iter().enumerate() {
         let declared = &graph.resources[resources[resource].declared];
-        let (mut past, takes_over) = match &declared.import {
+        let (mut past, mut takes_over) = match &declared.import {
             Some(import) => (past_of_import(import.before, &declared.kind), Vec::new()),
             None => past_of_memory(resource, resources, &spans),
         };
-        for (index, span) in own.iter().enumerate() {
-            if index == 0 && past.covers(span) {
-                continue; // One with the past: whoever waits for it waits for both.
+        for span in own {
+            // A covered span is one with the past: whoever waits for the past waits for both.
+            if !past.covers(span) {
+                barriers[span.first].push(barrier(resource, &past, span, std::mem::take(&mut takes_over)));
+                past = *span;
             }
-            let takes_over = if index == 0 { takes_over.clone() } else { Vec::new() };
-            barriers[span.first].push(barrier(resource, &past, span, takes_over));
-            past = *span;
+        }
+        let after = declared.import.as_ref().and_then(|import| import.after);
+        if let Some(after) = after.map(|access| Span::by_owner(order.len(), access, &declared.kind)) {
+            // The owner will wait for the stages of `after` only, so these must stand for all stages before.
+            if !(past.covers(&after) && after.stages.contains(past.stages)) {
+                final_barriers.push(barrier(resource, &past, &after, Vec::new()));
+            }
         }
     }
-    let final_barriers = barriers.pop().unwrap_or_default();
     (barriers, final_barriers)
 }
 
@@ -152,16 +162,12 @@ fn spans<W>(graph: &Graph<W>, order: &[usize], resource: usize) -> Vec<Span> {
         Some(last) => (last.stages, last.accesses) = (last.stages | span.stages, last.accesses | span.accesses),
         None => spans.push(span),
     };
-    let mut is_used = false;
     for (position, &pass) in order.iter().enumerate() {
         for use_ in graph.passes[pass].uses.iter().filter(|use_| use_.handle.resource == resource) {
             let discards = use_.needs().is_none();
             append(Span::new(position, use_.access, use_.mode.accesses(use_.access), &declared.kind, discards));
-            is_used = true;
         }
     }
-    let after = declared.import.as_ref().and_then(|import| import.after).filter(|_| is_used);
-    after.into_iter().for_each(|access| append(Span::by_owner(order.len(), access, &declared.kind)));
     spans
 }
 

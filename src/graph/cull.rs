@@ -1,5 +1,5 @@
 //! Cull: passes that no output needs do not run.
-use super::declare::{Graph, Handle};
+use super::declare::{Graph, Handle, Pass};
 use std::collections::BTreeSet;
 
 /// Which passes run, and why the others do not.
@@ -30,10 +30,13 @@ pub(super) fn cull<W>(graph: &Graph<W>) -> Culled {
 /// Why nobody needs the versions `made`.
 fn reason<W>(graph: &Graph<W>, made: impl Iterator<Item = Handle>) -> String {
     let wasted = made.map(|version| {
-        let needs = |pass: &&super::declare::Pass<W>| pass.uses.iter().any(|use_| use_.needs() == Some(version));
+        let needs = |pass: &&Pass<W>| pass.uses.iter().any(|use_| use_.needs() == Some(version));
         let readers: Vec<_> = graph.passes.iter().filter(needs).map(|pass| pass.name.as_str()).collect();
         let resource = &graph.resources[version.resource].name;
         match readers.as_slice() {
+            [] if graph.resources[version.resource].import.is_some() => {
+                format!("writes {resource}, which nothing reads and which is no output")
+            }
             [] => format!("writes {resource}, which nothing reads"),
             _ => format!("writes {resource}, which only culled passes read ({})", readers.join(", ")),
         }

@@ -8,15 +8,11 @@ use std::fmt::{Display, Formatter, Result};
 
 impl<W> Display for Plan<W> {
     fn fmt(&self, f: &mut Formatter<'_>) -> Result {
-        let transitions = |barriers: &[Barrier]| barriers.iter().filter(|b| b.old_layout != b.new_layout).count();
-        let all = || self.passes.iter().map(|pass| &pass.barriers).chain([&self.final_barriers]);
-        let (barriers, changes) = (all().map(Vec::len).sum(), all().map(|list| transitions(list)).sum());
-        let counts = [
-            count(self.passes.len(), "pass", "passes"),
-            count(barriers, "barrier", "barriers"),
-            count(changes, "layout change", "layout changes"),
-        ];
-        writeln!(f, "frame: {}, {} culled", counts.join(", "), self.culled.len())?;
+        let barriers = || self.passes.iter().flat_map(|pass| &pass.barriers).chain(&self.final_barriers);
+        let changes = barriers().filter(|barrier| barrier.old_layout != barrier.new_layout).count();
+        let (passes, culled) = (count(self.passes.len(), "pass", "passes"), self.culled.len());
+        let waits = count(barriers().count(), "barrier", "barriers");
+        writeln!(f, "frame: {passes}, {culled} culled; {waits}, {changes} of them with a change of layout")?;
         let width = self.resources.iter().map(|resource| resource.info.name.len()).max().unwrap_or(0);
         for (position, pass) in self.passes.iter().enumerate() {
             writeln!(f, "\n{position:>3}  {}", pass.name)?;
@@ -46,8 +42,8 @@ impl<W> Plan<W> {
         }
         if !barrier.takes_over.is_empty() {
             let others = barrier.takes_over.iter().filter(|&&other| other != barrier.resource);
-            let others: Vec<_> = others.map(|&other| name(other)).chain(["the frame before"]).collect();
-            write!(f, "  (memory of {})", others.join(", "))?;
+            let others: String = others.map(|&other| format!("{}, ", name(other))).collect();
+            write!(f, "  (memory of {others}the frame before)")?;
         }
         writeln!(f)
     }
@@ -71,7 +67,7 @@ impl<W> Plan<W> {
             let PlannedResource { info, lifetime, placement, .. } = resource;
             let alive = |pass: usize| if (lifetime.first..=lifetime.last).contains(&pass) { '#' } else { '.' };
             let chart: String = (0..self.passes.len()).map(alive).collect();
-            let place = placement.map_or("imported".to_owned(), |at| {
+            let place = placement.map_or(format!("{:>10}", "imported"), |at| {
                 format!("{:>10}  block {} + {}", bytes(at.size_bytes), at.block, bytes(at.offset_bytes))
             });
             writeln!(f, "     {:width$}  {what:what_width$}  {chart}  {place}", info.name)?;
