@@ -3,7 +3,7 @@ use crate::brdf::Brdf;
 use crate::environment::Environment;
 use crate::method::Method;
 use crate::passes::{Object, View};
-use crate::scene::{MaterialSource, Mesh, Scene, Source};
+use crate::scene::{Camera, MaterialSource, Mesh, Scene, Source};
 use crate::threads::{self, CacheState, Observer, ThreadTable};
 use crate::{Error, Result};
 use glam::DVec3;
@@ -103,11 +103,11 @@ pub fn prepare(scene: &Scene, cache: Option<&Path>, observer: &dyn Observer) -> 
         objects.push(Object { mesh, material: material as u32, to_world: object.transform() });
     }
     let environment = load_environment(&scene.environment.source)?;
-    let camera = match scene.camera {
-        Some(camera) => camera,
-        None => crate::scene::Camera::framing(bounding_sphere(&meshes, &objects)),
-    };
     let image = &scene.image;
+    let camera = scene.camera.unwrap_or_else(|| {
+        let (center, radius) = bounding_sphere(&meshes, &objects);
+        Camera::framing(center, radius, f64::from(image.width) / f64::from(image.height))
+    });
     let view = View {
         camera,
         width: image.width,

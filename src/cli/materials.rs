@@ -1,7 +1,7 @@
 //! `threadlight materials`: what --material, --environment and --mesh can name without a file.
 use std::io::Write;
 use threadlight::brdf::Brdf;
-use threadlight::scene::Mesh;
+use threadlight::scene::mesh;
 use threadlight::{environment, method::Method};
 
 /// Lists what can be named: materials, models, environments, meshes, methods.
@@ -19,11 +19,9 @@ impl Materials {
         let list = |names: &[&str]| names.join(", ");
         let models: Vec<_> = Brdf::MODELS.iter().copied().filter(|model| *model != "merl").collect();
         let methods: Vec<_> = Method::ALL.iter().map(|method| method.name()).collect();
-        let environments: Vec<_> = environment::builtin_names().collect();
-        let meshes: Vec<_> = Mesh::builtin_names().collect();
         writeln!(out, "Models (in a .toml or a scene file): {}", list(&models))?;
-        writeln!(out, "Environments (--environment; or an .hdr or .exr): {}", list(&environments))?;
-        writeln!(out, "Meshes (--mesh; or an .obj): {}", list(&meshes))?;
+        writeln!(out, "Environments (--environment; or an .hdr or .exr): {}", list(environment::builtin_names()))?;
+        writeln!(out, "Meshes (--mesh; or an .obj): {}", list(mesh::builtin_names()))?;
         writeln!(out, "Methods (--method): {}", list(&methods))?;
         Ok(())
     }

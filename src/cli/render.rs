@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use threadlight::output::{self, ExrHeader, Format};
 use threadlight::pipeline::{Renderer, Rendering, Wanted};
 use threadlight::prepare::{Prepared, prepare};
-use threadlight::scene::{Background, MaterialSettings, Mesh, ObjectSettings, Scene};
+use threadlight::scene::{Background, MaterialSettings, ObjectSettings, Scene, mesh};
 use threadlight::threads::CacheState;
 use threadlight::vulkan::{Device, Instance};
 use threadlight::{Error, environment};
@@ -127,11 +127,8 @@ impl Render {
         }
         // Whatever is wrong with the command is said before the work begins.
         let format = self.output.as_deref().map(Format::of).transpose()?;
-        for path in self.output.iter() {
+        for path in self.output.iter().chain(&self.stats) {
             output::check_writable(path)?;
-        }
-        for path in self.stats.iter() {
-            output::check_folder(path)?;
         }
         let scene = self.scene()?;
         let cache = cache_folder(self.no_cache);
@@ -192,7 +189,7 @@ impl Render {
             scene.objects.iter_mut().for_each(|object| object.material.clone_from(material));
         }
         if let Some(mesh) = &self.mesh {
-            let mesh = source_of(mesh, Mesh::builtin_names());
+            let mesh = source_of(mesh, mesh::builtin_names());
             let material = scene.objects.first().map(|object| object.material.clone()).unwrap_or_default();
             scene.objects = vec![ObjectSettings::new(mesh, material)];
         }

@@ -43,7 +43,7 @@ impl Threads {
             return Err(Error::input("threads", "has nothing to write", remedy).into());
         }
         for path in self.output.iter().chain(&self.plot) {
-            output::check_folder(path)?;
+            output::check_writable(path)?;
         }
         let source = material_of(&self.material);
         let name = match &source {
@@ -60,7 +60,7 @@ impl Threads {
         let how = if state == CacheState::Hit { "read from the cache" } else { "made" };
         eprintln!("{} threads x {} rows {how} in {:.2} s", table.count, table.rows, time.as_secs_f64());
         if let Some(path) = &self.output {
-            threads::write(path, &table)?;
+            threads::write(&table, path)?;
         }
         if let Some(path) = &self.plot {
             threads::plot(&table, path)?;

@@ -17,7 +17,8 @@ enum Object {
 /// The objects behind the handles of a graph.
 pub struct Resources<'r> {
     objects: &'r [Object],
-    index_of: &'r [Option<usize>],
+    /// For each object, the index of its resource in the graph as it was declared.
+    declared: &'r [usize],
 }
 
 impl Resources<'_> {
@@ -38,7 +39,7 @@ impl Resources<'_> {
     }
 
     fn object(&self, handle: Handle) -> Option<&Object> {
-        self.objects.get(self.index_of.get(handle.resource).copied().flatten()?)
+        self.objects.get(self.declared.iter().position(|declared| *declared == handle.resource)?)
     }
 }
 
@@ -47,6 +48,7 @@ pub struct Executable<'a> {
     /// What it does.
     pub plan: Plan<Work<'a>>,
     objects: Vec<Object>,
+    declared: Vec<usize>,
 }
 
 impl<'a> Executable<'a> {
@@ -96,7 +98,8 @@ impl<'a> Executable<'a> {
             };
             objects.push(object);
         }
-        Ok(Self { plan, objects })
+        let declared = plan.resources.iter().map(|resource| resource.declared).collect();
+        Ok(Self { plan, objects, declared })
     }
 
     /// Records and submits one frame.
@@ -104,7 +107,7 @@ impl<'a> Executable<'a> {
     /// # Errors
     /// Whatever Vulkan refuses.
     pub fn execute(&self, frames: &mut Frames) -> Result<()> {
-        let resources = Resources { objects: &self.objects, index_of: &self.plan.index_of };
+        let resources = Resources { objects: &self.objects, declared: &self.declared };
         frames.record(|commands| {
             for pass in &self.plan.passes {
                 self.record_barriers(commands, &pass.barriers);
@@ -118,26 +121,32 @@ impl<'a> Executable<'a> {
 
     fn record_barriers(&self, commands: &mut Commands, barriers: &[Barrier]) {
         // Where memory changes hands, what was written through its last owner lies outside of the scope of a barrier on
-        // its next one, so a global barrier comes first.
+        // its next one, so a global barrier comes first, and the next owner's own barrier waits for that.
         let takeovers: Vec<_> = barriers.iter().filter(|barrier| barrier.is_aliasing()).map(memory_barrier).collect();
         commands.barriers(&[], &[], &takeovers);
         let mut images = Vec::new();
         let mut buffers = Vec::new();
         for barrier in barriers {
+            let (src_stage, src_access) = match barrier.is_aliasing() {
+                true => (barrier.dst_stage, vk::AccessFlags2::NONE),
+                false => (barrier.src_stage, barrier.src_access),
+            };
             match &self.objects[barrier.resource] {
                 Object::Image(image) => images.push(
                     Commands::image_barrier(image)
-                        .src_stage_mask(barrier.src_stage)
-                        .src_access_mask(barrier.src_access)
+                        .src_stage_mask(src_stage)
+                        .src_access_mask(src_access)
                         .dst_stage_mask(barrier.dst_stage)
                         .dst_access_mask(barrier.dst_access)
                         .old_layout(barrier.old_layout)
                         .new_layout(barrier.new_layout),
                 ),
+                // A buffer has no layout: the global barrier was all it needed.
+                Object::Buffer(_) if barrier.is_aliasing() => {}
                 Object::Buffer(buffer) => buffers.push(
                     Commands::buffer_barrier(buffer)
-                        .src_stage_mask(barrier.src_stage)
-                        .src_access_mask(barrier.src_access)
+                        .src_stage_mask(src_stage)
+                        .src_access_mask(src_access)
                         .dst_stage_mask(barrier.dst_stage)
                         .dst_access_mask(barrier.dst_access),
                 ),

@@ -56,9 +56,8 @@ pub fn read_image(path: &Path) -> Result<Picture> {
     }
 }
 
-/// Says at once whether a picture could be written to `path`, so that a long rendering does not end in an error.
+/// Says at once whether a file could be written to `path`, so that a long rendering does not end in an error.
 pub fn check_writable(path: &Path) -> Result<()> {
-    Format::of(path)?;
     if path.is_dir() {
         return Err(Error::unwritable(path, "it is a folder"));
     }

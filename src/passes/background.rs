@@ -26,8 +26,6 @@ struct Push {
     size_px: [u32; 2],
     rotation: [f32; 2],
     radiance_scale: f32,
-    // The GLSL block's size is a multiple of its alignment, 16 bytes.
-    _padding: [u32; 3],
 }
 
 impl Background {
@@ -84,7 +82,6 @@ pub fn background<'a>(
             size_px: [view.width, view.height],
             rotation: view.rotation(),
             radiance_scale: *radiance_scale,
-            _padding: [0; 3],
         };
         commands.dispatch(pipeline, &bindings, bytemuck::bytes_of(&push), Groups::Direct(tiles_of(view)))
     }));

@@ -6,7 +6,7 @@ use crate::graph::{Access, Image};
 use crate::method::Method;
 use crate::threads::ThreadTable;
 use crate::vulkan::{
-    self, Bindings, Buffer, ComputePipeline, Device, Groups, ImageShape, PipelineCache, Sampler, SamplerKind,
+    self, Bindings, Buffer, ComputePipeline, Device, Groups, ImageKind, ImageShape, PipelineCache, Sampler, SamplerKind,
 };
 use crate::{Error, Result};
 use ash::vk;
@@ -121,7 +121,7 @@ impl<'a> TableAtlas<'a> {
             bytemuck::cast_slice(&half).to_vec()
         };
         let extent = extent.map(|size| size as u32);
-        let shape = ImageShape { format, extent, levels: 1, cube: false };
+        let shape = ImageShape { format, extent, levels: 1, kind: ImageKind::Volume };
         Ok(vulkan::Image::with_texels(device, "brdf tables", shape, &[bytes])?)
     }
 }
@@ -157,7 +157,7 @@ impl DeviceLight {
             format: if use_single { single } else { vk::Format::R16G16B16A16_SFLOAT },
             extent: [face_size, face_size, 1],
             levels: levels.len() as u32,
-            cube: true,
+            kind: ImageKind::Cube,
         };
         Ok(Self {
             pyramid: vulkan::Image::with_texels(device, "environment pyramid", shape, &levels)?,
@@ -184,8 +184,6 @@ struct Push {
     face_size: f32,
     rotation: [f32; 2],
     radiance_scale: f32,
-    // The GLSL block's size is a multiple of its alignment, 16 bytes; a vec4 inside of it sets that.
-    _padding: u32,
 }
 
 impl Shade {
@@ -242,7 +240,6 @@ pub fn shade<'a>(
                 face_size: light.face_size as f32,
                 rotation: view.rotation(),
                 radiance_scale: light.radiance_scale,
-                _padding: 0,
             };
             let groups = Groups::Indirect(counters, Counters::arguments_of(kind));
             commands.dispatch(pipeline, &bindings, bytemuck::bytes_of(&push), groups)?;

@@ -187,6 +187,17 @@ impl Drop for Buffer {
     }
 }
 
+/// How an image is addressed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ImageKind {
+    /// Two-dimensional.
+    Plane,
+    /// Three-dimensional.
+    Volume,
+    /// Six square faces, sampled by direction.
+    Cube,
+}
+
 /// Size, format and kind of an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ImageShape {
@@ -196,25 +207,25 @@ pub struct ImageShape {
     pub extent: [u32; 3],
     /// Mip levels.
     pub levels: u32,
-    /// Whether it is a cube map: six layers, sampled as one.
-    pub cube: bool,
+    /// How it is addressed.
+    pub kind: ImageKind,
 }
 
 impl ImageShape {
     /// A plain two-dimensional image with one level.
     pub fn plane(format: vk::Format, width: u32, height: u32) -> Self {
-        Self { format, extent: [width, height, 1], levels: 1, cube: false }
+        Self { format, extent: [width, height, 1], levels: 1, kind: ImageKind::Plane }
     }
 
     fn layers(&self) -> u32 {
-        if self.cube { 6 } else { 1 }
+        if self.kind == ImageKind::Cube { 6 } else { 1 }
     }
 
     fn view_type(&self) -> vk::ImageViewType {
-        match self {
-            Self { cube: true, .. } => vk::ImageViewType::CUBE,
-            Self { extent: [_, _, 1], .. } => vk::ImageViewType::TYPE_2D,
-            _ => vk::ImageViewType::TYPE_3D,
+        match self.kind {
+            ImageKind::Plane => vk::ImageViewType::TYPE_2D,
+            ImageKind::Volume => vk::ImageViewType::TYPE_3D,
+            ImageKind::Cube => vk::ImageViewType::CUBE,
         }
     }
 
@@ -291,10 +302,10 @@ impl Image {
         usage: vk::ImageUsageFlags,
     ) -> Result<Self> {
         let [width, height, depth] = shape.extent;
-        let (flags, kind) = match shape.view_type() {
-            vk::ImageViewType::CUBE => (vk::ImageCreateFlags::CUBE_COMPATIBLE, vk::ImageType::TYPE_2D),
-            vk::ImageViewType::TYPE_3D => (vk::ImageCreateFlags::empty(), vk::ImageType::TYPE_3D),
-            _ => (vk::ImageCreateFlags::empty(), vk::ImageType::TYPE_2D),
+        let (flags, kind) = match shape.kind {
+            ImageKind::Plane => (vk::ImageCreateFlags::empty(), vk::ImageType::TYPE_2D),
+            ImageKind::Volume => (vk::ImageCreateFlags::empty(), vk::ImageType::TYPE_3D),
+            ImageKind::Cube => (vk::ImageCreateFlags::CUBE_COMPATIBLE, vk::ImageType::TYPE_2D),
         };
         let info = vk::ImageCreateInfo::default()
             .flags(flags)

@@ -25,7 +25,7 @@ pub use device::{Device, DeviceDescription, DeviceKind, describe_devices};
 pub use error::VulkanError;
 pub use frames::{Frames, PassTime};
 pub use instance::{Instance, Messages};
-pub use memory::{Buffer, BufferUse, Image, ImageShape, Memory, Sampler, SamplerKind};
+pub use memory::{Buffer, BufferUse, Image, ImageKind, ImageShape, Memory, Sampler, SamplerKind};
 pub use pipeline::{ComputePipeline, GraphicsPipeline, GraphicsState, PipelineCache};
 pub use shader::{Shader, Stage, compiled};
 
