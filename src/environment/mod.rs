@@ -219,5 +219,3 @@ pub(crate) mod tests {
         }
     }
 }
-#[cfg(test)]
-mod scratch;

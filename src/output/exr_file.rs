@@ -74,8 +74,10 @@ pub fn write_exr(
     let channels = AnyChannels::sort(names.iter().copied().enumerate().map(channel).collect());
 
     let text = |value: &str| AttributeValue::Text(Text::new_or_none(value).unwrap_or_else(|| Text::from("?")));
-    let mut attributes = LayerAttributes::default();
-    attributes.software_name = Text::new_or_none(format!("Threadlight {}", header.version));
+    let mut attributes = LayerAttributes {
+        software_name: Text::new_or_none(format!("Threadlight {}", header.version)),
+        ..LayerAttributes::default()
+    };
     attributes.other.extend([
         (Text::from("method"), text(&header.method)),
         (Text::from("threads"), AttributeValue::I32(header.threads.try_into().unwrap_or(i32::MAX))),

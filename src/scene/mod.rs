@@ -1,1 +1,268 @@
-//! placeholder
+//! What is rendered: image settings, camera, environment, materials and objects, as a scene file or flags name them.
+use std::path::PathBuf;
+
+use glam::{DMat3, DQuat, EulerRot, Mat4, Quat, Vec3};
+use serde::{Deserialize, Serialize};
+
+use crate::environment::Environment;
+use crate::error::Result;
+
+pub mod camera;
+mod file;
+pub mod mesh;
+
+pub use camera::Camera;
+pub use mesh::Mesh;
+
+/// The built-in material of an object that names none in a scene without materials.
+pub const DEFAULT_MATERIAL: &str = "gold";
+/// The built-in environment of a scene that names none.
+pub const DEFAULT_ENVIRONMENT: &str = "studio";
+/// The shading method of a scene that names none.
+pub const DEFAULT_METHOD: &str = "paper";
+
+/// A scene, as yet only named: meshes, materials and environment are not loaded.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scene {
+    /// Size and display of the image.
+    pub image: ImageSettings,
+    /// Where from; none frames the objects with [`Camera::framing`].
+    pub camera: Option<Camera>,
+    /// The light.
+    pub environment: EnvironmentSettings,
+    /// How to shade.
+    pub shading: ShadingSettings,
+    /// At least one; names are unique.
+    pub materials: Vec<MaterialSettings>,
+    /// At least one; each names one of `materials`.
+    pub objects: Vec<ObjectSettings>,
+}
+
+/// `[image]`: size, sampling and display.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ImageSettings {
+    /// Columns, 1 to 16384.
+    #[serde(deserialize_with = "file::size_px")]
+    pub width: u32,
+    /// Rows, 1 to 16384.
+    #[serde(deserialize_with = "file::size_px")]
+    pub height: u32,
+    /// Sub-pixels along each axis of a pixel, 1 to 4.
+    #[serde(deserialize_with = "file::subpixels")]
+    pub subpixels: u32,
+    /// Display value = clamp(exposure L, 0, 1)^(1/gamma); not negative.
+    #[serde(deserialize_with = "file::not_negative")]
+    pub exposure: f64,
+    /// See `exposure`; positive.
+    #[serde(deserialize_with = "file::positive")]
+    pub gamma: f64,
+    /// What is seen past the objects.
+    pub background: Background,
+}
+
+/// What is seen past the objects.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Background {
+    /// The environment.
+    #[default]
+    Environment,
+    /// Nothing: the image is transparent there.
+    None,
+}
+
+/// A file, or something of that name made by the program.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Source {
+    /// Read from the disk.
+    File(PathBuf),
+    /// Built in.
+    Builtin(String),
+}
+
+impl Source {
+    /// What a flag names: one of `builtin_names`, or else a file.
+    pub fn named(name: &str, builtin_names: &[&str]) -> Self {
+        if builtin_names.contains(&name) { Self::Builtin(name.into()) } else { Self::File(name.into()) }
+    }
+}
+
+impl std::fmt::Display for Source {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter) -> std::fmt::Result {
+        match self {
+            Self::File(path) => path.display().fmt(formatter),
+            Self::Builtin(name) => name.fmt(formatter),
+        }
+    }
+}
+
+/// `[environment]`: the light.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EnvironmentSettings {
+    /// Lat-long picture or built-in.
+    pub source: Source,
+    /// Turn of the environment about +Y in degrees, counter-clockwise seen from above (it takes +Z towards +X).
+    pub rotation_deg: f64,
+    /// Factor of its radiance; not negative.
+    pub intensity: f64,
+}
+
+/// `[shading]`: how to shade.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ShadingSettings {
+    /// Name of the estimator.
+    pub method: String,
+    /// Threads, or samples of the other estimators, 1 to 1024.
+    #[serde(deserialize_with = "file::threads")]
+    pub threads: u32,
+    /// Seed of whatever is random.
+    pub seed: u64,
+}
+
+/// `[[material]]`: a name for a BRDF.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MaterialSettings {
+    /// By which objects call it.
+    pub name: String,
+    /// Where it comes from.
+    pub source: MaterialSource,
+}
+
+/// Where a BRDF comes from.
+#[derive(Clone, Debug, PartialEq)]
+pub enum MaterialSource {
+    /// A measured one on the disk.
+    File(PathBuf),
+    /// One that the program names.
+    Builtin(String),
+    /// An analytic model with its parameters, not yet checked.
+    Model {
+        /// Name of the model.
+        model: String,
+        /// The keys beside it.
+        parameters: toml::Table,
+    },
+}
+
+/// `[[object]]`: a mesh at its place, of one material.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ObjectSettings {
+    /// OBJ file or built-in.
+    pub mesh: Source,
+    /// Name of its material.
+    pub material: String,
+    /// Displacement, after rotation and scale.
+    pub translate: Vec3,
+    /// Turns about the fixed axes x, y and z in degrees: first about z, then x, then y (R = Ry Rx Rz).
+    pub rotate_deg: Vec3,
+    /// Uniform, not zero; negative mirrors through the origin.
+    pub scale: f32,
+}
+
+impl Default for Scene {
+    /// The built-in sphere of the default material in the default environment.
+    fn default() -> Self {
+        let material = MaterialSettings {
+            name: DEFAULT_MATERIAL.into(),
+            source: MaterialSource::Builtin(DEFAULT_MATERIAL.into()),
+        };
+        Self {
+            image: ImageSettings::default(),
+            camera: None,
+            environment: EnvironmentSettings::default(),
+            shading: ShadingSettings::default(),
+            objects: vec![ObjectSettings::new(Source::Builtin("sphere".into()), &material.name)],
+            materials: vec![material],
+        }
+    }
+}
+
+impl Default for ImageSettings {
+    fn default() -> Self {
+        Self { width: 640, height: 480, subpixels: 2, exposure: 1.0, gamma: 2.2, background: Background::Environment }
+    }
+}
+
+impl ImageSettings {
+    /// Width over height.
+    pub fn aspect(&self) -> f64 {
+        f64::from(self.width) / f64::from(self.height)
+    }
+}
+
+impl Default for EnvironmentSettings {
+    fn default() -> Self {
+        Self { source: Source::Builtin(DEFAULT_ENVIRONMENT.into()), rotation_deg: 0.0, intensity: 1.0 }
+    }
+}
+
+impl EnvironmentSettings {
+    /// Reads or makes the environment, without its turn and intensity.
+    pub fn load(&self) -> Result<Environment> {
+        match &self.source {
+            Source::File(path) => Environment::load(path),
+            Source::Builtin(name) => Environment::builtin(name),
+        }
+    }
+
+    /// Takes a direction in the world to the direction in the environment's own picture that is seen there.
+    pub fn environment_from_world(&self) -> DMat3 {
+        DMat3::from_rotation_y(-self.rotation_deg.to_radians())
+    }
+}
+
+impl Default for ShadingSettings {
+    fn default() -> Self {
+        Self { method: DEFAULT_METHOD.into(), threads: 100, seed: 0 }
+    }
+}
+
+impl ObjectSettings {
+    /// A mesh of a material, where it is.
+    pub fn new(mesh: Source, material: &str) -> Self {
+        Self { mesh, material: material.into(), translate: Vec3::ZERO, rotate_deg: Vec3::ZERO, scale: 1.0 }
+    }
+
+    /// Reads or makes the mesh, in object space.
+    pub fn load_mesh(&self) -> Result<Mesh> {
+        match &self.mesh {
+            Source::File(path) => Mesh::load(path),
+            Source::Builtin(name) => Mesh::builtin(name),
+        }
+    }
+
+    /// Object space to world space: scaled, then rotated, then translated.
+    pub fn transform(&self) -> Mat4 {
+        let [x, y, z] = self.rotate_deg.as_dvec3().to_array().map(f64::to_radians);
+        let rotation: Quat = DQuat::from_euler(EulerRot::YXZ, y, x, z).as_quat();
+        Mat4::from_scale_rotation_translation(Vec3::splat(self.scale), rotation, self.translate)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DVec3;
+
+    #[test]
+    fn an_object_is_scaled_then_turned_about_z_x_y_then_moved() {
+        let mut object = ObjectSettings::new(Source::Builtin("sphere".into()), "m");
+        assert_eq!(object.transform(), Mat4::IDENTITY);
+        object.rotate_deg = Vec3::new(90.0, 90.0, 90.0);
+        (object.scale, object.translate) = (2.0, Vec3::new(10.0, 0.0, 0.0));
+        // x: about z to y, about x to z, about y to x.
+        assert!(object.transform().transform_point3(Vec3::X).distance(Vec3::new(12.0, 0.0, 0.0)) < 1e-5);
+        // y: about z to -x, which x leaves, about y to z.
+        assert!(object.transform().transform_point3(Vec3::Y).distance(Vec3::new(10.0, 0.0, 2.0)) < 1e-5);
+    }
+
+    #[test]
+    fn turning_the_environment_takes_z_towards_x() {
+        let turned = EnvironmentSettings { rotation_deg: 90.0, ..EnvironmentSettings::default() };
+        // What the picture has at +Z is now seen towards +X.
+        assert!((turned.environment_from_world() * DVec3::X - DVec3::Z).length() < 1e-15);
+        assert_eq!(EnvironmentSettings::default().environment_from_world(), DMat3::IDENTITY);
+    }
+}

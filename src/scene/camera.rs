@@ -1,0 +1,224 @@
+//! The pinhole camera: rays for the CPU, matrices for Vulkan, and the view that frames a scene by default.
+use glam::{DMat4, DVec3, Mat4, dcamera};
+use serde::{Deserialize, Serialize};
+
+/// Where the default view stands, seen from a unit sphere at the origin.
+const DEFAULT_EYE: DVec3 = DVec3::new(1.5, 1.0, 3.5);
+/// Vertical field of view of the default view.
+const DEFAULT_FOV_Y_DEG: f64 = 36.0;
+
+/// A camera that looks from `eye` to `target`. World right-handed; pixel (0, 0) is at the top left.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "CameraKeys", into = "CameraKeys")]
+pub struct Camera {
+    /// Position.
+    pub eye: DVec3,
+    /// The point in the middle of the image.
+    pub target: DVec3,
+    /// Whatever is up in the image; not parallel to the line of sight.
+    pub up: DVec3,
+    /// Vertical field of view in degrees, in (0, 180).
+    pub fov_y_deg: f64,
+}
+
+/// `[camera]` in the scene file.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct CameraKeys {
+    eye: DVec3,
+    #[serde(default)]
+    target: DVec3,
+    #[serde(default = "default_up")]
+    up: DVec3,
+    #[serde(default = "default_fov_y_deg")]
+    fov_y_deg: f64,
+}
+
+fn default_up() -> DVec3 {
+    DVec3::Y
+}
+
+fn default_fov_y_deg() -> f64 {
+    DEFAULT_FOV_Y_DEG
+}
+
+impl TryFrom<CameraKeys> for Camera {
+    type Error = String;
+
+    fn try_from(CameraKeys { eye, target, up, fov_y_deg }: CameraKeys) -> Result<Self, String> {
+        let camera = Self { eye, target, up, fov_y_deg };
+        camera.validate()?;
+        Ok(camera)
+    }
+}
+
+impl From<Camera> for CameraKeys {
+    fn from(Camera { eye, target, up, fov_y_deg }: Camera) -> Self {
+        Self { eye, target, up, fov_y_deg }
+    }
+}
+
+impl Camera {
+    /// The view that frames a sphere: the unit sphere at the origin is seen from (1.5, 1, 3.5) at 36 degrees, others from
+    /// the same side and as large. In an image taller than wide (`aspect` = width / height below 1) the camera steps back.
+    pub fn framing(centre: DVec3, radius: f64, aspect: f64) -> Self {
+        // To three digits: a tessellated unit sphere, whose vertices lie 5e-5 outside, is framed as what it stands for.
+        let magnitude = 10f64.powi(2 - radius.log10().floor() as i32);
+        let radius = if radius > 0.0 { (radius * magnitude).round() / magnitude } else { 1.0 };
+        // The sine of the angle between the axis and the nearest edge of the image: the silhouette stays as far inside it.
+        let half_height = (0.5 * DEFAULT_FOV_Y_DEG).to_radians();
+        let half_width = (half_height.tan() * aspect).atan();
+        let step_back = (half_height.sin() / half_width.sin()).max(1.0);
+        let eye = centre + DEFAULT_EYE * (radius * step_back);
+        Self { eye, target: centre, up: DVec3::Y, fov_y_deg: DEFAULT_FOV_Y_DEG }
+    }
+
+    /// Whether the camera can see: an error in words names the key at fault.
+    pub fn validate(&self) -> Result<(), String> {
+        for (key, value) in [("eye", self.eye), ("target", self.target), ("up", self.up)] {
+            if !value.is_finite() {
+                return Err(format!("`{key}` must be three finite numbers"));
+            }
+        }
+        let sight = self.target - self.eye;
+        if sight.length() == 0.0 {
+            return Err("`eye` and `target` must not be the same point".into());
+        }
+        // Below a thousandth of a degree, roundings would decide which way is right.
+        let sine = sight.normalize().cross(self.up.normalize_or_zero()).length();
+        if sine < 1e-5 {
+            return Err("`up` must not be zero or parallel to the line from `eye` to `target`".into());
+        }
+        // Not written as two comparisons of the other sense, as NaN must fail too.
+        if !(self.fov_y_deg > 0.0 && self.fov_y_deg < 180.0) {
+            return Err("`fov_y_deg` must be between 0 and 180".into());
+        }
+        Ok(())
+    }
+
+    /// The unit vectors right, up and forward of the image.
+    pub fn basis(&self) -> (DVec3, DVec3, DVec3) {
+        let forward = (self.target - self.eye).normalize();
+        let right = forward.cross(self.up).normalize();
+        (right, right.cross(forward), forward)
+    }
+
+    /// The unit direction through the centre of pixel (column `pixel_x`, row `pixel_y`); fractions name points between the
+    /// centres, so that the pixel covers -0.5 to 0.5 around them.
+    pub fn ray(&self, pixel_x: f64, pixel_y: f64, width: u32, height: u32) -> DVec3 {
+        let (right, up, forward) = self.basis();
+        let (width, height) = (f64::from(width), f64::from(height));
+        let tangent = (0.5 * self.fov_y_deg).to_radians().tan();
+        let x = (2.0 * (pixel_x + 0.5) / width - 1.0) * tangent * width / height;
+        let y = (1.0 - 2.0 * (pixel_y + 0.5) / height) * tangent;
+        (forward + x * right + y * up).normalize()
+    }
+
+    /// World to view space: right-handed, x right, y up, looking along -z.
+    pub fn view(&self) -> Mat4 {
+        self.view_f64().as_mat4()
+    }
+
+    /// View to Vulkan's clip space: y down, depth 1 at the near plane falling to 0 at infinity (reversed, as floats are
+    /// densest at 0). `aspect` is width / height. Nothing nearer than a thousandth of the distance to `target` is seen.
+    pub fn projection(&self, aspect: f64) -> Mat4 {
+        self.projection_f64(aspect).as_mat4()
+    }
+
+    fn view_f64(&self) -> DMat4 {
+        dcamera::rh::view::look_at_mat4(self.eye, self.target, self.up.normalize())
+    }
+
+    fn projection_f64(&self, aspect: f64) -> DMat4 {
+        let near = 1e-3 * self.eye.distance(self.target);
+        dcamera::rh::proj::vulkan::perspective_infinite_reverse(self.fov_y_deg.to_radians(), aspect, near)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn reference() -> Camera {
+        Camera { eye: DEFAULT_EYE, target: DVec3::ZERO, up: DVec3::Y, fov_y_deg: 36.0 }
+    }
+
+    #[test]
+    fn rays_match_the_independent_renderer() {
+        for (x, y, expected) in
+            [(0.0, 0.0, [-0.713445, 0.052437, -0.698747]), (450.0, 300.0, [-0.206535, -0.327077, -0.922152])]
+        {
+            let error = reference().ray(x, y, 640, 480) - DVec3::from_array(expected);
+            assert!(error.abs().max_element() < 1e-6, "{x} {y}: {error}");
+        }
+    }
+
+    #[test]
+    fn the_matrices_put_a_ray_into_its_pixel() {
+        let camera = Camera {
+            eye: DVec3::new(3.0, -2.0, 1.0),
+            target: DVec3::new(0.5, 1.0, 0.0),
+            up: DVec3::new(0.1, 2.0, 0.3),
+            fov_y_deg: 70.0,
+        };
+        let clip_from_world = camera.projection(640.0 / 480.0) * camera.view();
+        let mut depth_before = 1.0;
+        for (x, y, distance) in [(0.0, 0.0, 0.5), (450.0, 300.0, 2.0), (639.0, 479.0, 10.0)] {
+            let point = camera.eye + distance * camera.ray(x, y, 640, 480);
+            let clip = clip_from_world * point.as_vec3().extend(1.0);
+            let (pixel_x, pixel_y) = ((clip.x / clip.w + 1.0) * 320.0 - 0.5, (clip.y / clip.w + 1.0) * 240.0 - 0.5);
+            assert!(
+                (f64::from(pixel_x) - x).abs() < 1e-3 && (f64::from(pixel_y) - y).abs() < 1e-3,
+                "{pixel_x} {pixel_y}"
+            );
+            let depth = clip.z / clip.w;
+            assert!(depth > 0.0 && depth < depth_before, "{depth}");
+            depth_before = depth;
+        }
+    }
+
+    #[test]
+    fn the_default_view_is_that_of_the_reference_images() {
+        assert_eq!(Camera::framing(DVec3::ZERO, 1.0, 4.0 / 3.0), reference());
+        assert_eq!(Camera::framing(DVec3::ZERO, 1.00005, 1.0), reference());
+        let far = Camera::framing(DVec3::ONE, 20.0, 2.0);
+        assert_eq!((far.eye, far.target), (DVec3::ONE + 20.0 * DEFAULT_EYE, DVec3::ONE));
+    }
+
+    #[test]
+    fn the_framed_sphere_is_inside_the_image_whatever_its_shape() {
+        for (width, height) in [(640, 480), (480, 640), (100, 1000), (1000, 100)] {
+            let camera = Camera::framing(DVec3::ONE, 3.0, f64::from(width) / f64::from(height));
+            for i in 0..100 {
+                let across = f64::from(i) / 99.0;
+                let (x, y) = (across * f64::from(width) - 0.5, across * f64::from(height) - 0.5);
+                let (right, bottom) = (f64::from(width) - 0.5, f64::from(height) - 0.5);
+                for (x, y) in [(x, -0.5), (x, bottom), (-0.5, y), (right, y)] {
+                    let ray = camera.ray(x, y, width, height);
+                    assert!(
+                        ray.cross(DVec3::ONE - camera.eye).length() > 3.0,
+                        "{width}x{height}: ({x}, {y}) is covered"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn blind_cameras_are_errors_that_name_the_key() {
+        let good = reference();
+        for (camera, key) in [
+            (Camera { target: good.eye, ..good }, "target"),
+            (Camera { up: DVec3::ZERO, ..good }, "up"),
+            (Camera { up: -2.0 * good.eye, ..good }, "up"),
+            (Camera { eye: DVec3::NAN, ..good }, "eye"),
+            (Camera { fov_y_deg: 0.0, ..good }, "fov_y_deg"),
+            (Camera { fov_y_deg: 180.0, ..good }, "fov_y_deg"),
+            (Camera { fov_y_deg: f64::NAN, ..good }, "fov_y_deg"),
+        ] {
+            let error = camera.validate().unwrap_err();
+            assert!(error.contains(&format!("`{key}`")), "{error}");
+        }
+        assert!(good.validate().is_ok());
+    }
+}

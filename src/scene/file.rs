@@ -1,0 +1,522 @@
+//! The scene file: TOML to and from [`Scene`], with errors that name file, line and key.
+use std::ops::RangeBounds;
+use std::path::{Path, PathBuf};
+
+use serde::de::{Deserializer, Error as _};
+use serde::{Deserialize, Serialize};
+use toml::Spanned;
+
+use super::{
+    Camera, DEFAULT_MATERIAL, EnvironmentSettings, ImageSettings, MaterialSettings, MaterialSource, ObjectSettings,
+    Scene, ShadingSettings, Source,
+};
+use crate::error::{Error, Result};
+
+/// A whole scene file.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SceneFile {
+    #[serde(default)]
+    image: ImageSettings,
+    camera: Option<Camera>,
+    #[serde(default)]
+    environment: EnvironmentKeys,
+    #[serde(default)]
+    shading: ShadingSettings,
+    #[serde(default)]
+    material: Vec<Spanned<toml::Table>>,
+    #[serde(default)]
+    object: Vec<Spanned<ObjectKeys>>,
+}
+
+/// `[environment]`.
+#[derive(Default, Deserialize)]
+#[serde(try_from = "RawEnvironmentKeys")]
+struct EnvironmentKeys(EnvironmentSettings);
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawEnvironmentKeys {
+    file: Option<PathBuf>,
+    builtin: Option<String>,
+    #[serde(default, deserialize_with = "finite")]
+    rotation_deg: f64,
+    #[serde(default = "one", deserialize_with = "not_negative")]
+    intensity: f64,
+}
+
+/// `[[object]]`.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ObjectKeys {
+    mesh: Option<PathBuf>,
+    builtin: Option<String>,
+    material: Option<String>,
+    #[serde(default, deserialize_with = "finite_vector")]
+    translate: [f32; 3],
+    #[serde(default, deserialize_with = "finite_vector")]
+    rotate_deg: [f32; 3],
+    #[serde(default = "one_f32", deserialize_with = "scale")]
+    scale: f32,
+}
+
+impl TryFrom<RawEnvironmentKeys> for EnvironmentKeys {
+    type Error = String;
+
+    fn try_from(keys: RawEnvironmentKeys) -> Result<Self, String> {
+        let source = match (keys.file, keys.builtin) {
+            (Some(file), None) => Source::File(file),
+            (None, Some(name)) => Source::Builtin(name),
+            (None, None) => EnvironmentSettings::default().source,
+            (Some(_), Some(_)) => return Err("[environment] takes `file` or `builtin`, not both".into()),
+        };
+        Ok(Self(EnvironmentSettings { source, rotation_deg: keys.rotation_deg, intensity: keys.intensity }))
+    }
+}
+
+impl Scene {
+    /// Reads a scene file. Paths in it are relative to its folder. Without objects the scene is the built-in sphere; an object
+    /// that names no material is of the first one, or of the default one in a scene without any.
+    pub fn load(path: &Path) -> Result<Self> {
+        let text = std::fs::read_to_string(path).map_err(|cause| Error::unreadable(path, cause))?;
+        parse(&text, path.parent().unwrap_or(Path::new("")))
+            .map_err(|problem| Error::in_file(path, problem, "see the scene file in the README"))
+    }
+
+    /// A scene from the text of a file whose relative paths start at `base_dir`; see [`Self::load`].
+    pub fn parse(text: &str, base_dir: &Path) -> Result<Self> {
+        parse(text, base_dir).map_err(|problem| Error::input("scene", problem, "see the scene file in the README"))
+    }
+
+    /// The scene as the text of a file, with absolute paths, so that it can be saved anywhere.
+    pub fn to_toml(&self) -> Result<String> {
+        toml::to_string_pretty(&SceneText::from(self)).map_err(|cause| {
+            Error::input("scene", format!("cannot be written as TOML ({cause})"), "use paths in UTF-8")
+        })
+    }
+}
+
+/// Parses and checks a scene; an error is one line that names line and key.
+fn parse(text: &str, base_dir: &Path) -> Result<Scene, String> {
+    let file: SceneFile = toml::from_str(text).map_err(|error| {
+        let problem = error.message().split_whitespace().collect::<Vec<_>>().join(" ");
+        match error.span() {
+            Some(span) => format!("{}: {problem}", quote_line(text, span.start)),
+            None => problem,
+        }
+    })?;
+    let mut scene = Scene {
+        image: file.image,
+        camera: file.camera,
+        environment: file.environment.0,
+        shading: file.shading,
+        materials: Vec::new(),
+        objects: Vec::new(),
+    };
+    for table in file.material {
+        let line = quote_line(text, table.span().start);
+        let material = material(table.into_inner()).map_err(|problem| format!("{line}: {problem}"))?;
+        if scene.materials.iter().any(|other| other.name == material.name) {
+            return Err(format!("{line}: there are two materials with `name` \"{}\"", material.name));
+        }
+        scene.materials.push(material);
+    }
+    if scene.materials.is_empty() {
+        scene.materials = Scene::default().materials;
+    }
+    let first_material = scene.materials.first().map_or(DEFAULT_MATERIAL, |material| &material.name).to_owned();
+    for keys in file.object {
+        let line = quote_line(text, keys.span().start);
+        let object = object(keys.into_inner(), &first_material).map_err(|problem| format!("{line}: {problem}"))?;
+        if scene.materials.iter().all(|material| material.name != object.material) {
+            let names: Vec<_> = scene.materials.iter().map(|material| material.name.as_str()).collect();
+            return Err(format!(
+                "{line}: the object's `material` \"{}\" is not among the scene's: {}",
+                object.material,
+                names.join(", ")
+            ));
+        }
+        scene.objects.push(object);
+    }
+    if scene.objects.is_empty() {
+        scene.objects = vec![ObjectSettings::new(Source::Builtin("sphere".into()), &first_material)];
+    }
+
+    let resolve = |path: &mut PathBuf| *path = base_dir.join(&*path);
+    if let Source::File(path) = &mut scene.environment.source {
+        resolve(path);
+    }
+    for material in &mut scene.materials {
+        if let MaterialSource::File(path) = &mut material.source {
+            resolve(path);
+        }
+    }
+    for object in &mut scene.objects {
+        if let Source::File(path) = &mut object.mesh {
+            resolve(path);
+        }
+    }
+    Ok(scene)
+}
+
+/// "line 7 (`width = 0`)" for the line of `text` that holds the byte at `position`.
+fn quote_line(text: &str, position: usize) -> String {
+    let before = text.get(..position).unwrap_or(text);
+    let number = before.matches('\n').count() + 1;
+    let line = text.lines().nth(number - 1).unwrap_or_default().trim();
+    format!("line {number} (`{line}`)")
+}
+
+/// A `[[material]]`: its name, and one of `file`, `builtin` and `model`; with `model` come parameters.
+fn material(mut table: toml::Table) -> Result<MaterialSettings, String> {
+    let mut take = |key: &str| match table.remove(key) {
+        None => Ok(None),
+        Some(toml::Value::String(text)) => Ok(Some(text)),
+        Some(other) => Err(format!("`{key}` must be a string, not {}", other.type_str())),
+    };
+    let (name, file, builtin, model) = (take("name")?, take("file")?, take("builtin")?, take("model")?);
+    let name = name.ok_or("a [[material]] needs a `name`")?;
+    let source = match (file, builtin, model) {
+        (Some(file), None, None) => MaterialSource::File(file.into()),
+        (None, Some(builtin), None) => MaterialSource::Builtin(builtin),
+        (None, None, Some(model)) => MaterialSource::Model { model, parameters: std::mem::take(&mut table) },
+        _ => return Err(format!("material \"{name}\" needs exactly one of `file`, `builtin` and `model`")),
+    };
+    match table.keys().next() {
+        Some(key) => Err(format!("unknown field `{key}` in material \"{name}\", only a `model` has parameters")),
+        None => Ok(MaterialSettings { name, source }),
+    }
+}
+
+/// An `[[object]]`.
+fn object(keys: ObjectKeys, first_material: &str) -> Result<ObjectSettings, String> {
+    let mesh = match (keys.mesh, keys.builtin) {
+        (Some(file), None) => Source::File(file),
+        (None, Some(name)) => Source::Builtin(name),
+        _ => return Err("an [[object]] needs exactly one of `mesh` and `builtin`".into()),
+    };
+    Ok(ObjectSettings {
+        mesh,
+        material: keys.material.unwrap_or(first_material.into()),
+        translate: keys.translate.into(),
+        rotate_deg: keys.rotate_deg.into(),
+        scale: keys.scale,
+    })
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+fn one_f32() -> f32 {
+    1.0
+}
+
+/// A number in `range`, or the error that it must be `what`.
+fn checked<'de, D, T>(deserializer: D, range: impl RangeBounds<T>, what: &str) -> Result<T, D::Error>
+where
+    D: Deserializer<'de>,
+    T: Deserialize<'de> + PartialOrd + std::fmt::Display,
+{
+    let value = T::deserialize(deserializer)?;
+    // No range holds NaN.
+    if range.contains(&value) { Ok(value) } else { Err(D::Error::custom(format!("{value} must be {what}"))) }
+}
+
+/// An integer in `range`: read as wide as TOML has them, so that -1 and 10^12 get the same message as 0.
+fn integer<'de, D: Deserializer<'de>>(deserializer: D, range: std::ops::RangeInclusive<u32>) -> Result<u32, D::Error> {
+    let (low, high) = (i64::from(*range.start()), i64::from(*range.end()));
+    checked(deserializer, low..=high, &format!("{low} to {high}")).map(|value| value as u32)
+}
+
+/// Width or height of an image.
+pub(super) fn size_px<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u32, D::Error> {
+    integer(deserializer, 1..=16384)
+}
+
+/// Sub-pixels along an axis.
+pub(super) fn subpixels<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u32, D::Error> {
+    integer(deserializer, 1..=4)
+}
+
+/// Number of threads.
+pub(super) fn threads<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u32, D::Error> {
+    integer(deserializer, 1..=1024)
+}
+
+/// A finite number from 0.
+pub(super) fn not_negative<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    checked(deserializer, 0.0..=f64::MAX, "finite and not negative")
+}
+
+/// A finite number above 0.
+pub(super) fn positive<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    checked(deserializer, f64::MIN_POSITIVE..=f64::MAX, "finite and above 0")
+}
+
+fn finite<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    checked(deserializer, f64::MIN..=f64::MAX, "finite")
+}
+
+fn scale<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f32, D::Error> {
+    let scale = checked(deserializer, f32::MIN..=f32::MAX, "finite")?;
+    if scale == 0.0 { Err(D::Error::custom("0 must not be the scale")) } else { Ok(scale) }
+}
+
+fn finite_vector<'de, D: Deserializer<'de>>(deserializer: D) -> Result<[f32; 3], D::Error> {
+    let vector = <[f32; 3]>::deserialize(deserializer)?;
+    if vector.iter().all(|value| value.is_finite()) {
+        Ok(vector)
+    } else {
+        Err(D::Error::custom(format!("{vector:?} must be three finite numbers")))
+    }
+}
+
+/// What [`Scene::to_toml`] writes.
+#[derive(Serialize)]
+struct SceneText<'a> {
+    image: &'a ImageSettings,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    camera: Option<Camera>,
+    environment: toml::Table,
+    shading: &'a ShadingSettings,
+    material: Vec<toml::Table>,
+    object: Vec<toml::Table>,
+}
+
+impl<'a> From<&'a Scene> for SceneText<'a> {
+    fn from(scene: &'a Scene) -> Self {
+        let environment = &scene.environment;
+        let (key, value) = source_entry(&environment.source, "file");
+        Self {
+            image: &scene.image,
+            camera: scene.camera,
+            environment: toml::Table::from_iter([
+                (key, value),
+                ("rotation_deg".into(), environment.rotation_deg.into()),
+                ("intensity".into(), environment.intensity.into()),
+            ]),
+            shading: &scene.shading,
+            material: scene.materials.iter().map(material_table).collect(),
+            object: scene.objects.iter().map(object_table).collect(),
+        }
+    }
+}
+
+fn material_table(material: &MaterialSettings) -> toml::Table {
+    let mut table = toml::Table::from_iter([("name".into(), material.name.clone().into())]);
+    match &material.source {
+        MaterialSource::File(path) => table.extend([("file".into(), absolute(path))]),
+        MaterialSource::Builtin(name) => table.extend([("builtin".into(), name.clone().into())]),
+        MaterialSource::Model { model, parameters } => {
+            table.extend([("model".into(), model.clone().into())]);
+            table.extend(parameters.clone());
+        }
+    }
+    table
+}
+
+fn object_table(object: &ObjectSettings) -> toml::Table {
+    // Through the shortest decimal, so that 0.1 does not become 0.10000000149011612.
+    let number = |value: f32| toml::Value::Float(value.to_string().parse().unwrap_or(f64::from(value)));
+    let vector = |values: [f32; 3]| toml::Value::Array(values.map(number).to_vec());
+    toml::Table::from_iter([
+        source_entry(&object.mesh, "mesh"),
+        ("material".into(), object.material.clone().into()),
+        ("translate".into(), vector(object.translate.to_array())),
+        ("rotate_deg".into(), vector(object.rotate_deg.to_array())),
+        ("scale".into(), number(object.scale)),
+    ])
+}
+
+/// The key and value of a source; `file_key` is the key of files.
+fn source_entry(source: &Source, file_key: &str) -> (String, toml::Value) {
+    match source {
+        Source::File(path) => (file_key.into(), absolute(path)),
+        Source::Builtin(name) => ("builtin".into(), name.clone().into()),
+    }
+}
+
+/// The absolute path: the file may be saved in another folder than the one that relative paths start at.
+fn absolute(path: &Path) -> toml::Value {
+    std::path::absolute(path).unwrap_or(path.into()).to_string_lossy().into_owned().into()
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{DVec3, Vec3};
+
+    use super::super::Background;
+    use super::*;
+
+    const FULL: &str = r#"
+        [image]
+        width = 320
+        height = 200
+        subpixels = 3
+        exposure = 0.5
+        gamma = 1
+        background = "none"
+        [camera]
+        eye = [1.5, 1.0, 3]
+        target = [0, 0.5, 0]
+        up = [0, 1, 0]
+        fov_y_deg = 40
+        [environment]
+        file = "maps/x.hdr"
+        rotation_deg = -30.0
+        intensity = 2
+        [shading]
+        method = "paper"
+        threads = 64
+        seed = 7
+        [[material]]
+        name = "measured"
+        file = "x.binary"
+        [[material]]
+        name = "metal"
+        model = "conductor"
+        distribution = "ggx"
+        alpha = 0.1
+        eta = [0.2, 0.9, 1.1]
+        k = [3.9, 2.4, 2.1]
+        [[material]]
+        name = "named"
+        builtin = "gold"
+        [[object]]
+        mesh = "/absolute/y.obj"
+        material = "metal"
+        translate = [0.1, 0, 0]
+        rotate_deg = [0, 90, 0]
+        scale = 0.5
+        [[object]]
+        builtin = "sphere"
+    "#;
+
+    fn error(text: &str) -> String {
+        let error = Scene::parse(text, Path::new("")).unwrap_err().to_string();
+        assert!(!error.contains('\n'), "{error}");
+        error
+    }
+
+    #[test]
+    fn every_key_is_read_and_paths_start_at_the_file() {
+        let scene = Scene::parse(FULL, Path::new("/base")).unwrap();
+        let expected = ImageSettings {
+            width: 320,
+            height: 200,
+            subpixels: 3,
+            exposure: 0.5,
+            gamma: 1.0,
+            background: Background::None,
+        };
+        assert_eq!(scene.image, expected);
+        let expected =
+            Camera { eye: DVec3::new(1.5, 1.0, 3.0), target: DVec3::new(0.0, 0.5, 0.0), up: DVec3::Y, fov_y_deg: 40.0 };
+        assert_eq!(scene.camera, Some(expected));
+        let expected = EnvironmentSettings {
+            source: Source::File("/base/maps/x.hdr".into()),
+            rotation_deg: -30.0,
+            intensity: 2.0,
+        };
+        assert_eq!(scene.environment, expected);
+        assert_eq!(scene.shading, ShadingSettings { method: "paper".into(), threads: 64, seed: 7 });
+        assert_eq!(scene.materials[0].source, MaterialSource::File("/base/x.binary".into()));
+        let MaterialSource::Model { model, parameters } = &scene.materials[1].source else { panic!("not a model") };
+        assert_eq!((model.as_str(), parameters["alpha"].as_float(), parameters.len()), ("conductor", Some(0.1), 4));
+        assert_eq!(scene.materials[2].source, MaterialSource::Builtin("gold".into()));
+        assert_eq!(scene.objects[0].mesh, Source::File("/absolute/y.obj".into()));
+        assert_eq!((scene.objects[0].translate, scene.objects[0].scale), (Vec3::new(0.1, 0.0, 0.0), 0.5));
+        assert_eq!(scene.objects[1], ObjectSettings::new(Source::Builtin("sphere".into()), "measured"));
+    }
+
+    #[test]
+    fn an_empty_file_is_the_default_scene() {
+        let scene = Scene::parse("", Path::new("")).unwrap();
+        assert_eq!(scene, Scene::default());
+        assert_eq!(
+            (scene.image.width, scene.image.height, scene.shading.threads, scene.image.subpixels),
+            (640, 480, 100, 2)
+        );
+    }
+
+    #[test]
+    fn what_is_saved_reads_back_the_same() {
+        for scene in [Scene::default(), Scene::parse(FULL, Path::new("/base")).unwrap()] {
+            let text = scene.to_toml().unwrap();
+            assert_eq!(Scene::parse(&text, Path::new("/elsewhere")).unwrap(), scene, "{text}");
+        }
+    }
+
+    #[test]
+    fn unknown_keys_are_errors_that_name_the_key_and_its_line() {
+        for (text, key, line) in [
+            ("[image]\nwidth = 3\nwidht = 4", "widht", "line 3"),
+            ("[camera]\neye = [1, 2, 3]\nfov = 4", "fov", "line 3"),
+            ("[environment]\n\nrotation = 4", "rotation", "line 3"),
+            ("[shading]\nthread = 4", "thread", "line 2"),
+            ("[[material]]\nname = 'm'\nfile = 'x'\nalpha = 4", "alpha", "line 1"),
+            ("[[object]]\nbuiltin = 'sphere'\nsize = 4", "size", "line 3"),
+            ("[scene]", "scene", "line 1"),
+        ] {
+            let error = error(text);
+            assert!(error.contains(&format!("`{key}`")) && error.contains(line), "{error}");
+        }
+    }
+
+    #[test]
+    fn bad_values_are_errors_that_name_the_key_and_its_line() {
+        for (text, key, line) in [
+            ("[image]\nwidth = 0", "width", "line 2"),
+            ("[image]\nheight = -1", "height", "line 2"),
+            ("[image]\nheight = 100000", "height", "line 2"),
+            ("[image]\nwidth = 3.5", "width", "line 2"),
+            ("[image]\nwidth = '3'", "width", "line 2"),
+            ("[image]\nsubpixels = 5", "subpixels", "line 2"),
+            ("[image]\nexposure = -0.1", "exposure", "line 2"),
+            ("[image]\nexposure = inf", "exposure", "line 2"),
+            ("[image]\ngamma = 0", "gamma", "line 2"),
+            ("[image]\nbackground = 'black'", "environment", "line 2"),
+            ("[camera]\neye = [0, 0, 0]", "target", "line 1"),
+            ("[camera]\neye = [0, 0]", "eye", "line 2"),
+            ("[camera]\neye = [0, 1, 0]", "up", "line 1"),
+            ("[camera]\neye = [0, 0, 1]\nfov_y_deg = 180", "fov_y_deg", "line 1"),
+            ("[camera]\nfov_y_deg = 30", "eye", "line 1"),
+            ("[environment]\nintensity = nan", "intensity", "line 2"),
+            ("[environment]\nrotation_deg = inf", "rotation_deg", "line 2"),
+            ("[environment]\nfile = 'x'\nbuiltin = 'y'", "builtin", "line 1"),
+            ("[shading]\nthreads = 0", "threads", "line 2"),
+            ("[shading]\nthreads = 1025", "threads", "line 2"),
+            ("[shading]\nseed = -1", "seed", "line 2"),
+            ("[[material]]\nname = 'm'", "model", "line 1"),
+            ("[[material]]\nname = 'm'\nfile = 'x'\nmodel = 'y'", "model", "line 1"),
+            ("[[material]]\nfile = 'x'", "name", "line 1"),
+            ("[[material]]\nname = 3\nfile = 'x'", "name", "line 1"),
+            ("[[material]]\nname = 'm'\nfile = 'x'\n[[material]]\nname = 'm'\nfile = 'x'", "name", "line 4"),
+            ("[[object]]\nmaterial = 'gold'", "mesh", "line 1"),
+            ("[[object]]\nbuiltin = 'sphere'\nscale = 0", "scale", "line 3"),
+            ("[[object]]\nbuiltin = 'sphere'\nscale = nan", "scale", "line 3"),
+            ("[[object]]\nbuiltin = 'sphere'\ntranslate = [0, inf, 0]", "translate", "line 3"),
+            ("[image]\nwidth = ", "width", "line 2"),
+            ("[image\nwidth = 3", "image", "line 1"),
+        ] {
+            let error = error(text);
+            assert!(error.contains(key) && error.contains(line), "{text:?}: {error}");
+        }
+        let error = error("[[material]]\nname = 'red'\nfile = 'x'\n[[object]]\nbuiltin = 'sphere'\nmaterial = 'blue'");
+        assert!(error.contains("\"blue\"") && error.contains("red") && error.contains("line 4"), "{error}");
+    }
+
+    #[test]
+    fn errors_of_files_name_the_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("bad.toml");
+        std::fs::write(&path, "[image]\nwidth = 0").unwrap();
+        assert!(Scene::load(&path).unwrap_err().to_string().contains("bad.toml"));
+        std::fs::write(&path, b"\xff\xfe").unwrap();
+        assert!(Scene::load(&path).unwrap_err().to_string().contains("bad.toml"));
+        assert!(Scene::load(&folder.path().join("none.toml")).unwrap_err().to_string().contains("none.toml"));
+        std::fs::write(&path, "[environment]\nfile = 'x.hdr'").unwrap();
+        assert_eq!(Scene::load(&path).unwrap().environment.source, Source::File(folder.path().join("x.hdr")));
+    }
+}

@@ -1,0 +1,354 @@
+//! Triangle meshes: read from OBJ and cleaned so that nothing degenerate reaches the rasteriser, or built in.
+use std::collections::HashMap;
+use std::path::Path;
+
+use glam::{DVec3, Vec3};
+
+use crate::error::{Error, Result};
+
+/// Cells along the edge of a face of the built-in sphere, 49152 triangles: chords err by 1.5e-4, half of it each side.
+const SPHERE_CELLS: usize = 64;
+
+/// An indexed triangle mesh with unit normals; counter-clockwise triangles face outwards, as far as the file is right.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Mesh {
+    /// Finite.
+    pub positions: Vec<Vec3>,
+    /// Unit, one a position.
+    pub normals: Vec<Vec3>,
+    /// Three a triangle, each below the number of positions; no triangle is degenerate.
+    pub indices: Vec<u32>,
+}
+
+/// The names that [`Mesh::builtin`] takes.
+pub fn builtin_names() -> &'static [&'static str] {
+    &["sphere"]
+}
+
+impl Mesh {
+    /// A built-in mesh: `sphere` has radius 1 and its centre at the origin, and is within 1e-4 of the true sphere everywhere.
+    pub fn builtin(name: &str) -> Result<Self> {
+        match name {
+            "sphere" => Ok(cube_sphere(SPHERE_CELLS)),
+            _ => Err(Error::input(
+                format!("mesh `{name}`"),
+                "is not built in",
+                format!("choose {}, or give an .obj file", builtin_names().join(", ")),
+            )),
+        }
+    }
+
+    /// Reads all triangles and polygons of a Wavefront OBJ as one mesh; objects, groups, materials, texture coordinates and
+    /// lines are ignored. Polygons become fans. Where a normal is missing, zero or not finite, the mean normal of the
+    /// faces that share the position takes its place, weighted by their angles there. Degenerate triangles are dropped.
+    pub fn load(path: &Path) -> Result<Self> {
+        if path.extension().is_none_or(|extension| !extension.eq_ignore_ascii_case("obj")) {
+            return Err(Error::in_file(path, "is no known kind of mesh", "give a Wavefront .obj file"));
+        }
+        let bytes = std::fs::read(path).map_err(|cause| Error::unreadable(path, cause))?;
+        // Names in old files are in any encoding; the numbers are ASCII in all of them.
+        let obj = Obj::parse(&String::from_utf8_lossy(&bytes)).map_err(|(line, problem)| {
+            Error::in_file(path, format!("line {line}: {problem}"), "repair or export it again")
+        })?;
+        let (mesh, dropped) = obj.into_mesh();
+        if dropped > 0 {
+            tracing::warn!("{}: dropped {dropped} degenerate triangles", path.display());
+        }
+        if mesh.indices.is_empty() {
+            return Err(Error::in_file(path, "has no triangle with an area", "give a mesh with faces"));
+        }
+        tracing::debug!("{}: {} triangles, {} vertices", path.display(), mesh.indices.len() / 3, mesh.positions.len());
+        Ok(mesh)
+    }
+
+    /// The smallest and largest coordinates.
+    pub fn bounds(&self) -> (Vec3, Vec3) {
+        self.positions.iter().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), &position| {
+            (low.min(position), high.max(position))
+        })
+    }
+
+    /// Centre and radius of a sphere that holds the mesh: around the middle of its bounds, so not always the smallest.
+    pub fn bounding_sphere(&self) -> (Vec3, f32) {
+        let (low, high) = self.bounds();
+        let centre = low.midpoint(high);
+        (centre, self.positions.iter().map(|position| position.distance(centre)).fold(0.0, f32::max))
+    }
+}
+
+/// The sphere as a cube of `cells` x `cells` quads a face, with equal angles between the grid lines.
+fn cube_sphere(cells: usize) -> Mesh {
+    let mut mesh = Mesh::default();
+    // Chords lie inside the sphere, by at most half the square of the angle from the middle of a cell to its corner. The
+    // cells at the middle of a face are the largest. Vertices lie half of that outside, so the error has both signs.
+    let angle = 0.5 * std::f64::consts::FRAC_PI_2 / cells as f64;
+    let radius = 1.0 + 0.5 * angle * angle;
+    let tangent = |index: usize| ((2 * index) as f64 * angle - std::f64::consts::FRAC_PI_4).tan();
+    // Normal, and the two directions along each face, right-handed.
+    let axes = [DVec3::X, DVec3::Y, DVec3::Z];
+    for face in 0..6 {
+        let (i, sign) = (face / 2, if face % 2 == 0 { 1.0 } else { -1.0 });
+        let (normal, right, up) = (sign * axes[i], sign * axes[(i + 1) % 3], axes[(i + 2) % 3]);
+        let first = mesh.positions.len() as u32;
+        for row in 0..=cells {
+            for column in 0..=cells {
+                let direction = (normal + tangent(column) * right + tangent(row) * up).normalize();
+                mesh.positions.push((radius * direction).as_vec3());
+                mesh.normals.push(direction.as_vec3());
+            }
+        }
+        let stride = cells as u32 + 1;
+        for (row, column) in (0..cells as u32).flat_map(|row| (0..cells as u32).map(move |column| (row, column))) {
+            let corner = first + row * stride + column;
+            let [a, b, c, d] = [corner, corner + 1, corner + stride + 1, corner + stride];
+            let length = |from: u32, to: u32| mesh.positions[from as usize].distance(mesh.positions[to as usize]);
+            // Near the corners of the cube cells are rhombs: along the shorter diagonal the chords stay short.
+            let split = if length(a, c) <= length(b, d) { [a, b, c, a, c, d] } else { [a, b, d, b, c, d] };
+            mesh.indices.extend(split);
+        }
+    }
+    mesh
+}
+
+/// What is of use in a Wavefront OBJ file.
+///
+/// Read here rather than by a crate: the one that fits misplaces normals when some vertices lack them, overflows on absurd
+/// indices, refuses names that are not UTF-8, and cannot say which line is wrong.
+#[derive(Default)]
+struct Obj {
+    positions: Vec<Vec3>,
+    normals: Vec<Vec3>,
+    /// Of each triangle's corners: index of the position, and of the normal where there is one.
+    triangles: Vec<[(u32, Option<u32>); 3]>,
+}
+
+impl Obj {
+    /// Parses a whole file; an error is the number of the line and what is wrong there.
+    fn parse(text: &str) -> Result<Self, (usize, String)> {
+        let mut obj = Self::default();
+        for (index, line) in text.lines().enumerate() {
+            obj.parse_line(line).map_err(|problem| (index + 1, problem))?;
+        }
+        Ok(obj)
+    }
+
+    fn parse_line(&mut self, line: &str) -> Result<(), String> {
+        let mut words = line.split_ascii_whitespace();
+        match words.next() {
+            Some("v") => {
+                let position = parse_vector(words)?;
+                if !position.is_finite() {
+                    return Err(format!("position {position} is not finite"));
+                }
+                self.positions.push(position);
+            }
+            Some("vn") => self.normals.push(parse_vector(words)?),
+            Some("f") => {
+                let corners = words.map(|word| self.parse_corner(word)).collect::<Result<Vec<_>, _>>()?;
+                let [first, rest @ ..] = &corners[..] else { return Err("a face has no vertices".into()) };
+                self.triangles.extend(rest.windows(2).map(|pair| [*first, pair[0], pair[1]]));
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// A corner of a face: `v`, `v/vt`, `v//vn` or `v/vt/vn`; negative numbers count back from the latest.
+    fn parse_corner(&self, word: &str) -> Result<(u32, Option<u32>), String> {
+        let index = |number: &str, of: &str, count: usize| {
+            let number: i64 = number.parse().map_err(|_| format!("`{word}` is no vertex of a face"))?;
+            let index = if number < 0 { number.saturating_add_unsigned(count as u64) } else { number - 1 };
+            let found = u32::try_from(index).ok().filter(|&index| (index as usize) < count);
+            found.ok_or(format!("{of} {number} is out of range, there are {count} before this line"))
+        };
+        let mut numbers = word.split('/');
+        let position = index(numbers.next().unwrap_or_default(), "vertex", self.positions.len())?;
+        let normal = numbers.nth(1).filter(|number| !number.is_empty());
+        Ok((position, normal.map(|number| index(number, "normal", self.normals.len())).transpose()?))
+    }
+
+    /// Joins corners with the same position and normal into vertices; gives also the number of dropped triangles.
+    fn into_mesh(self) -> (Mesh, usize) {
+        // Normals that are none count as missing.
+        let normal_at = |index: u32| {
+            let normal = self.normals[index as usize].as_dvec3();
+            (normal.is_finite() && normal.length_squared() > 0.0).then(|| normal.normalize())
+        };
+        let mut mean_normals = vec![DVec3::ZERO; self.positions.len()];
+        let mut vertices = HashMap::new();
+        let (mut mesh, mut dropped, mut missing) = (Mesh::default(), 0, Vec::new());
+        for triangle in &self.triangles {
+            let [a, b, c] = triangle.map(|(position, _)| self.positions[position as usize].as_dvec3());
+            let area = (b - a).cross(c - a);
+            let longest = (b - a).length_squared().max((c - a).length_squared()).max((c - b).length_squared());
+            // A height of a millionth of the length is rounding of single precision, and the normal is noise.
+            if area.length() <= 1e-6 * longest {
+                dropped += 1;
+                continue;
+            }
+            let normal = area.normalize();
+            for ((position, _), [at, next, before]) in triangle.iter().zip([[a, b, c], [b, c, a], [c, a, b]]) {
+                mean_normals[*position as usize] += (next - at).angle_between(before - at) * normal;
+            }
+            for &(position, normal) in triangle {
+                let normal = normal.filter(|&normal| normal_at(normal).is_some());
+                let index = *vertices.entry((position, normal)).or_insert_with(|| {
+                    if normal.is_none() {
+                        missing.push((mesh.positions.len(), position));
+                    }
+                    mesh.positions.push(self.positions[position as usize]);
+                    mesh.normals.push(normal.and_then(normal_at).unwrap_or_default().as_vec3());
+                    mesh.positions.len() as u32 - 1
+                });
+                mesh.indices.push(index);
+            }
+        }
+        for (vertex, position) in missing {
+            // Faces back to back cancel: any direction is as good, as long as it is one.
+            mesh.normals[vertex] = mean_normals[position as usize].try_normalize().unwrap_or(DVec3::Y).as_vec3();
+        }
+        (mesh, dropped)
+    }
+}
+
+/// The first three numbers of a line.
+fn parse_vector<'a>(words: impl Iterator<Item = &'a str>) -> Result<Vec3, String> {
+    let mut numbers = words.map(|word| word.parse::<f32>().map_err(|_| format!("`{word}` is no number")));
+    let mut next = || numbers.next().unwrap_or(Err("three numbers are needed".into()));
+    Ok(Vec3::new(next()?, next()?, next()?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Loads a mesh from the text of an OBJ file named `test.obj`.
+    fn load(text: impl AsRef<[u8]>) -> Result<Mesh> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("test.obj");
+        std::fs::write(&path, text).unwrap();
+        Mesh::load(&path)
+    }
+
+    const CUBE: &str = "
+        v -1 -1 -1\nv 1 -1 -1\nv 1 1 -1\nv -1 1 -1\nv -1 -1 1\nv 1 -1 1\nv 1 1 1\nv -1 1 1
+        f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
+
+    #[test]
+    fn the_sphere_is_within_1e_4_of_the_true_one() {
+        let mesh = Mesh::builtin("sphere").unwrap();
+        let triangles = mesh.indices.len() / 3;
+        assert!(triangles < 60_000, "{triangles}");
+        let (mut low, mut high, mut crooked) = (f32::MAX, 0f32, 0f32);
+        for triangle in mesh.indices.chunks_exact(3) {
+            let [a, b, c] = [0, 1, 2].map(|corner| triangle[corner] as usize);
+            for (u, v) in [(0.0, 0.0), (0.5, 0.0), (0.5, 0.5), (0.0, 0.5), (1.0 / 3.0, 1.0 / 3.0), (0.1, 0.3)] {
+                let blend = |of: &[Vec3]| of[a] * (1.0 - u - v) + of[b] * u + of[c] * v;
+                let (position, normal) = (blend(&mesh.positions), blend(&mesh.normals).normalize());
+                low = low.min(position.length());
+                high = high.max(position.length());
+                crooked = crooked.max(normal.distance(position.normalize()));
+            }
+            let outwards = (mesh.positions[b] - mesh.positions[a]).cross(mesh.positions[c] - mesh.positions[a]);
+            assert!(outwards.dot(mesh.positions[a]) > 0.0, "a triangle faces inwards");
+        }
+        assert!(1.0 - low < 1e-4 && high - 1.0 < 1e-4 && crooked < 1e-4, "{low} {high} {crooked}");
+    }
+
+    #[test]
+    fn quads_and_polygons_become_triangles_of_the_same_area() {
+        let area = |mesh: &Mesh| -> f32 {
+            let corner = |index: u32| mesh.positions[index as usize];
+            let triangles = mesh.indices.chunks_exact(3);
+            triangles.map(|t| (corner(t[1]) - corner(t[0])).cross(corner(t[2]) - corner(t[0])).length() / 2.0).sum()
+        };
+        let cube = load(CUBE).unwrap();
+        assert_eq!((cube.indices.len(), cube.positions.len()), (36, 8));
+        assert!((area(&cube) - 24.0).abs() < 1e-5);
+        assert_eq!(cube.bounds(), (Vec3::NEG_ONE, Vec3::ONE));
+        assert_eq!(cube.bounding_sphere(), (Vec3::ZERO, 3f32.sqrt()));
+        let octagon: String = (0..8)
+            .map(|i| (f32::from(i as u8) * std::f32::consts::FRAC_PI_4).sin_cos())
+            .map(|(y, x)| format!("v {x} {y} 0\n"))
+            .collect();
+        let octagon = load(octagon + "f 1 2 3 4 5 6 7 8").unwrap();
+        assert_eq!(octagon.indices.len(), 18);
+        assert!((area(&octagon) - 8f32.sqrt()).abs() < 1e-5);
+        assert!(octagon.normals.iter().all(|normal| normal.distance(Vec3::Z) < 1e-6));
+    }
+
+    #[test]
+    fn missing_normals_are_weighted_by_angle() {
+        // The corners of a cube, each face split along some diagonal: only weights by angle give the true diagonals.
+        for (position, normal) in load(CUBE).map(|cube| cube.positions.into_iter().zip(cube.normals)).unwrap() {
+            assert!(normal.distance(position.normalize()) < 1e-6, "{position} {normal}");
+        }
+    }
+
+    #[test]
+    fn single_missing_and_bad_normals_are_replaced_and_the_others_kept() {
+        let mesh =
+            load("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nvn 0 3 4\nvn 0 0 0\nvn nan 0 1\nf 1//1 2//2 3//3\nf 2 4 3//1")
+                .unwrap();
+        let tilted = Vec3::new(0.0, 0.6, 0.8);
+        assert_eq!(mesh.normals, [tilted, Vec3::Z, Vec3::Z, Vec3::Z, tilted]);
+        assert_eq!(mesh.indices, [0, 1, 2, 1, 3, 4]);
+    }
+
+    #[test]
+    fn degenerate_triangles_are_dropped() {
+        let mesh = load("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 2 0 0\nv 1 0 0\nf 1 2 3\nf 1 1 3\nf 1 2 4\nf 2 5 3\nf 1 2\nf 3")
+            .unwrap();
+        assert_eq!((mesh.indices.len(), mesh.positions.len()), (3, 3));
+        let huge = load("v 1e38 1e38 0\nv -1e38 0 3e38\nv 0 1e38 1e38\nf 1 2 3").unwrap();
+        assert!(huge.normals.iter().all(|normal| normal.is_normalized()));
+    }
+
+    #[test]
+    fn what_is_not_geometry_is_ignored_and_indices_may_be_relative() {
+        let mesh = load(b"# caf\xe9\nmtllib none.mtl\no a\nusemtl b\ns 1\nv 0 0 0 1 0 0\nv 1 0 0\r\nvt 0 0\nv 0 1 0\ng c\nl 1 2\nf -3/1 -2/1 -1/9\n").unwrap();
+        assert_eq!(mesh.indices, [0, 1, 2]);
+        assert_eq!(mesh.normals, [Vec3::Z; 3]);
+    }
+
+    #[test]
+    fn hostile_files_are_errors_that_name_file_and_line() {
+        let triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
+        for (text, line, what) in [
+            (format!("{triangle}f 1 2 4"), "line 4", "vertex 4"),
+            (format!("{triangle}f 1 2 0"), "line 4", "vertex 0"),
+            (format!("{triangle}f 1 2 -4"), "line 4", "vertex -4"),
+            (format!("{triangle}f 1 2 -9223372036854775808"), "line 4", "out of range"),
+            (format!("{triangle}f 1//1 2 3"), "line 4", "normal 1"),
+            (format!("{triangle}f 1 2 99999999999999999999"), "line 4", "99999"),
+            (format!("{triangle}f"), "line 4", "no vertices"),
+            (format!("{triangle}v 1 2"), "line 4", "three numbers"),
+            (format!("{triangle}v 1 2 nan"), "line 4", "not finite"),
+            (format!("{triangle}v 1 2 1e99"), "line 4", "not finite"),
+            (format!("{triangle}v 1 2 x"), "line 4", "`x`"),
+            (format!("{triangle}f 1 1 1"), "test.obj", "no triangle"),
+            (triangle.into(), "test.obj", "no triangle"),
+            (String::new(), "test.obj", "no triangle"),
+        ] {
+            let error = load(&text).unwrap_err().to_string();
+            assert!(error.contains("test.obj") && error.contains(line) && error.contains(what), "{error}");
+        }
+        assert!(Mesh::load(Path::new("missing.obj")).unwrap_err().to_string().contains("missing.obj"));
+        assert!(Mesh::load(Path::new("mesh.ply")).unwrap_err().to_string().contains(".obj"));
+        assert!(Mesh::builtin("cube").unwrap_err().to_string().contains("sphere"));
+    }
+
+    #[test]
+    fn the_dragon_loads() {
+        let data = std::env::var("THREADLIGHT_DATA").unwrap_or("../shared/data".into());
+        let path = Path::new(&data).join("mesh/dragon_100k.obj");
+        if !path.exists() {
+            return println!("skipped: {} is not here", path.display());
+        }
+        let start = std::time::Instant::now();
+        let mesh = Mesh::load(&path).unwrap();
+        println!("{} triangles in {:?}", mesh.indices.len() / 3, start.elapsed());
+        assert!(mesh.indices.len() / 3 > 99_900);
+        assert!(mesh.normals.iter().all(|normal| normal.is_normalized()));
+    }
+}
