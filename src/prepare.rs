@@ -3,10 +3,10 @@ use crate::brdf::Brdf;
 use crate::environment::Environment;
 use crate::method::Method;
 use crate::passes::{Object, View};
-use crate::scene::{Camera, MaterialSource, Mesh, Scene, Source};
+use crate::scene::{Camera, MaterialSource, Mesh, Scene};
 use crate::threads::{self, CacheState, Observer, ThreadTable};
 use crate::{Error, Result};
-use glam::DVec3;
+use glam::{DAffine3, DVec3};
 use std::path::Path;
 use std::time::Duration;
 
@@ -63,17 +63,6 @@ pub fn load_material(source: &MaterialSource) -> Result<Brdf> {
     }
 }
 
-/// Reads an environment: a built-in's name, or a file.
-///
-/// # Errors
-/// Neither, or a file that cannot be used.
-pub fn load_environment(source: &Source) -> Result<Environment> {
-    match source {
-        Source::File(path) => Environment::load(path),
-        Source::Builtin(name) => Environment::builtin(name),
-    }
-}
-
 /// Loads and makes everything; thread generation reports to `observer` and is cached in `cache` if that is a folder.
 ///
 /// # Errors
@@ -88,11 +77,7 @@ pub fn prepare(scene: &Scene, cache: Option<&Path>, observer: &dyn Observer) -> 
         let mesh = match meshes.iter().position(|(known, _)| *known == name) {
             Some(known) => known,
             None => {
-                let mesh = match &object.mesh {
-                    Source::File(path) => Mesh::load(path)?,
-                    Source::Builtin(name) => Mesh::builtin(name)?,
-                };
-                meshes.push((name, mesh));
+                meshes.push((name, object.load_mesh()?));
                 meshes.len() - 1
             }
         };
@@ -100,13 +85,13 @@ pub fn prepare(scene: &Scene, cache: Option<&Path>, observer: &dyn Observer) -> 
             used_materials.push(&object.material);
             used_materials.len() - 1
         });
-        objects.push(Object { mesh, material: material as u32, to_world: object.transform() });
+        objects.push(Object { mesh, material: material as u32, to_world: DAffine3::from_mat4(object.transform().as_dmat4()) });
     }
-    let environment = load_environment(&scene.environment.source)?;
+    let environment = scene.environment.load()?;
     let image = &scene.image;
     let camera = scene.camera.unwrap_or_else(|| {
         let (center, radius) = bounding_sphere(&meshes, &objects);
-        Camera::framing(center, radius, f64::from(image.width) / f64::from(image.height))
+        Camera::framing(center, radius, image.aspect())
     });
     let view = View {
         camera,

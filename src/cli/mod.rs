@@ -11,7 +11,7 @@ use clap::{Parser, Subcommand};
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use threadlight::brdf::Brdf;
-use threadlight::scene::{MaterialSource, Source};
+use threadlight::scene::MaterialSource;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -69,21 +69,15 @@ pub fn start_logging(verbose: u8) {
         .init();
 }
 
-/// A built-in's name if `text` is one of `names`, else a file (`./name` for a file that is called like a built-in).
-fn source_of(text: &str, names: impl IntoIterator<Item = impl AsRef<str>>) -> Source {
-    if names.into_iter().any(|name| name.as_ref() == text) {
-        Source::Builtin(text.to_owned())
-    } else {
-        Source::File(PathBuf::from(text))
-    }
-}
-
-/// The material that `text` names: built in, or a file. A name that is neither, and looks like no file, is an unknown
-/// built-in rather than a missing file.
+/// The material that `text` names: built in, or a file (`./name` for one that is called like a built-in). A name that is
+/// neither, and looks like no file, is an unknown built-in rather than a missing file.
 fn material_of(text: &str) -> MaterialSource {
-    match source_of(text, Brdf::builtin_names()) {
-        Source::File(path) if path.extension().is_some() || path.exists() => MaterialSource::File(path),
-        _ => MaterialSource::Builtin(text.to_owned()),
+    let path = PathBuf::from(text);
+    let is_builtin = Brdf::builtin_names().any(|name| name == text);
+    if !is_builtin && (path.extension().is_some() || path.exists()) {
+        MaterialSource::File(path)
+    } else {
+        MaterialSource::Builtin(text.to_owned())
     }
 }
 

@@ -1,12 +1,12 @@
 //! `threadlight render`: a picture of a scene.
 use super::progress::Progress;
-use super::{cache_folder, material_of, source_of};
+use super::{cache_folder, material_of};
 use anyhow::Context;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use threadlight::output::{self, ExrHeader, Format};
 use threadlight::pipeline::{Renderer, Rendering, Wanted};
 use threadlight::prepare::{Prepared, prepare};
-use threadlight::scene::{Background, MaterialSettings, ObjectSettings, Scene, mesh};
+use threadlight::scene::{Background, MaterialSettings, ObjectSettings, Scene, Source, mesh};
 use threadlight::threads::CacheState;
 use threadlight::vulkan::{Device, Instance};
 use threadlight::{Error, environment};
@@ -189,15 +189,22 @@ impl Render {
             scene.objects.iter_mut().for_each(|object| object.material.clone_from(material));
         }
         if let Some(mesh) = &self.mesh {
-            let mesh = source_of(mesh, mesh::builtin_names());
+            let mesh = Source::named(mesh, mesh::builtin_names());
             let material = scene.objects.first().map(|object| object.material.clone()).unwrap_or_default();
-            scene.objects = vec![ObjectSettings::new(mesh, material)];
+            scene.objects = vec![ObjectSettings::new(mesh, &material)];
         }
         if let Some(name) = &self.environment {
-            scene.environment.source = source_of(name, environment::builtin_names());
+            scene.environment.source = Source::named(name, environment::builtin_names());
         }
         if let Some(background) = &self.background {
-            scene.image.background = background.parse()?;
+            scene.image.background = match background.as_str() {
+                "environment" => Background::Environment,
+                "none" => Background::None,
+                _ => {
+                    let subject = format!("--background {background}");
+                    return Err(Error::input(subject, "is not known", "use environment or none"));
+                }
+            };
         }
         if let Some((width, height)) = self.size {
             (scene.image.width, scene.image.height) = (width, height);
@@ -214,7 +221,8 @@ impl Render {
         lay(&self.exposure, &mut scene.image.exposure);
         lay(&self.gamma, &mut scene.image.gamma);
         lay(&self.rotation, &mut scene.environment.rotation_deg);
-        scene.validate()?;
+        // The flags get the same checks as the keys of a scene file, by being read as one.
+        Scene::parse(&scene.to_toml()?, Path::new(""))?;
         Ok(scene)
     }
 
