@@ -125,10 +125,13 @@ impl Renderer {
         let mut passes: Vec<Vec<PassTime>> = Vec::new();
         for _ in 0..repeat.max(1) {
             let start = std::time::Instant::now();
-            executable.execute(&mut frames)?;
-            frames.wait()?;
+            passes.push(if self.device.times_passes() {
+                executable.execute(&mut frames)?;
+                frames.pass_times()?
+            } else {
+                executable.execute_pass_by_pass(&mut frames)?
+            });
             frame_ms.push(start.elapsed().as_secs_f64() * 1e3);
-            passes.push(frames.pass_times()?);
         }
         let pass_median = |index: usize| PassTime {
             name: passes[0][index].name.clone(),

@@ -1,9 +1,10 @@
 //! Execute: the plan's resources as Vulkan objects, its passes and barriers as commands.
-use super::{Barrier, Graph, Handle, Kind, MemoryRequirement, Plan, ResourceInfo};
+use super::{Barrier, Graph, Handle, Kind, MemoryRequirement, Plan, PlannedPass, ResourceInfo};
 use crate::Result;
-use crate::vulkan::{self, Commands, Device, Frames, ImageShape, Memory, VulkanError};
+use crate::vulkan::{self, Commands, Device, Frames, ImageShape, Memory, PassTime, VulkanError};
 use ash::vk;
 use std::sync::Arc;
+use std::time::Instant;
 
 /// What a pass records when it runs.
 pub type Work<'a> = Box<dyn Fn(&mut Commands, &Resources<'_>) -> std::result::Result<(), VulkanError> + 'a>;
@@ -107,16 +108,45 @@ impl<'a> Executable<'a> {
     /// # Errors
     /// Whatever Vulkan refuses.
     pub fn execute(&self, frames: &mut Frames) -> Result<()> {
-        let resources = Resources { objects: &self.objects, declared: &self.declared };
         frames.record(|commands| {
             for pass in &self.plan.passes {
-                self.record_barriers(commands, &pass.barriers);
-                commands.timed_pass(&pass.name, |commands| (pass.work)(commands, &resources))?;
+                self.record_pass(commands, pass)?;
             }
             self.record_barriers(commands, &self.plan.final_barriers);
             Ok(())
         })?;
         Ok(())
+    }
+
+    /// Submits one frame pass by pass, waiting for each, and times them from outside: for devices whose timestamps do
+    /// not tell.
+    ///
+    /// # Errors
+    /// Whatever Vulkan refuses.
+    pub fn execute_pass_by_pass(&self, frames: &mut Frames) -> Result<Vec<PassTime>> {
+        let mut times = Vec::new();
+        for pass in &self.plan.passes {
+            let start = Instant::now();
+            frames.record(|commands| self.record_pass(commands, pass))?;
+            frames.wait()?;
+            times.push(PassTime { name: pass.name.clone(), gpu_ms: start.elapsed().as_secs_f64() * 1e3 });
+        }
+        frames.record(|commands| {
+            self.record_barriers(commands, &self.plan.final_barriers);
+            Ok(())
+        })?;
+        frames.wait()?;
+        Ok(times)
+    }
+
+    fn record_pass(
+        &self,
+        commands: &mut Commands,
+        pass: &PlannedPass<Work<'a>>,
+    ) -> std::result::Result<(), VulkanError> {
+        self.record_barriers(commands, &pass.barriers);
+        let resources = Resources { objects: &self.objects, declared: &self.declared };
+        commands.timed_pass(&pass.name, |commands| (pass.work)(commands, &resources))
     }
 
     fn record_barriers(&self, commands: &mut Commands, barriers: &[Barrier]) {
