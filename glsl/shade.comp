@@ -11,6 +11,10 @@ layout(local_size_x = 64) in;
 
 layout(constant_id = 0) const uint SUBPIXELS = 2; // per axis
 
+// Between these view angles the threads start to follow the view; why, says methods/paper.glsl.
+const float FACING_DEG = 3.0;
+const float TURNING_DEG = 15.0;
+
 layout(set = 0, binding = 0) uniform utexture2D geometry;
 layout(set = 0, binding = 1, std430) readonly buffer Counters {
     PixelClass classes[2];
@@ -19,6 +23,12 @@ layout(set = 0, binding = 2, std430) readonly buffer PixelList {
     uint pixels[];
 } pixel_list;
 layout(set = 0, binding = 3, rgba32f) uniform writeonly image2D radiance;
+
+// How many lookups in the environment were made, as a number of 64 bits.
+layout(set = 0, binding = 8, std430) buffer Lookups {
+    uint low;
+    uint high;
+} all_lookups;
 
 layout(push_constant) uniform Push {
     Camera camera;
@@ -33,16 +43,24 @@ layout(push_constant) uniform Push {
 #include "material.glsl"
 #include "brdf_models.glsl"
 
-// A method gives the sum over threads first, first + stride, ... of weight times environment: a partition of
-// the radiance that leaves `surface` towards the eye.
-#include "method.glsl"
-
 // World to environment coordinates: the environment is turned by the rotation, so directions are turned back.
 vec3 to_environment(vec3 d) {
     return vec3(push.rotation.x * d.x - push.rotation.y * d.z, d.y, push.rotation.y * d.x + push.rotation.x * d.z);
 }
 
+// Lookups in the environment that this invocation has made: methods count them.
+uint lookups = 0;
+
+// A method gives the sum over threads first, first + stride, ... of weight times environment: a partition of
+// the radiance that leaves `surface` towards the eye.
+#include "method.glsl"
+
+shared uint group_lookups;
+
 void main() {
+    if (gl_LocalInvocationIndex == 0) {
+        group_lookups = 0;
+    }
     const uint subpixel_count = SUBPIXELS * SUBPIXELS;
     uint count = counters.classes[push.kind].count;
     uint last = push.size_px.x * push.size_px.y - 1;
@@ -70,5 +88,14 @@ void main() {
         }
         float coverage = float(covered) / float(subpixel_count);
         imageStore(radiance, ivec2(pixel), vec4(sum * push.radiance_scale, coverage));
+    }
+    barrier();
+    atomicAdd(group_lookups, lookups);
+    barrier();
+    if (gl_LocalInvocationIndex == 0) {
+        uint before = atomicAdd(all_lookups.low, group_lookups);
+        if (before + group_lookups < before) {
+            atomicAdd(all_lookups.high, 1);
+        }
     }
 }

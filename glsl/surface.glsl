@@ -3,7 +3,9 @@
 struct Surface {
     // Columns: x, the part of w_o orthogonal to n; y = z cross x; z = n. In the environment's coordinates.
     mat3 frame;
-    // Angle between the normal and w_o, held below the horizon's side by the shading method.
+    // Towards the eye, unit, in the environment's coordinates.
+    vec3 w_o;
+    // Angle between the normal and w_o; above 90 degrees where an interpolated normal faces away.
     float theta_o;
 };
 
@@ -24,6 +26,15 @@ Surface make_surface(vec3 n, vec3 w_o) {
     vec3 x = sin_theta_o > 1e-6 ? across / sin_theta_o : any_tangent(n);
     Surface surface;
     surface.frame = mat3(x, cross(n, x), n);
+    surface.w_o = w_o;
     surface.theta_o = atan(sin_theta_o, cos_theta_o);
     return surface;
+}
+
+// A frame at n that does not turn with w_o: its x is what is left of `axis` in the tangent plane.
+mat3 fixed_frame(vec3 n, vec3 axis) {
+    vec3 along = axis - dot(axis, n) * n;
+    // An axis within 1e-3 of n gives no direction that single precision could be trusted with.
+    vec3 x = dot(along, along) > 1e-6 ? normalize(along) : any_tangent(n);
+    return mat3(x, cross(n, x), n);
 }

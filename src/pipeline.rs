@@ -25,19 +25,20 @@ fn declare<'a>(graph: &mut FrameGraph<'a>, renderer: &'a Renderer) -> Frame {
     let view = &renderer.view;
     let geometry = geometry_cache(graph, &renderer.geometry_cache, view); // pass 1 of the paper
     let tiles = classify(graph, &renderer.classify, geometry, view);
-    let radiance = shade(graph, &renderer.shade, geometry, &tiles, view); // pass 2 of the paper
+    let Shaded { radiance, lookups } = shade(graph, &renderer.shade, geometry, &tiles, view); // pass 2 of the paper
     let radiance = match &renderer.background {
         Some(environment) => background(graph, environment, radiance, view),
         None => radiance,
     };
     let display = tone_map(graph, &renderer.tone_map, radiance, view);
-    Frame { geometry, counters: tiles.counters, radiance, display }
+    Frame { geometry, counters: tiles.counters, lookups, radiance, display }
 }
 
 /// What a frame leaves.
 struct Frame {
     geometry: Image,
     counters: Buffer,
+    lookups: Buffer,
     radiance: Image,
     display: Image,
 }
@@ -64,6 +65,8 @@ pub struct Rendering {
     pub geometry: Vec<[u32; 2]>,
     /// What the classification counted.
     pub counters: Counters,
+    /// Lookups in the environment that shading made.
+    pub lookups: u64,
     /// Time on the GPU by pass, median over the repetitions; empty where the device cannot tell.
     pub passes: Vec<PassTime>,
     /// From the start of recording until the GPU is done, in milliseconds: median over the repetitions.
@@ -84,7 +87,8 @@ impl Renderer {
         let largest = device.limits().max_image_dimension2_d;
         let [width, height] = view.cache_size();
         if width.max(height) > largest {
-            let problem = format!("needs {width} x {height} sub-pixels, this device's images have at most {largest} a side");
+            let problem =
+                format!("needs {width} x {height} sub-pixels, this device's images have at most {largest} a side");
             return Err(Error::input("image size", problem, "use a smaller --size or fewer --subpixels"));
         }
         let cache = PipelineCache::new(device, cache_folder)?;
@@ -113,6 +117,7 @@ impl Renderer {
         let frame = declare(&mut graph, self);
         let mut readbacks = Readbacks { graph, device: &self.device, imports: Vec::new() };
         let counters = readbacks.buffer("read_counters", frame.counters, size_of::<Counters>() as u64)?;
+        let lookups = readbacks.buffer("read_lookups", frame.lookups, size_of::<u64>() as u64)?;
         let View { width, height, .. } = self.view;
         let radiance = readbacks.image("read_radiance", frame.radiance, [width, height], 16, wanted.radiance)?;
         let display = readbacks.image("read_display", frame.display, [width, height], 4, wanted.display)?;
@@ -142,6 +147,7 @@ impl Renderer {
             display: texels(display.as_deref()),
             geometry: texels(geometry.as_deref()),
             counters: texels(Some(&counters)).first().copied().unwrap_or_default(),
+            lookups: texels(Some(&lookups)).first().copied().unwrap_or_default(),
             passes: (0..passes[0].len()).map(pass_median).collect(),
             frame_ms: median(frame_ms),
             device_memory_bytes: self.device.allocated_bytes(),

@@ -85,7 +85,11 @@ pub fn prepare(scene: &Scene, cache: Option<&Path>, observer: &dyn Observer) -> 
             used_materials.push(&object.material);
             used_materials.len() - 1
         });
-        objects.push(Object { mesh, material: material as u32, to_world: DAffine3::from_mat4(object.transform().as_dmat4()) });
+        objects.push(Object {
+            mesh,
+            material: material as u32,
+            to_world: DAffine3::from_mat4(object.transform().as_dmat4()),
+        });
     }
     let environment = scene.environment.load()?;
     let image = &scene.image;
@@ -113,11 +117,8 @@ pub fn prepare(scene: &Scene, cache: Option<&Path>, observer: &dyn Observer) -> 
             MaterialSource::Model { .. } => error.within(format!("material \"{name}\"")),
             _ => error,
         })?;
-        let settings = threads::Settings {
-            count: scene.shading.threads as usize,
-            seed: scene.shading.seed,
-            ..Default::default()
-        };
+        let settings =
+            threads::Settings { count: scene.shading.threads as usize, seed: scene.shading.seed, ..Default::default() };
         let (mut threads, state, time) = threads::load_or_generate(&brdf, &settings, cache, observer)?;
         threads.material = name.to_owned();
         thread_time += time;

@@ -4,9 +4,9 @@
 //! in double precision; everything else follows the shader line by line.
 use crate::brdf::Brdf;
 use crate::environment::Pyramid;
-use crate::passes::View;
+use crate::passes::{SMOOTH_DEG, View};
 use crate::threads::ThreadTable;
-use glam::{DVec3, Mat3, UVec2, Vec2, Vec3, Vec4};
+use glam::{Mat3, UVec2, Vec2, Vec3, Vec4};
 use std::f32::consts::FRAC_PI_2;
 
 /// A point to shade: its shading frame and view angle. Twin of `Surface` in glsl/surface.glsl.
@@ -14,7 +14,9 @@ use std::f32::consts::FRAC_PI_2;
 pub struct Surface {
     /// Columns: x, the part of w_o orthogonal to n; y = z cross x; z = n.
     pub frame: Mat3,
-    /// Angle between the normal and w_o in radians.
+    /// Towards the eye, unit.
+    pub w_o: Vec3,
+    /// Angle between the normal and w_o in radians; above 90 degrees where an interpolated normal faces away.
     pub theta_o: f32,
 }
 
@@ -26,7 +28,7 @@ impl Surface {
         let sin_theta_o = across.length();
         // The reason for 1e-6 stands in the shader.
         let x = if sin_theta_o > 1e-6 { across / sin_theta_o } else { any_tangent(n) };
-        Self { frame: Mat3::from_cols(x, n.cross(x), n), theta_o: sin_theta_o.atan2(cos_theta_o) }
+        Self { frame: Mat3::from_cols(x, n.cross(x), n), w_o, theta_o: sin_theta_o.atan2(cos_theta_o) }
     }
 }
 
@@ -64,38 +66,107 @@ pub fn unpack_geometry(texel: UVec2) -> Option<(Vec3, usize)> {
     (texel.y != 0).then(|| (normal, texel.y as usize - 1))
 }
 
-/// The paper's estimate, equation (2), over threads `first`, `first + stride`, ... Twin of glsl/methods/paper.glsl.
-pub fn paper(surface: &Surface, brdf: &Brdf, threads: &ThreadTable, light: &Pyramid, first: usize, stride: usize) -> Vec3 {
-    let (m, rows) = (threads.count, threads.rows);
-    let row = (surface.theta_o * (rows as f32 / FRAC_PI_2)).min((rows - 1) as f32);
-    let theta_o = f64::from(row * (FRAC_PI_2 / rows as f32));
-    let w_o = DVec3::new(theta_o.sin(), 0.0, theta_o.cos());
-    let row_0 = row as usize;
-    let row_1 = (row_0 + 1).min(rows - 1);
-    let t = row - row_0 as f32;
-    let mut sum = Vec3::ZERO;
-    for k in (first..m).step_by(stride) {
-        let [sample_0, sample_1] = [row_0, row_1].map(|row| {
-            let sample = &threads.samples[row * m + k];
-            sample.direction().as_vec3().extend(sample.p.log2())
-        });
-        let blend: Vec4 = sample_0.lerp(sample_1, t);
-        let (w_i, log2_p) = (blend.truncate().normalize(), blend.w);
-        let direction = surface.frame * w_i;
-        let level = light.level_of((-(m as f32).log2() - log2_p).exp2(), direction);
-        let radiance = light.lookup(direction, level);
-        sum += brdf.evaluate(w_i.as_dvec3(), w_o).as_vec3() * radiance * (w_i.z * (-log2_p).exp2());
-    }
-    sum / m as f32
+/// A frame at `n` that does not turn with w_o. Twin of `fixed_frame` in glsl/surface.glsl.
+fn fixed_frame(n: Vec3, axis: Vec3) -> Mat3 {
+    let along = axis - axis.dot(n) * n;
+    // The reason for 1e-6 stands in the shader.
+    let x = if along.length_squared() > 1e-6 { along.normalize() } else { any_tangent(n) };
+    Mat3::from_cols(x, n.cross(x), n)
 }
 
-/// Linear radiance times coverage, and coverage, of the pixel that sees `texels` (row by row, sub-pixels of one pixel),
-/// which is `interior` if they lie on one smooth surface. Twin of `main` in glsl/shade.comp.
+/// The paper's estimate, equation (2): what glsl/methods/paper.glsl computes, by functions of the same names.
+struct Paper<'a> {
+    brdf: &'a Brdf,
+    threads: &'a ThreadTable,
+    light: &'a Pyramid,
+    /// Threads `first`, `first + stride`, ...
+    first: usize,
+    stride: usize,
+}
+
+/// View angles between which the threads start to follow the view, as in the shader.
+const FACING_DEG: f32 = 3.0;
+const TURNING_DEG: f32 = 15.0;
+
+impl Paper<'_> {
+    fn sample(&self, row: usize, k: usize) -> Vec4 {
+        let sample = &self.threads.row(row)[k];
+        sample.direction().as_vec3().extend(sample.p.log2())
+    }
+
+    fn ks(&self) -> impl Iterator<Item = usize> + use<> {
+        (self.first..self.threads.count).step_by(self.stride)
+    }
+
+    fn paper_term(&self, frame: Mat3, w_i: Vec3, w_o: Vec3, log2_p: f32) -> Vec3 {
+        let direction = frame * w_i;
+        let solid_angle = (-(self.threads.count as f32).log2() - log2_p).exp2();
+        let radiance = self.light.lookup(direction, self.light.level_of(solid_angle, direction));
+        self.brdf.evaluate(w_i.as_dvec3(), w_o.as_dvec3()).as_vec3() * radiance * (w_i.z * (-log2_p).exp2())
+    }
+
+    fn threads_following_view(&self, surface: &Surface) -> Vec3 {
+        let rows = self.threads.rows;
+        let row = (surface.theta_o * (rows as f32 / FRAC_PI_2)).min((rows - 1) as f32);
+        let theta_o = row * (FRAC_PI_2 / rows as f32);
+        let w_o = Vec3::new(theta_o.sin(), 0.0, theta_o.cos());
+        let row_0 = row as usize;
+        let row_1 = (row_0 + 1).min(rows - 1);
+        let t = row - row_0 as f32;
+        let term = |k| {
+            let between = self.sample(row_0, k).lerp(self.sample(row_1, k), t);
+            self.paper_term(surface.frame, between.truncate().normalize(), w_o, between.w)
+        };
+        self.ks().map(term).sum::<Vec3>() / self.threads.count as f32
+    }
+
+    fn threads_of_facing_view(&self, surface: &Surface, axis: Vec3) -> Vec3 {
+        let frame = fixed_frame(surface.frame.z_axis, axis);
+        let w_o = frame.transpose() * surface.w_o;
+        let term = |k| {
+            let facing = self.sample(0, k);
+            let h = (facing.truncate() + Vec3::Z).normalize();
+            let cos_theta_d = w_o.dot(h);
+            let w_i = 2.0 * cos_theta_d * h - w_o;
+            match w_i.z > 0.0 {
+                true => self.paper_term(frame, w_i, w_o, facing.w + (h.z / cos_theta_d).log2()),
+                false => Vec3::ZERO,
+            }
+        };
+        self.ks().map(term).sum::<Vec3>() / self.threads.count as f32
+    }
+
+    fn estimate(&self, surface: &Surface, axis: Vec3) -> Vec3 {
+        let (from, to) = (FACING_DEG.to_radians(), TURNING_DEG.to_radians());
+        let x = ((surface.theta_o - from) / (to - from)).clamp(0.0, 1.0);
+        let following = x * x * (3.0 - 2.0 * x);
+        let mut sum = Vec3::ZERO;
+        if following > 0.0 {
+            sum += following * self.threads_following_view(surface);
+        }
+        if following < 1.0 {
+            sum += (1.0 - following) * self.threads_of_facing_view(surface, axis);
+        }
+        sum
+    }
+}
+
+/// Whether the sub-pixels of a pixel lie on one smooth surface. Twin of glsl/classify.comp.
+pub fn is_interior(texels: &[UVec2]) -> bool {
+    let Some((first_normal, first_material)) = texels.first().copied().and_then(unpack_geometry) else { return false };
+    texels.iter().all(|texel| {
+        unpack_geometry(*texel).is_some_and(|(normal, material)| {
+            material == first_material && normal.dot(first_normal) >= SMOOTH_DEG.to_radians().cos()
+        })
+    })
+}
+
+/// Linear radiance times coverage, and coverage, of the pixel that sees `texels`: its sub-pixels, row by row.
+/// Twin of `main` in glsl/shade.comp.
 pub fn shade(
     view: &View,
     pixel: UVec2,
     texels: &[UVec2],
-    interior: bool,
     materials: &[(Brdf, ThreadTable)],
     light: &Pyramid,
     intensity: f32,
@@ -104,6 +175,7 @@ pub fn shade(
     let size = UVec2::new(view.width, view.height) * view.subpixels;
     let [cos, sin] = view.rotation();
     let to_environment = |d: Vec3| Vec3::new(cos * d.x - sin * d.z, d.y, sin * d.x + cos * d.z);
+    let interior = is_interior(texels);
     let mut sum = Vec3::ZERO;
     let mut covered = 0;
     for (j, texel) in texels.iter().enumerate() {
@@ -114,7 +186,7 @@ pub fn shade(
         let surface = Surface::new(to_environment(normal), to_environment(w_o));
         let (brdf, threads) = &materials[material];
         let (first, stride) = if interior { (j, texels.len()) } else { (0, 1) };
-        sum += paper(&surface, brdf, threads, light, first, stride);
+        sum += Paper { brdf, threads, light, first, stride }.estimate(&surface, to_environment(rays.right()));
     }
     if !interior {
         sum /= texels.len() as f32;

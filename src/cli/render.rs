@@ -142,11 +142,8 @@ impl Render {
         drop(instance);
         let device_name = device.description().name.clone();
         let renderer = Renderer::new(&device, cache.as_deref(), &prepared)?;
-        let wanted = Wanted {
-            radiance: format == Some(Format::Exr),
-            display: format != Some(Format::Exr),
-            ..Wanted::default()
-        };
+        let wanted =
+            Wanted { radiance: format == Some(Format::Exr), display: format != Some(Format::Exr), ..Wanted::default() };
         let rendering = renderer.render(wanted, self.repeat)?;
         // Closing the device is part of what validation checks.
         drop(renderer);
@@ -259,7 +256,7 @@ fn stats<'a>(
         covered_subpixels: counters.covered_subpixels,
         interior_pixels: counters.interior.count,
         edge_pixels: counters.edge.count,
-        lookups: counters.lookups(scene.shading.threads),
+        lookups: rendering.lookups,
         passes: rendering.passes.iter().map(|pass| Pass { name: &pass.name, gpu_ms: pass.gpu_ms }).collect(),
         frame_ms: rendering.frame_ms,
         thread_generation_ms: prepared.thread_time.as_secs_f64() * 1e3,

@@ -195,10 +195,7 @@ fn memory_barrier(barrier: &Barrier) -> vk::MemoryBarrier2<'static> {
 }
 
 /// A transient resource without memory, and what memory it needs.
-fn make(
-    device: &Arc<Device>,
-    info: &ResourceInfo,
-) -> std::result::Result<(Object, MemoryRequirement), VulkanError> {
+fn make(device: &Arc<Device>, info: &ResourceInfo) -> std::result::Result<(Object, MemoryRequirement), VulkanError> {
     let (object, needs) = match info.kind {
         Kind::Image(desc) => {
             let shape = ImageShape::plane(desc.format, desc.width, desc.height);

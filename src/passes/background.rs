@@ -33,12 +33,7 @@ impl Background {
     ///
     /// # Errors
     /// No device memory left, or a map wider or higher than the device's images can be.
-    pub fn new(
-        device: &Arc<Device>,
-        cache: &PipelineCache,
-        environment: &Environment,
-        intensity: f64,
-    ) -> Result<Self> {
+    pub fn new(device: &Arc<Device>, cache: &PipelineCache, environment: &Environment, intensity: f64) -> Result<Self> {
         let largest = device.limits().max_image_dimension2_d as usize;
         if environment.width.max(environment.height) > largest {
             let (width, height) = (environment.width, environment.height);
@@ -74,9 +69,8 @@ pub fn background<'a>(
     let radiance = pass.modify(radiance, Access::StorageWriteCompute);
     pass.record(Box::new(move |commands, resources| {
         let Background { pipeline, map, sampler, radiance_scale } = background;
-        let bindings = Bindings::new()
-            .image("radiance", resources.image(radiance))
-            .sampled("environment_map", map, sampler);
+        let bindings =
+            Bindings::new().image("radiance", resources.image(radiance)).sampled("environment_map", map, sampler);
         let push = Push {
             camera: view.camera_rays(),
             size_px: [view.width, view.height],

@@ -10,7 +10,7 @@ use std::sync::Arc;
 /// Sub-pixels whose normals differ by less share one partitioned sum over the threads. Narrower than this, and curved
 /// parts of a mesh count as edges and cost as much as all sub-pixels shaded alone; wider, and the parts of the sum
 /// belong to visibly different normals.
-const SMOOTH_DEG: f32 = 10.0;
+pub const SMOOTH_DEG: f32 = 10.0;
 
 /// One class of pixels: arguments of an indirect dispatch and a count. `PixelClass` in glsl/tiles.glsl.
 #[repr(C)]
@@ -99,12 +99,4 @@ pub fn classify<'a>(graph: &mut FrameGraph<'a>, classify: &'a Classify, geometry
         commands.dispatch(&classify.pipeline, &bindings, bytemuck::bytes_of(&push), groups)
     }));
     Tiles { counters, pixels, radiance }
-}
-
-impl Counters {
-    /// Lookups in the environment that shading makes with `threads` threads: all of them once in an interior pixel, and
-    /// once in every covered sub-pixel of an edge pixel.
-    pub fn lookups(&self, threads: u32) -> u64 {
-        u64::from(threads) * (u64::from(self.interior.count) + u64::from(self.covered_edge_subpixels))
-    }
 }

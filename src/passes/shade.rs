@@ -1,8 +1,8 @@
 //! Pass 2 of the paper (section 4.2): the radiance of every listed pixel, by its partition of the sample threads.
-use super::{CameraRays, Counters, FrameGraph, Tiles, View};
+use super::{CameraRays, Counters, FrameGraph, Tiles, View, clear};
 use crate::brdf::Brdf;
 use crate::environment::Pyramid;
-use crate::graph::{Access, Image};
+use crate::graph::{self, Access, BufferDesc, Image};
 use crate::method::Method;
 use crate::threads::ThreadTable;
 use crate::vulkan::{
@@ -61,7 +61,9 @@ impl DeviceMaterials {
                 thread_count: table.count as u32,
                 row_count: table.rows as u32,
             });
-            threads.extend(table.samples.iter().map(|sample| sample.direction().as_vec3().extend(sample.p.log2()).to_array()));
+            threads.extend(
+                table.samples.iter().map(|sample| sample.direction().as_vec3().extend(sample.p.log2()).to_array()),
+            );
         }
         let storage = vk::BufferUsageFlags::STORAGE_BUFFER;
         Ok(Self {
@@ -88,7 +90,8 @@ impl<'a> TableAtlas<'a> {
         let per_axis = device.limits().max_image_dimension3_d as usize / TABLE_SIDE;
         let index = self.0.len();
         if index >= per_axis * per_axis {
-            let problem = format!("has more measured materials than the {} that this device holds", per_axis * per_axis);
+            let problem =
+                format!("has more measured materials than the {} that this device holds", per_axis * per_axis);
             return Err(Error::input("the scene", problem, "use fewer"));
         }
         self.0.push(texels);
@@ -205,6 +208,15 @@ impl Shade {
     }
 }
 
+/// What shading leaves.
+#[derive(Clone, Copy)]
+pub struct Shaded {
+    /// Linear radiance times coverage, and coverage.
+    pub radiance: Image,
+    /// Number of lookups in the environment that were made: a u64.
+    pub lookups: graph::Buffer,
+}
+
 /// Shades the pixels that `tiles` lists: interior ones with one sum shared by all sub-pixels, then those at edges.
 pub fn shade<'a>(
     graph: &mut FrameGraph<'a>,
@@ -212,14 +224,17 @@ pub fn shade<'a>(
     geometry: Image,
     tiles: &Tiles,
     view: &'a View,
-) -> Image {
+) -> Shaded {
     let Tiles { counters, pixels, radiance } = *tiles;
+    let lookups = graph.buffer("lookups", BufferDesc { size_bytes: size_of::<u64>() as u64 });
+    let lookups = clear(graph, "clear_lookups", lookups);
     let mut pass = graph.pass("shade");
     pass.read(geometry, Access::SampledCompute);
     pass.read(counters, Access::Indirect);
     pass.read(counters, Access::StorageReadCompute);
     pass.read(pixels, Access::StorageReadCompute);
     let radiance = pass.modify(radiance, Access::StorageWriteCompute);
+    let lookups = pass.modify(lookups, Access::StorageWriteCompute);
     pass.record(Box::new(move |commands, resources| {
         let Shade { pipeline, materials, light } = shade;
         let counters = resources.buffer(counters);
@@ -231,7 +246,8 @@ pub fn shade<'a>(
             .sampled("environment_pyramid", &light.pyramid, &light.sampler)
             .buffer("Materials", &materials.records)
             .sampled("brdf_tables", &materials.tables, &materials.table_sampler)
-            .buffer("Threads", &materials.threads);
+            .buffer("Threads", &materials.threads)
+            .buffer("all_lookups", resources.buffer(lookups));
         for kind in [0, 1] {
             let push = Push {
                 camera: view.camera_rays(),
@@ -246,5 +262,5 @@ pub fn shade<'a>(
         }
         Ok(())
     }));
-    radiance
+    Shaded { radiance, lookups }
 }

@@ -38,9 +38,8 @@ pub fn tone_map<'a>(graph: &mut FrameGraph<'a>, tone_map: &'a ToneMap, radiance:
     pass.read(radiance, Access::StorageReadCompute);
     let display = pass.write(display, Access::StorageWriteCompute);
     pass.record(Box::new(move |commands, resources| {
-        let bindings = Bindings::new()
-            .image("radiance", resources.image(radiance))
-            .image("display", resources.image(display));
+        let bindings =
+            Bindings::new().image("radiance", resources.image(radiance)).image("display", resources.image(display));
         let push = Push { size_px: [width, height], exposure: view.exposure, inverse_gamma: 1.0 / view.gamma };
         commands.dispatch(&tone_map.pipeline, &bindings, bytemuck::bytes_of(&push), Groups::Direct(tiles_of(view)))
     }));

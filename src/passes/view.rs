@@ -21,6 +21,11 @@ impl CameraRays {
         Self { right: pack(right * (half_height * aspect)), up: pack(up * half_height), forward: pack(forward) }
     }
 
+    /// The direction to the right, not normalised.
+    pub fn right(&self) -> Vec3 {
+        Vec3::new(self.right[0], self.right[1], self.right[2])
+    }
+
     /// Direction from the eye through `position`, in [0, 1] from the top left corner; not normalised.
     /// Twin of `camera_ray` in glsl/camera.glsl.
     pub fn ray(&self, position: Vec2) -> Vec3 {

@@ -203,7 +203,10 @@ mod tests {
             let mean = directions.iter().sum::<DVec3>() / 100.0;
             let square = directions.iter().map(|s| s.z * s.z).sum::<f64>() / 100.0;
             // Moments of the cosine distribution: (0, 0, 2/3) and 1/2; random points would miss by about 0.05.
-            assert!((mean - DVec3::new(0.0, 0.0, 2.0 / 3.0)).length() < 0.03 && (square - 0.5).abs() < 0.03, "{row} {mean}");
+            assert!(
+                (mean - DVec3::new(0.0, 0.0, 2.0 / 3.0)).length() < 0.03 && (square - 0.5).abs() < 0.03,
+                "{row} {mean}"
+            );
         }
     }
 
@@ -282,7 +285,11 @@ mod tests {
                 turns.sort_by(f64::total_cmp);
                 println!(
                     "{name:16} {count:4} threads: {seconds:.2} s, furnace {:.4} on rows, {:.4} between; turn per row: median {:.2}, 99 % {:.2}, most {:.2} deg; light error {:.4}",
-                    worst(0.0), worst(0.5), turns[turns.len() / 2], turns[turns.len() * 99 / 100], turns[turns.len() - 1],
+                    worst(0.0),
+                    worst(0.5),
+                    turns[turns.len() / 2],
+                    turns[turns.len() * 99 / 100],
+                    turns[turns.len() - 1],
                     light_error(&brdf, &table)
                 );
             }
@@ -299,7 +306,8 @@ mod tests {
                 let z = uv.x;
                 let d = (DVec2::from_angle(2.0 * PI * uv.y) * (1.0 - z * z).sqrt()).extend(z);
                 let mean = |points: &mut dyn Iterator<Item = DVec3>| {
-                    let (sum, count) = points.fold((0.0, 0.0), |(sum, n), s| (sum + (8.0 * (s.dot(d) - 1.0)).exp(), n + 1.0));
+                    let (sum, count) =
+                        points.fold((0.0, 0.0), |(sum, n), s| (sum + (8.0 * (s.dot(d) - 1.0)).exp(), n + 1.0));
                     sum / count
                 };
                 let exact = mean(&mut dense.iter().copied());

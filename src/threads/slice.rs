@@ -158,7 +158,8 @@ fn normalise(cdf: &mut [f64]) {
 fn invert(cdf: &[f64], mass: f64) -> (usize, f64) {
     let step = cdf.partition_point(|&value| value <= mass).clamp(1, cdf.len() - 1) - 1;
     // `mass` beyond the last step with any mass lands in an empty one: go back to where the CDF rose last.
-    let step = if cdf[step + 1] > cdf[step] { step } else { cdf.partition_point(|&value| value < cdf[step]).max(1) - 1 };
+    let step =
+        if cdf[step + 1] > cdf[step] { step } else { cdf.partition_point(|&value| value < cdf[step]).max(1) - 1 };
     (step, ((mass - cdf[step]) / (cdf[step + 1] - cdf[step])).clamp(0.0, 1.0))
 }
 

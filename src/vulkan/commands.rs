@@ -189,7 +189,8 @@ impl Commands {
             .layer_count(1)
             .color_attachments(&colors)
             .depth_attachment(&depth_attachment);
-        let viewport = vk::Viewport { width: width as f32, height: height as f32, max_depth: 1.0, ..Default::default() };
+        let viewport =
+            vk::Viewport { width: width as f32, height: height as f32, max_depth: 1.0, ..Default::default() };
         // SAFETY: the views are alive and in the layouts named above, by the caller's barriers; ended below.
         unsafe {
             self.device.dynamic_rendering.cmd_begin_rendering(self.raw, &info);
@@ -334,16 +335,17 @@ impl Commands {
             return Ok(());
         }
         let layouts = [pipeline.set_layout];
-        let info =
-            vk::DescriptorSetAllocateInfo::default().descriptor_pool(self.descriptor_pool).set_layouts(&layouts);
+        let info = vk::DescriptorSetAllocateInfo::default().descriptor_pool(self.descriptor_pool).set_layouts(&layouts);
         // SAFETY: the pool belongs to the frame being recorded.
         let set = unsafe { self.device.raw.allocate_descriptor_sets(&info) }
             .during("vkAllocateDescriptorSets", pipeline.name)?[0];
         for (name, declared) in &pipeline.bindings {
             let given = bindings.0.iter().find(|(given, _)| given == name);
             let (_, bound) = given.ok_or_else(|| refuse(pipeline, format!("binding {name} is not given")))?;
-            let write =
-                vk::WriteDescriptorSet::default().dst_set(set).dst_binding(declared.index).descriptor_type(declared.kind);
+            let write = vk::WriteDescriptorSet::default()
+                .dst_set(set)
+                .dst_binding(declared.index)
+                .descriptor_type(declared.kind);
             let layout = match declared.kind {
                 vk::DescriptorType::STORAGE_IMAGE => vk::ImageLayout::GENERAL,
                 _ => vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL,

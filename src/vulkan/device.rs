@@ -241,8 +241,7 @@ impl Device {
             .push_next(&mut synchronization2)
             .push_next(&mut dynamic_rendering);
         // SAFETY: the physical device is this instance's; `info` and all it points to outlive the call.
-        let raw =
-            unsafe { instance.raw.create_device(chosen.physical, &info, None) }.during("vkCreateDevice", name)?;
+        let raw = unsafe { instance.raw.create_device(chosen.physical, &info, None) }.during("vkCreateDevice", name)?;
         let allocator = Allocator::new(&AllocatorCreateDesc {
             instance: instance.raw.clone(),
             device: raw.clone(),

@@ -109,8 +109,8 @@ impl Slot {
             unsafe { device.raw.create_command_pool(&info, None) }.during("vkCreateCommandPool", name)?;
         let info = vk::CommandBufferAllocateInfo::default().command_pool(command_pool).command_buffer_count(1);
         // SAFETY: the pool is alive; the buffer goes with it.
-        let commands = unsafe { device.raw.allocate_command_buffers(&info) }
-            .during("vkAllocateCommandBuffers", name)?[0];
+        let commands =
+            unsafe { device.raw.allocate_command_buffers(&info) }.during("vkAllocateCommandBuffers", name)?[0];
         device.set_name(commands, name);
 
         // Room for far more passes than a frame has; running out is an error that says so.

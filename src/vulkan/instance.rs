@@ -1,6 +1,6 @@
 //! The Vulkan instance: loader, validation layer, and the messages it sends.
-use super::error::{During, VulkanError};
 use super::Result;
+use super::error::{During, VulkanError};
 use ash::{ext, khr, vk};
 use std::ffi::{CStr, c_void};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -41,7 +41,8 @@ impl Instance {
     /// No loader, no driver, or no validation layer where one was asked for; each says what to install.
     pub fn new(validate: bool) -> Result<Arc<Self>> {
         // SAFETY: loads the system's Vulkan loader; it is unloaded after every object made through it (field order).
-        let entry = unsafe { ash::Entry::load() }.map_err(|cause| VulkanError::NoLoader { cause: cause.to_string() })?;
+        let entry =
+            unsafe { ash::Entry::load() }.map_err(|cause| VulkanError::NoLoader { cause: cause.to_string() })?;
         let name = "instance";
         // SAFETY: plain query of the loader.
         let loader_version = unsafe { entry.try_enumerate_instance_version() }

@@ -249,10 +249,7 @@ impl ImageShape {
 
     /// One level of all layers, for copies.
     pub(super) fn level(&self, level: u32) -> vk::ImageSubresourceLayers {
-        vk::ImageSubresourceLayers::default()
-            .aspect_mask(self.aspect())
-            .mip_level(level)
-            .layer_count(self.layers())
+        vk::ImageSubresourceLayers::default().aspect_mask(self.aspect()).mip_level(level).layer_count(self.layers())
     }
 
     /// Extent of `level`.
@@ -283,7 +280,8 @@ impl Image {
         let mut image = Self::unbound(device, name, shape, usage)?;
         let memory = Memory::allocate(device, name, image.requirements(), MemoryLocation::GpuOnly, false)?;
         image.bind(&Arc::new(memory), 0)?;
-        let staging: Vec<_> = levels.iter().map(|texels| Buffer::staging(device, name, texels)).collect::<Result<_>>()?;
+        let staging: Vec<_> =
+            levels.iter().map(|texels| Buffer::staging(device, name, texels)).collect::<Result<_>>()?;
         device.submit_and_wait("upload", |commands| {
             commands.upload_image(&image, &staging);
             Ok(())
@@ -295,12 +293,7 @@ impl Image {
     ///
     /// # Errors
     /// A size or format that the driver refuses.
-    pub fn unbound(
-        device: &Arc<Device>,
-        name: &str,
-        shape: ImageShape,
-        usage: vk::ImageUsageFlags,
-    ) -> Result<Self> {
+    pub fn unbound(device: &Arc<Device>, name: &str, shape: ImageShape, usage: vk::ImageUsageFlags) -> Result<Self> {
         let [width, height, depth] = shape.extent;
         let (flags, kind) = match shape.kind {
             ImageKind::Plane => (vk::ImageCreateFlags::empty(), vk::ImageType::TYPE_2D),

@@ -28,8 +28,8 @@ impl PipelineCache {
         let contents = file.as_deref().and_then(|file| std::fs::read(file).ok()).unwrap_or_default();
         let info = vk::PipelineCacheCreateInfo::default().initial_data(&contents);
         // SAFETY: `contents` outlives the call; the driver validates it.
-        let raw =
-            unsafe { device.raw.create_pipeline_cache(&info, None) }.during("vkCreatePipelineCache", "pipeline cache")?;
+        let raw = unsafe { device.raw.create_pipeline_cache(&info, None) }
+            .during("vkCreatePipelineCache", "pipeline cache")?;
         Ok(Self { raw, file, device: device.clone() })
     }
 
@@ -255,9 +255,7 @@ impl GraphicsPipeline {
         let blends: Vec<_> = state
             .colors
             .iter()
-            .map(|_| {
-                vk::PipelineColorBlendAttachmentState::default().color_write_mask(vk::ColorComponentFlags::RGBA)
-            })
+            .map(|_| vk::PipelineColorBlendAttachmentState::default().color_write_mask(vk::ColorComponentFlags::RGBA))
             .collect();
         let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&blends);
         let dynamic = [vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR];

@@ -76,9 +76,9 @@ impl Shader {
             match variable {
                 Variable::Descriptor { name, desc_bind, desc_ty, ty, .. } => {
                     // A block without an instance name is known by the name of its type.
-                    let name = name.filter(|name| !name.is_empty()).or_else(|| {
-                        ty.as_struct().and_then(|block| block.name.clone())
-                    });
+                    let name = name
+                        .filter(|name| !name.is_empty())
+                        .or_else(|| ty.as_struct().and_then(|block| block.name.clone()));
                     let name = name.ok_or_else(|| self.refuse("a binding has no name"))?;
                     if desc_bind.set() != 0 {
                         return Err(self.refuse(format!("{name} is not in descriptor set 0")));

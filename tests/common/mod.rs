@@ -1,0 +1,105 @@
+//! What the tests that render have in common.
+#![allow(dead_code)]
+use std::path::PathBuf;
+use std::sync::Arc;
+use threadlight::pipeline::{Renderer, Rendering, Wanted};
+use threadlight::prepare::{Prepared, prepare};
+use threadlight::scene::{MaterialSettings, MaterialSource, Scene, Source};
+use threadlight::vulkan::{Device, Instance, Messages};
+
+/// A device with validation on; `finish` fails the test if validation said anything, from first call to last.
+pub struct Validated {
+    pub device: Arc<Device>,
+    messages: Messages,
+}
+
+impl Validated {
+    pub fn new() -> Self {
+        let instance = Instance::new(true).expect("an instance with validation");
+        let wanted = std::env::var("THREADLIGHT_TEST_DEVICE").ok();
+        let device = Device::new(&instance, wanted.as_deref()).expect("a device");
+        Self { device, messages: instance.messages() }
+    }
+
+    pub fn render(&self, prepared: &Prepared, wanted: Wanted) -> Rendering {
+        Renderer::new(&self.device, None, prepared).expect("a renderer").render(wanted, 1).expect("a rendering")
+    }
+
+    pub fn finish(self) {
+        let Self { device, messages } = self;
+        assert_eq!(Arc::strong_count(&device), 1, "something still holds the device");
+        drop(device);
+        assert_eq!(messages.all(), Vec::<String>::new());
+    }
+}
+
+/// The built-in sphere of one material in a built-in environment.
+pub fn sphere(material: MaterialSource, environment: &str, threads: u32, (width, height): (u32, u32)) -> Scene {
+    let mut scene = Scene::default();
+    scene.materials = vec![MaterialSettings { name: "m".to_owned(), source: material }];
+    scene.objects[0].material = "m".to_owned();
+    scene.environment.source = Source::Builtin(environment.to_owned());
+    scene.shading.threads = threads;
+    (scene.image.width, scene.image.height) = (width, height);
+    scene
+}
+
+pub fn ready(scene: &Scene) -> Prepared {
+    prepare(scene, None, &()).expect("a scene that can be prepared")
+}
+
+/// A material given by its model and parameters in TOML.
+pub fn model(text: &str) -> MaterialSource {
+    let mut parameters: toml::Table = text.parse().expect("TOML");
+    let model = parameters.remove("model").and_then(|model| model.as_str().map(str::to_owned)).expect("a model");
+    MaterialSource::Model { model, parameters }
+}
+
+/// Lambert, conductors of two widths, plastic.
+pub fn analytic_materials() -> Vec<(&'static str, MaterialSource)> {
+    vec![
+        ("lambert", model("model = 'lambert'\nreflectance = [0.8, 0.5, 0.2]")),
+        (
+            "conductor 0.1",
+            model(
+                "model = 'conductor'\ndistribution = 'ggx'\nalpha = 0.1\neta = [0.2, 0.924, 1.102]\nk = [3.912, 2.448, 2.142]",
+            ),
+        ),
+        (
+            "conductor 0.5",
+            model(
+                "model = 'conductor'\ndistribution = 'ggx'\nalpha = 0.5\neta = [0.2, 0.924, 1.102]\nk = [3.912, 2.448, 2.142]",
+            ),
+        ),
+        (
+            "plastic",
+            model("model = 'plastic'\ndistribution = 'beckmann'\nalpha = 0.2\nior = 1.5\ndiffuse = [0.3, 0.08, 0.04]"),
+        ),
+    ]
+}
+
+/// The folder of measured data beside the project, where there is one.
+pub fn data() -> Option<PathBuf> {
+    let folder = std::env::var_os("THREADLIGHT_DATA").map_or_else(|| PathBuf::from("../shared/data"), PathBuf::from);
+    folder.is_dir().then_some(folder)
+}
+
+/// A MERL file of a made-up material: diffuse and a lobe, with -1 below the horizon as in the database.
+pub fn merl_like_table() -> Vec<u8> {
+    let mut bytes: Vec<u8> = [90_i32, 90, 180].iter().flat_map(|size| size.to_le_bytes()).collect();
+    for (channel, scale) in [1.0, 1.15, 1.66].iter().enumerate() {
+        for cell in 0..90 * 90 * 180 {
+            let (theta_h, theta_d, phi_d) = (cell / (90 * 180), cell / 180 % 90, cell % 180);
+            let theta_h = ((theta_h as f64 + 0.5) / 90.0).powi(2) * std::f64::consts::FRAC_PI_2;
+            let (theta_d, phi_d) = ((theta_d as f64 + 0.5).to_radians(), (phi_d as f64 + 0.5).to_radians());
+            let swing = theta_h.sin() * theta_d.sin() * phi_d.cos();
+            let fresnel = 0.04 + 0.96 * (1.0 - theta_d.cos()).powi(5);
+            let lobe = 8.0 * fresnel * (-(theta_h.tan() / 0.15).powi(2)).exp();
+            let value = [0.12, 0.05, 0.02][channel] + lobe;
+            let below = theta_h.cos() * theta_d.cos() - swing.abs() < 0.0;
+            let stored = if below { -1.0 } else { value * 1500.0 / scale };
+            bytes.extend_from_slice(&stored.to_le_bytes());
+        }
+    }
+    bytes
+}

@@ -1,0 +1,152 @@
+//! Pass 2 against its CPU twin, and against closed forms.
+mod common;
+
+use common::{Validated, analytic_materials, model, ready, sphere};
+use glam::{UVec2, Vec3, Vec4};
+use threadlight::environment::Pyramid;
+use threadlight::pipeline::{Rendering, Wanted};
+use threadlight::prepare::Prepared;
+use threadlight::scene::{Scene, Source};
+use threadlight::shading;
+
+const EVERYTHING: Wanted = Wanted { radiance: true, display: false, geometry: true };
+
+/// The texels of the geometry cache that a pixel sees.
+fn texels_of(prepared: &Prepared, rendering: &Rendering, pixel: UVec2) -> Vec<UVec2> {
+    let (s, stride) = (prepared.view.subpixels, prepared.view.width * prepared.view.subpixels);
+    let texel = |j: u32| {
+        let at = pixel * s + UVec2::new(j % s, j / s);
+        UVec2::from(rendering.geometry[(at.y * stride + at.x) as usize])
+    };
+    (0..s * s).map(texel).collect()
+}
+
+fn pixels(prepared: &Prepared) -> impl Iterator<Item = UVec2> + use<> {
+    let (width, height) = (prepared.view.width, prepared.view.height);
+    (0..height).flat_map(move |y| (0..width).map(move |x| UVec2::new(x, y)))
+}
+
+#[test]
+fn the_shader_agrees_with_its_cpu_twin() {
+    let gpu = Validated::new();
+    let mut materials = analytic_materials();
+    materials.push((
+        "blinn-phong",
+        model("model = 'blinn_phong'\ndiffuse = [0.1, 0.2, 0.3]\nspecular = [0.4, 0.4, 0.4]\nexponent = 60.0"),
+    ));
+    materials.push((
+        "narrow",
+        model(
+            "model = 'conductor'\ndistribution = 'beckmann'\nalpha = 0.02\neta = [1.5, 1.0, 0.6]\nk = [7.8, 6.7, 5.5]",
+        ),
+    ));
+    let folder = tempfile::tempdir().unwrap();
+    let table = folder.path().join("table.binary");
+    std::fs::write(&table, common::merl_like_table()).unwrap();
+    materials.push(("table", threadlight::scene::MaterialSource::File(table)));
+    for (name, material) in materials {
+        for (environment, threads, subpixels) in [("studio", 100, 2), ("sky", 7, 3)] {
+            let mut scene = sphere(material.clone(), environment, threads, (48, 36));
+            scene.image.subpixels = subpixels;
+            scene.image.background = threadlight::scene::Background::None;
+            scene.environment.rotation_deg = 73.0;
+            scene.environment.intensity = 1.7;
+            let prepared = ready(&scene);
+            let rendering = gpu.render(&prepared, EVERYTHING);
+            let materials: Vec<_> = prepared.materials.iter().map(|m| (m.brdf.clone(), m.threads.clone())).collect();
+            let light = Pyramid::box_filtered(&prepared.environment);
+            let (mut interior, mut edge, mut covered) = (0, 0, 0);
+            for pixel in pixels(&prepared) {
+                let texels = texels_of(&prepared, &rendering, pixel);
+                let expected = shading::shade(&prepared.view, pixel, &texels, &materials, &light, 1.7);
+                let found = Vec4::from(rendering.radiance[(pixel.y * 48 + pixel.x) as usize]);
+                assert_eq!(found.w, expected.w, "{name}, {environment}: coverage at {pixel}");
+                let difference = (found - expected).abs().max_element();
+                assert!(
+                    difference <= 1e-3 * expected.truncate().max_element(),
+                    "{name}, {environment}: {found} at {pixel}, the twin has {expected}"
+                );
+                let here = texels.iter().filter(|texel| shading::unpack_geometry(**texel).is_some()).count();
+                covered += here;
+                match shading::is_interior(&texels) {
+                    true => interior += 1,
+                    false => edge += usize::from(here > 0),
+                }
+            }
+            let counters = rendering.counters;
+            assert_eq!((counters.interior.count as usize, counters.edge.count as usize), (interior, edge), "{name}");
+            assert_eq!(counters.covered_subpixels as usize, covered, "{name}");
+            assert!(interior > 300 && edge > 30, "{interior} interior and {edge} edge pixels are no test");
+        }
+    }
+    gpu.finish();
+}
+
+/// Largest relative deviation from the directional albedo over all view angles, in an environment of radiance 1.
+fn furnace_error(gpu: &Validated, scene: &Scene) -> (f32, f64) {
+    let prepared = ready(scene);
+    let rendering = gpu.render(&prepared, EVERYTHING);
+    // One albedo for each degree, by quadrature, which knows nothing of threads; the last row of threads is at 89.
+    let brdf = &prepared.materials[0].brdf;
+    let albedos: Vec<Vec3> = (0..=90).map(|deg| brdf.albedo(f64::from(deg.min(89)).to_radians()).as_vec3()).collect();
+    let rays = prepared.view.camera_rays();
+    let size = UVec2::new(prepared.view.width, prepared.view.height);
+    let mut worst = (0.0, 0.0);
+    for pixel in pixels(&prepared) {
+        let texel = texels_of(&prepared, &rendering, pixel)[0];
+        let Some((normal, _)) = shading::unpack_geometry(texel) else { continue };
+        let w_o = -rays.ray((pixel.as_vec2() + 0.5) / size.as_vec2()).normalize();
+        let theta_o_deg = shading::Surface::new(normal, w_o).theta_o.to_degrees().min(89.0);
+        let degree = theta_o_deg as usize;
+        let albedo = albedos[degree].lerp(albedos[degree + 1], theta_o_deg - degree as f32);
+        let found = Vec4::from(rendering.radiance[(pixel.y * size.x + pixel.x) as usize]).truncate();
+        let error = ((found - albedo) / albedo).abs().max_element();
+        if error > worst.0 {
+            worst = (error, f64::from(theta_o_deg));
+        }
+    }
+    worst
+}
+
+#[test]
+fn a_white_furnace_shows_the_albedo() {
+    let gpu = Validated::new();
+    let mut materials = analytic_materials();
+    let folder = tempfile::tempdir().unwrap();
+    let table = folder.path().join("table.binary");
+    std::fs::write(&table, common::merl_like_table()).unwrap();
+    materials.push(("table", threadlight::scene::MaterialSource::File(table)));
+    if let Some(merl) =
+        common::data().map(|_| std::path::PathBuf::from("target/merl/alumina-oxide.binary")).filter(|f| f.is_file())
+    {
+        materials.push(("alumina-oxide", threadlight::scene::MaterialSource::File(merl)));
+    }
+    for (name, material) in materials {
+        let mut scene = sphere(material, "white", 100, (160, 120));
+        scene.image.subpixels = 1;
+        let (error, theta_o_deg) = furnace_error(&gpu, &scene);
+        println!("{name}: at most {:.3} % from its albedo, at {theta_o_deg:.1} degrees", 100.0 * error);
+        assert!(error < 0.02, "{name}: {error} at {theta_o_deg} degrees");
+    }
+    gpu.finish();
+}
+
+#[test]
+fn a_sun_of_a_million_stays_finite() {
+    let gpu = Validated::new();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("sun.exr");
+    let mut texels = vec![[0.25, 0.25, 0.25, 1.0]; 64 * 32];
+    texels[64 * 10 + 20] = [1e6, 1e6, 1e6, 1.0];
+    threadlight::output::write_exr(&path, 64, 32, &texels, false, &Default::default()).unwrap();
+    for (name, material) in analytic_materials() {
+        let mut scene = sphere(material, "white", 16, (48, 36));
+        scene.environment.source = Source::File(path.clone());
+        let prepared = ready(&scene);
+        let rendering = gpu.render(&prepared, EVERYTHING);
+        assert!(rendering.radiance.iter().flatten().all(|value| value.is_finite() && *value >= 0.0), "{name}");
+        let brightest = rendering.radiance.iter().flatten().fold(0.0_f32, |max, value| max.max(*value));
+        assert!(brightest > 100.0, "{name}: the sun is lost, the brightest is {brightest}");
+    }
+    gpu.finish();
+}
