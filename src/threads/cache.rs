@@ -88,7 +88,9 @@ mod tests {
         let (table, state) = fetch(&clay(), &SETTINGS, &folder);
         assert_eq!(state, CacheState::Miss);
         assert_eq!(fetch(&clay(), &SETTINGS, &folder), (table, CacheState::Hit));
-        for settings in [Settings { count: 5, ..SETTINGS }, Settings { rows: 4, ..SETTINGS }, Settings { seed: 2, ..SETTINGS }] {
+        for settings in
+            [Settings { count: 5, ..SETTINGS }, Settings { rows: 4, ..SETTINGS }, Settings { seed: 2, ..SETTINGS }]
+        {
             assert_eq!(fetch(&clay(), &settings, &folder).1, CacheState::Miss);
         }
         assert_eq!(fetch(&Brdf::builtin("gold").unwrap(), &SETTINGS, &folder).1, CacheState::Miss);

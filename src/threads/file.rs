@@ -136,7 +136,11 @@ mod tests {
 
     #[test]
     fn a_sound_checksum_does_not_excuse_bad_numbers() {
-        for bad in [Sample { theta: 2.0, phi: 0.0, p: 1.0 }, Sample { theta: 0.1, phi: f32::NAN, p: 1.0 }, Sample { theta: 0.1, phi: 0.0, p: 0.0 }] {
+        for bad in [
+            Sample { theta: 2.0, phi: 0.0, p: 1.0 },
+            Sample { theta: 0.1, phi: f32::NAN, p: 1.0 },
+            Sample { theta: 0.1, phi: 0.0, p: 0.0 },
+        ] {
             let mut table = table();
             table.samples[3] = bad;
             assert!(decode(&encode(&table)).unwrap_err().contains("sample"));

@@ -8,17 +8,21 @@
 //! | 3.2.2, smoothing | [`smoothing`] |
 //! | 3.2.3, peaks | [`peaks`] |
 //! | the whole | [`generate`] |
+//!
+//! Two corrections that the paper does not have are [`shares`] and [`calibration`]; each says why it is there.
 use std::f64::consts::FRAC_PI_2;
 
 use glam::{DVec3, dvec3};
 
 mod cache;
+pub mod calibration;
 pub mod cones;
 mod file;
 pub mod forces;
 mod generate;
 pub mod peaks;
 mod plot;
+pub mod shares;
 pub mod slice;
 pub mod smoothing;
 #[cfg(test)]

@@ -103,8 +103,13 @@ impl<'a> Slice<'a> {
         } else if self.albedo == DVec3::ZERO {
             w_i.z * FRAC_1_PI
         } else {
-            luminance(self.brdf.evaluate(w_i, self.w_o)) * w_i.z / self.total
+            luminance(self.f_cos(w_i)) / self.total
         }
+    }
+
+    /// f(w_i, w_o) (n . w_i) per channel, in 1/sr.
+    pub fn f_cos(&self, w_i: DVec3) -> DVec3 {
+        self.brdf.evaluate(w_i, self.w_o) * w_i.z
     }
 
     /// Where the pdf is greatest.
@@ -158,7 +163,8 @@ fn normalise(cdf: &mut [f64]) {
 fn invert(cdf: &[f64], mass: f64) -> (usize, f64) {
     let step = cdf.partition_point(|&value| value <= mass).clamp(1, cdf.len() - 1) - 1;
     // `mass` beyond the last step with any mass lands in an empty one: go back to where the CDF rose last.
-    let step = if cdf[step + 1] > cdf[step] { step } else { cdf.partition_point(|&value| value < cdf[step]).max(1) - 1 };
+    let step =
+        if cdf[step + 1] > cdf[step] { step } else { cdf.partition_point(|&value| value < cdf[step]).max(1) - 1 };
     (step, ((mass - cdf[step]) / (cdf[step + 1] - cdf[step])).clamp(0.0, 1.0))
 }
 

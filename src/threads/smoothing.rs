@@ -28,7 +28,8 @@ mod tests {
 
     #[test]
     fn a_thread_that_turns_evenly_stays() {
-        let thread: Vec<DVec3> = (0..20).map(|row| 0.02 * f64::from(row)).map(|a| DVec3::new(a.sin(), 0.0, a.cos())).collect();
+        let thread: Vec<DVec3> =
+            (0..20).map(|row| 0.02 * f64::from(row)).map(|a| DVec3::new(a.sin(), 0.0, a.cos())).collect();
         assert!(smooth(&thread).iter().zip(&thread).all(|(a, b)| a.distance(*b) < 1e-12));
     }
 

@@ -30,7 +30,9 @@ fn merl_from_slice(values: &[f32]) -> Vec<u8> {
 }
 
 fn conductor(distribution: &str, alpha: f64) -> Brdf {
-    let parameters = format!("distribution = '{distribution}'\nalpha = {alpha}\neta = [0.2, 0.924, 1.102]\nk = [3.912, 2.448, 2.142]");
+    let parameters = format!(
+        "distribution = '{distribution}'\nalpha = {alpha}\neta = [0.2, 0.924, 1.102]\nk = [3.912, 2.448, 2.142]"
+    );
     Brdf::from_parameters("conductor", parameters.parse().unwrap()).unwrap()
 }
 
