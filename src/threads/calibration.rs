@@ -1,15 +1,19 @@
-//! Corrects p so that a white furnace gives the albedo of every channel exactly in every row.
+//! Corrects p so that a white furnace gives the albedo of every channel in every row.
 //!
 //! Not in the paper, whose p of equation (4) does so for the luminance only: few samples meet the colours of a highlight and
-//! of its surroundings in slightly wrong proportion. Dividing p by factors c_k near 1 mends that ("calibration weights",
-//! Deville and Sarndal 1992); among all that do, these are the nearest to 1 in the least squares.
+//! of its surroundings in slightly wrong proportion. Dividing p by factors c_k near 1 mends that: calibration weights by
+//! raking (Deville and Sarndal 1992), which keeps them positive and as near to 1 as can be.
 use glam::{DMat3, DVec3};
 
 use super::Sample;
 use super::slice::Slice;
 
-/// Divides the pdfs of one row by c_k = 1 + mu . r_k, normalised to a mean of 1, where r_k = f (n.s) / (p albedo) and mu solves
-/// (mean of r r^T) mu = 1 - mean of r.
+/// Part of the samples that must in effect be left. A handful may need more than a correction, above all where none of them
+/// has the colour that is missing; then the furnace stays a little off instead.
+const LEAST_EFFECTIVE: f64 = 0.9;
+
+/// Divides the pdfs of one row by c_k = exp(mu . r_k), normalised to a mean of 1, where r_k = f (n.s) / (p albedo) per channel
+/// and mu is such that the mean of c_k r_k is 1.
 pub fn calibrate(slice: &Slice, row: &mut [Sample]) {
     let albedo = slice.albedo();
     let count = row.len() as f64;
@@ -19,14 +23,31 @@ pub fn calibrate(slice: &Slice, row: &mut [Sample]) {
         DVec3::select(albedo.cmpgt(DVec3::ZERO), term / albedo, DVec3::ONE)
     };
     let ratios: Vec<DVec3> = row.iter().map(ratio).collect();
-    let mean = ratios.iter().sum::<DVec3>() / count;
-    let gram = ratios.iter().map(|&r| DMat3::from_cols(r * r.x, r * r.y, r * r.z)).sum::<DMat3>() * (1.0 / count);
-    // Grey slices have equal channels, hence a singular matrix. A colour spread of 1 % is the least worth correcting.
-    let mu = (gram + DMat3::from_diagonal(DVec3::splat(1e-4))).inverse() * (DVec3::ONE - mean);
-    // A handful of samples may ask for more than a correction; then the furnace stays a little off instead.
-    let factors: Vec<f64> = ratios.iter().map(|&r| (1.0 + mu.dot(r)).clamp(0.5, 2.0)).collect();
-    let mean = factors.iter().sum::<f64>() / count;
-    for (sample, factor) in row.iter_mut().zip(factors) {
+    // The bounds only keep Newton's method from running away where there is no solution.
+    let factor = |mu: DVec3, r: DVec3| mu.dot(r).exp().clamp(0.1, 10.0);
+    let mut mu = DVec3::ZERO;
+    // Newton's method; it has all digits after 5 steps unless there is no solution.
+    for _ in 0..10 {
+        let mut residual = DVec3::ONE;
+        // Where colours are alike the matrix is singular: a spread of 1 % is the least worth correcting.
+        let mut slope = DMat3::from_diagonal(DVec3::splat(1e-4));
+        for &r in &ratios {
+            let weighted = r * (factor(mu, r) / count);
+            residual -= weighted;
+            slope += DMat3::from_cols(weighted * r.x, weighted * r.y, weighted * r.z);
+        }
+        mu += slope.inverse() * residual;
+    }
+    let factors = |mu: DVec3| ratios.iter().map(|&r| factor(mu, r)).collect::<Vec<f64>>();
+    // Kish's effective number of samples, (sum c)^2 / sum c^2.
+    let effective = |c: &[f64]| c.iter().sum::<f64>().powi(2) / c.iter().map(|c| c * c).sum::<f64>();
+    let mut factors_of_row = factors(mu);
+    while effective(&factors_of_row) < LEAST_EFFECTIVE * count {
+        mu *= 0.5;
+        factors_of_row = factors(mu);
+    }
+    let mean = factors_of_row.iter().sum::<f64>() / count;
+    for (sample, factor) in row.iter_mut().zip(factors_of_row) {
         sample.p *= (mean / factor) as f32;
     }
 }
@@ -37,7 +58,7 @@ mod tests {
     use crate::threads::test_materials;
 
     #[test]
-    fn every_channel_gets_its_albedo_and_p_hardly_changes() {
+    fn every_channel_gets_its_albedo_and_p_changes_little() {
         for (name, brdf) in test_materials::all() {
             let slice = Slice::new(&brdf, 0.7);
             let before: Vec<Sample> = slice.points(50).map(|s| Sample::new(s, slice.pdf(s))).collect();
@@ -46,7 +67,10 @@ mod tests {
             let furnace = row.iter().map(|s| slice.f_cos(s.direction()) / f64::from(s.p)).sum::<DVec3>() / 50.0;
             let error = ((furnace - slice.albedo()) / slice.albedo()).abs().max_element();
             assert!(error < 2e-3, "{name}: {error}");
-            assert!(row.iter().zip(&before).all(|(a, b)| (a.p / b.p - 1.0).abs() < 0.2), "{name}");
+            let change = |(a, b): (&Sample, &Sample)| (f64::from(a.p) / f64::from(b.p)).ln().powi(2);
+            let rms = (row.iter().zip(&before).map(change).sum::<f64>() / 50.0).sqrt();
+            // A lobe of another colour than its surroundings, as alumina-oxide has, needs the most.
+            assert!(rms < 0.3, "{name}: {rms}");
         }
     }
 }

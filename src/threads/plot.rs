@@ -78,8 +78,10 @@ pub fn plot(table: &ThreadTable, path: &Path) -> Result<()> {
 type Canvas<'a> = DrawingArea<BitMapBackend<'a>, plotters::coord::Shift>;
 
 fn draw<'a>(table: &ThreadTable, view: &View, canvas: &Canvas<'a>) -> Result<(), Box<dyn std::error::Error + 'a>> {
+    // Segment by segment: a thick path grows spikes where it turns back.
     let line = |points: &mut dyn Iterator<Item = DVec3>, style: ShapeStyle| {
-        canvas.draw(&PathElement::new(points.map(|point| view.project(point)).collect::<Vec<_>>(), style))
+        let points: Vec<_> = points.map(|point| view.project(point)).collect();
+        points.windows(2).try_for_each(|pair| canvas.draw(&PathElement::new(pair.to_vec(), style)))
     };
     let px = OVERSAMPLING;
 
