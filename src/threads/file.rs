@@ -13,6 +13,7 @@
 //!
 //! Row r is for the view angle theta_o = r 90 deg / rows; theta and phi are in the frame whose z is the normal and in which
 //! w_o = (sin theta_o, 0, cos theta_o).
+use std::f32::consts::FRAC_PI_2;
 use std::io::Write;
 use std::path::Path;
 
@@ -92,7 +93,8 @@ fn decode(bytes: &[u8]) -> Result<ThreadTable, String> {
     let values = payload.as_chunks().0.iter().map(|&value| f32::from_le_bytes(value)).collect::<Vec<f32>>();
     let samples: Vec<Sample> = values.as_chunks().0.iter().map(|&[theta, phi, p]| Sample { theta, phi, p }).collect();
     // A foreign writer can get the checksum right and a number wrong.
-    let is_usable = |s: &Sample| (0.0..1.5708).contains(&s.theta) && s.phi.is_finite() && s.p > 0.0 && s.p.is_finite();
+    let is_usable =
+        |s: &Sample| (0.0..FRAC_PI_2).contains(&s.theta) && s.phi.is_finite() && s.p > 0.0 && s.p.is_finite();
     if !samples.iter().all(is_usable) {
         return Err("holds a sample below the horizon or without a pdf".into());
     }

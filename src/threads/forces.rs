@@ -69,12 +69,12 @@ pub fn settle(
     iterations: usize,
     observer: &dyn Observer,
 ) -> Result<()> {
-    /// Part of its cone's radius that a sample moves under a force of 1; twice as much begins to oscillate.
-    const STEP: f64 = 0.15;
+    /// Part of its cone's radius that a sample moves under a force of 1.
+    const STEP: f64 = 0.05;
     /// No sample moves further than this part of its radius at once: forces hold only nearby.
     const LONGEST_STEP: f64 = 0.3;
     /// Settled: no sample moves by more than this part of its radius any more.
-    const SETTLED: f64 = 0.01;
+    const SETTLED: f64 = 0.003;
     /// Cones change slowly, and finding them costs more than the forces.
     const STEPS_PER_CONE: usize = 5;
     /// A sample keeps to where the pdf is at least this part of its mean over the sample's cone. Outside a lobe with an edge
@@ -158,7 +158,7 @@ mod tests {
         // All within a degree, two of them equal.
         let mut samples: Vec<DVec3> =
             (0..20).map(|i| DVec3::new(1e-3 * f64::from(i % 19), 1e-3 * f64::from(i % 7), 1.0).normalize()).collect();
-        settle(&slice, &mut samples, None, 500, &()).unwrap();
+        settle(&slice, &mut samples, None, 1000, &()).unwrap();
         let nearest = |i: usize| {
             let others = samples.iter().enumerate().filter(|(j, _)| *j != i);
             others.map(|(_, s)| s.angle_between(samples[i])).fold(f64::INFINITY, f64::min)

@@ -103,8 +103,13 @@ impl<'a> Slice<'a> {
         } else if self.albedo == DVec3::ZERO {
             w_i.z * FRAC_1_PI
         } else {
-            luminance(self.brdf.evaluate(w_i, self.w_o)) * w_i.z / self.total
+            luminance(self.f_cos(w_i)) / self.total
         }
+    }
+
+    /// f(w_i, w_o) (n . w_i) per channel, in 1/sr.
+    pub fn f_cos(&self, w_i: DVec3) -> DVec3 {
+        self.brdf.evaluate(w_i, self.w_o) * w_i.z
     }
 
     /// Where the pdf is greatest.
