@@ -1,4 +1,4 @@
-//! The materials that come with the program: assets/materials/<name>.toml.
+//! The materials that come with the program: the files of assets/materials.
 
 macro_rules! materials {
     ($($name:literal)+) => {

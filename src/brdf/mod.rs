@@ -1,4 +1,4 @@
-//! BRDFs: one file per model (the CPU form, in double precision, is the truth; its GLSL twin is glsl/brdf/<model>.glsl).
+//! BRDFs: one file per model (the CPU form, in double precision, is the truth; its GLSL twin is glsl/brdf/).
 //!
 //! Shading frame (conventions of the whole project): z is the normal, `w_i` points to the light, `w_o` to the eye, both
 //! unit. `f` is in 1/sr, without the cosine, and 0 where either cosine is not positive.

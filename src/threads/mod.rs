@@ -2,12 +2,12 @@
 //!
 //! | paper | module |
 //! |---|---|
-//! | equation (4), the pdf of one view | [`slice`] |
+//! | equation (4), the pdf of one view | [`mod@slice`] |
 //! | equations (5), (6), cones | [`cones`] |
 //! | equations (8) to (10), forces | [`forces`] |
 //! | 3.2.2, smoothing | [`smoothing`] |
 //! | 3.2.3, peaks | [`peaks`] |
-//! | the whole | [`generate`] |
+//! | the whole | [`generate()`] |
 //!
 //! Two corrections that the paper does not have are [`shares`] and [`calibration`]; each says why it is there.
 use std::f64::consts::FRAC_PI_2;
