@@ -88,66 +88,95 @@ struct Paper<'a> {
 const FACING_DEG: f32 = 3.0;
 const TURNING_DEG: f32 = 15.0;
 
+/// Sums of f cos / p and of f cos / p times radiance.
+#[derive(Default)]
+struct WeightedSum {
+    weight: Vec3,
+    radiance: Vec3,
+}
+
+impl WeightedSum {
+    fn weighted_mean(&self) -> Vec3 {
+        Vec3::select(self.weight.cmpgt(Vec3::ZERO), self.radiance / self.weight, Vec3::ZERO)
+    }
+}
+
+/// Where a view angle lies among the rows.
+struct Rows {
+    below: usize,
+    above: usize,
+    t: f32,
+    theta_o: f32,
+}
+
 impl Paper<'_> {
-    fn sample(&self, row: usize, k: usize) -> Vec4 {
+    fn rows_at(&self, theta_o: f32) -> Rows {
+        let count = self.threads.rows;
+        let row = (theta_o * (count as f32 / FRAC_PI_2)).min((count - 1) as f32);
+        let below = row as usize;
+        let above = (below + 1).min(count - 1);
+        Rows { below, above, t: row - below as f32, theta_o: row * (FRAC_PI_2 / count as f32) }
+    }
+
+    fn thread(&self, row: usize, k: usize) -> Vec4 {
         let sample = &self.threads.row(row)[k];
         sample.direction().as_vec3().extend(sample.p.log2())
     }
 
-    fn ks(&self) -> impl Iterator<Item = usize> + use<> {
+    fn partition(&self) -> impl Iterator<Item = usize> + use<> {
         (self.first..self.threads.count).step_by(self.stride)
     }
 
-    fn paper_term(&self, frame: Mat3, w_i: Vec3, w_o: Vec3, log2_p: f32) -> Vec3 {
+    fn add_term(&self, sum: &mut WeightedSum, frame: Mat3, w_i: Vec3, w_o: Vec3, log2_p: f32) {
         let direction = frame * w_i;
         let solid_angle = (-(self.threads.count as f32).log2() - log2_p).exp2();
         let radiance = self.light.lookup(direction, self.light.level_of(solid_angle, direction));
-        self.brdf.evaluate(w_i.as_dvec3(), w_o.as_dvec3()).as_vec3() * radiance * (w_i.z * (-log2_p).exp2())
+        let weight = self.brdf.evaluate(w_i.as_dvec3(), w_o.as_dvec3()).as_vec3() * (w_i.z * (-log2_p).exp2());
+        sum.weight += weight;
+        sum.radiance += weight * radiance;
     }
 
-    fn threads_following_view(&self, surface: &Surface) -> Vec3 {
-        let rows = self.threads.rows;
-        let row = (surface.theta_o * (rows as f32 / FRAC_PI_2)).min((rows - 1) as f32);
-        let theta_o = row * (FRAC_PI_2 / rows as f32);
-        let w_o = Vec3::new(theta_o.sin(), 0.0, theta_o.cos());
-        let row_0 = row as usize;
-        let row_1 = (row_0 + 1).min(rows - 1);
-        let t = row - row_0 as f32;
-        let term = |k| {
-            let between = self.sample(row_0, k).lerp(self.sample(row_1, k), t);
-            self.paper_term(surface.frame, between.truncate().normalize(), w_o, between.w)
-        };
-        self.ks().map(term).sum::<Vec3>() / self.threads.count as f32
+    fn threads_following_view(&self, surface: &Surface, rows: &Rows) -> Vec3 {
+        let w_o = Vec3::new(rows.theta_o.sin(), 0.0, rows.theta_o.cos());
+        let mut sum = WeightedSum::default();
+        for k in self.partition() {
+            let between = self.thread(rows.below, k).lerp(self.thread(rows.above, k), rows.t);
+            self.add_term(&mut sum, surface.frame, between.truncate().normalize(), w_o, between.w);
+        }
+        sum.weighted_mean()
     }
 
     fn threads_of_facing_view(&self, surface: &Surface, axis: Vec3) -> Vec3 {
         let frame = fixed_frame(surface.frame.z_axis, axis);
         let w_o = frame.transpose() * surface.w_o;
-        let term = |k| {
-            let facing = self.sample(0, k);
-            let h = (facing.truncate() + Vec3::Z).normalize();
+        let mut sum = WeightedSum::default();
+        for k in self.partition() {
+            let thread = self.thread(0, k);
+            let h = (thread.truncate() + Vec3::Z).normalize();
             let cos_theta_d = w_o.dot(h);
             let w_i = 2.0 * cos_theta_d * h - w_o;
-            match w_i.z > 0.0 {
-                true => self.paper_term(frame, w_i, w_o, facing.w + (h.z / cos_theta_d).log2()),
-                false => Vec3::ZERO,
+            if w_i.z > 0.0 {
+                self.add_term(&mut sum, frame, w_i, w_o, thread.w + (h.z / cos_theta_d).log2());
             }
-        };
-        self.ks().map(term).sum::<Vec3>() / self.threads.count as f32
+        }
+        sum.weighted_mean()
     }
 
     fn estimate(&self, surface: &Surface, axis: Vec3) -> Vec3 {
+        let rows = self.rows_at(surface.theta_o);
         let (from, to) = (FACING_DEG.to_radians(), TURNING_DEG.to_radians());
         let x = ((surface.theta_o - from) / (to - from)).clamp(0.0, 1.0);
         let following = x * x * (3.0 - 2.0 * x);
-        let mut sum = Vec3::ZERO;
+        let mut mean = Vec3::ZERO;
         if following > 0.0 {
-            sum += following * self.threads_following_view(surface);
+            mean += following * self.threads_following_view(surface, &rows);
         }
         if following < 1.0 {
-            sum += (1.0 - following) * self.threads_of_facing_view(surface, axis);
+            mean += (1.0 - following) * self.threads_of_facing_view(surface, axis);
         }
-        sum
+        let [below, above] = [rows.below, rows.above].map(|row| Vec3::from(self.threads.albedo[row]));
+        let share = self.partition().count() as f32 / self.threads.count as f32;
+        share * below.lerp(above, rows.t) * mean
     }
 }
 

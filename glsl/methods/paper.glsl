@@ -1,70 +1,113 @@
-// The paper's estimate, equation (2): L_o = 1/m sum over k of f(s_k, o) L_i(s_k) (n . s_k) / p(s_k).
-// Twin: paper in src/shading.rs.
+// The paper's estimate, equation (2), L_o = 1/m sum over k of f(s_k, o) L_i(s_k) (n . s_k) / p(s_k), divided by what it
+// gives in a white furnace and multiplied by what it should give there, the albedo. So no error of p, between rows
+// or in the proportion of colours, shows as a wrong brightness or tint.
+// Twin: Paper in src/shading.rs.
 
-// Row by row of theta_o, thread by thread: direction in the shading frame, and the logarithm to base 2 of its pdf in
-// 1/sr. Between rows the logarithm is nearer to the pdf than a linear blend, and it is what the level needs.
+// Row by row of theta_o: the row's albedo, then thread by thread the direction in the shading frame, and the logarithm
+// to base 2 of its pdf in 1/sr. Between rows the logarithm is nearer to the pdf than a linear blend, and it is what the
+// level needs.
 layout(set = 0, binding = 7, std430) readonly buffer Threads {
     vec4 threads[];
 };
 
-// One term of equation (2), but for 1/m; all directions in `frame`.
-vec3 paper_term(Material material, mat3 frame, vec3 w_i, vec3 w_o, float log2_p) {
+// The threads of a partition: first, first + stride, ...
+struct Partition {
+    uint first;
+    uint stride;
+};
+
+// Sums of f cos / p and of f cos / p times radiance over a partition.
+struct WeightedSum {
+    vec3 weight;
+    vec3 radiance;
+};
+
+// Adds one term of equation (2), but for 1/m; all directions in `frame`.
+void add_term(inout WeightedSum sum, Material material, mat3 frame, vec3 w_i, vec3 w_o, float log2_p) {
     ++lookups;
     vec3 direction = frame * w_i;
     float level = level_of(-log2(float(material.thread_count)) - log2_p, push.face_size, direction);
     vec3 radiance = textureLod(environment_pyramid, direction, level).rgb;
-    return brdf(material, w_i, w_o) * radiance * (w_i.z * exp2(-log2_p));
+    vec3 weight = brdf(material, w_i, w_o) * (w_i.z * exp2(-log2_p));
+    sum.weight += weight;
+    sum.radiance += weight * radiance;
+}
+
+// The mean radiance, weighted channel by channel; black where nothing is reflected.
+vec3 weighted_mean(WeightedSum sum) {
+    return mix(sum.radiance / sum.weight, vec3(0.0), lessThanEqual(sum.weight, vec3(0.0)));
+}
+
+// Where a view angle lies among the rows, which stand at multiples of 90 degrees / row_count. Beyond the last one the view
+// angle is held there.
+struct Rows {
+    uint below;
+    uint above;
+    float t;
+    float theta_o;
+};
+
+Rows rows_at(float theta_o, Material material) {
+    float row = min(theta_o * (float(material.row_count) / radians(90.0)), float(material.row_count - 1));
+    uint below = uint(row);
+    return Rows(below, min(below + 1, material.row_count - 1), row - float(below),
+                row * (radians(90.0) / float(material.row_count)));
+}
+
+uint row_start(Material material, uint row) {
+    return material.first_thread + row * (material.thread_count + 1);
 }
 
 // The threads as published: row and frame follow the view.
-vec3 threads_following_view(Surface surface, Material material, uint first, uint stride) {
-    uint m = material.thread_count;
-    // Rows stand at multiples of 90 degrees / row_count. Beyond the last one the view angle is held there.
-    float row = min(surface.theta_o * (float(material.row_count) / radians(90.0)), float(material.row_count - 1));
-    float theta_o = row * (radians(90.0) / float(material.row_count));
-    vec3 w_o = vec3(sin(theta_o), 0.0, cos(theta_o));
-    uint row_0 = uint(row);
-    uint row_1 = min(row_0 + 1, material.row_count - 1);
-    float t = row - float(row_0);
-    vec3 sum = vec3(0.0);
-    for (uint k = first; k < m; k += stride) {
-        vec4 sample_0 = threads[material.first_thread + row_0 * m + k];
-        vec4 sample_1 = threads[material.first_thread + row_1 * m + k];
-        vec4 between = mix(sample_0, sample_1, t);
-        sum += paper_term(material, surface.frame, normalize(between.xyz), w_o, between.w);
+vec3 threads_following_view(Surface surface, Material material, Rows rows, Partition share) {
+    vec3 w_o = vec3(sin(rows.theta_o), 0.0, cos(rows.theta_o));
+    uint below = row_start(material, rows.below) + 1;
+    uint above = row_start(material, rows.above) + 1;
+    WeightedSum sum = WeightedSum(vec3(0.0), vec3(0.0));
+    for (uint k = share.first; k < material.thread_count; k += share.stride) {
+        vec4 between = mix(threads[below + k], threads[above + k], rows.t);
+        add_term(sum, material, surface.frame, normalize(between.xyz), w_o, between.w);
     }
-    return sum / float(m);
+    return weighted_mean(sum);
 }
 
 // The threads of the first row, in a frame that does not turn, carried to this view along their half vectors: lobes stay
 // lobes, and p changes by the Jacobian 4 (w_o . h) of the reflection.
-vec3 threads_of_facing_view(Surface surface, Material material, uint first, uint stride) {
-    uint m = material.thread_count;
+vec3 threads_of_facing_view(Surface surface, Material material, Partition share) {
     mat3 frame = fixed_frame(surface.frame[2], to_environment(push.camera.right.xyz));
     vec3 w_o = surface.w_o * frame;
-    vec3 sum = vec3(0.0);
-    for (uint k = first; k < m; k += stride) {
-        vec4 facing = threads[material.first_thread + k];
-        vec3 h = normalize(facing.xyz + vec3(0.0, 0.0, 1.0));
+    uint facing = row_start(material, 0) + 1;
+    WeightedSum sum = WeightedSum(vec3(0.0), vec3(0.0));
+    for (uint k = share.first; k < material.thread_count; k += share.stride) {
+        vec4 thread = threads[facing + k];
+        vec3 h = normalize(thread.xyz + vec3(0.0, 0.0, 1.0));
         float cos_theta_d = dot(w_o, h);
         vec3 w_i = 2.0 * cos_theta_d * h - w_o;
         if (w_i.z > 0.0) {
-            sum += paper_term(material, frame, w_i, w_o, facing.w + log2(h.z / cos_theta_d));
+            add_term(sum, material, frame, w_i, w_o, thread.w + log2(h.z / cos_theta_d));
         }
     }
-    return sum / float(m);
+    return weighted_mean(sum);
 }
 
 // Where the normal faces the eye the shading frame turns once around within a few pixels, and the threads with it: their
 // error would show as a pinwheel. There the sum over threads that do not turn takes over.
 vec3 estimate(Surface surface, Material material, uint first, uint stride) {
+    if (first >= material.thread_count) {
+        return vec3(0.0);
+    }
+    Partition share = Partition(first, stride);
+    Rows rows = rows_at(surface.theta_o, material);
     float following = smoothstep(radians(FACING_DEG), radians(TURNING_DEG), surface.theta_o);
-    vec3 sum = vec3(0.0);
+    vec3 mean = vec3(0.0);
     if (following > 0.0) {
-        sum += following * threads_following_view(surface, material, first, stride);
+        mean += following * threads_following_view(surface, material, rows, share);
     }
     if (following < 1.0) {
-        sum += (1.0 - following) * threads_of_facing_view(surface, material, first, stride);
+        mean += (1.0 - following) * threads_of_facing_view(surface, material, share);
     }
-    return sum;
+    vec3 albedo = mix(threads[row_start(material, rows.below)], threads[row_start(material, rows.above)], rows.t).rgb;
+    // The partition's part of all threads.
+    float fraction = float((material.thread_count - first + stride - 1) / stride) / float(material.thread_count);
+    return fraction * albedo * mean;
 }

@@ -4,7 +4,7 @@ use crate::brdf::Brdf;
 use crate::environment::Pyramid;
 use crate::graph::{self, Access, BufferDesc, Image};
 use crate::method::Method;
-use crate::threads::ThreadTable;
+use crate::threads::{Sample, ThreadTable};
 use crate::vulkan::{
     self, Bindings, Buffer, ComputePipeline, Device, Groups, ImageKind, ImageShape, PipelineCache, Sampler, SamplerKind,
 };
@@ -61,9 +61,11 @@ impl DeviceMaterials {
                 thread_count: table.count as u32,
                 row_count: table.rows as u32,
             });
-            threads.extend(
-                table.samples.iter().map(|sample| sample.direction().as_vec3().extend(sample.p.log2()).to_array()),
-            );
+            for (row, albedo) in table.albedo.iter().enumerate() {
+                threads.push([albedo[0], albedo[1], albedo[2], 0.0]);
+                let thread = |sample: &Sample| sample.direction().as_vec3().extend(sample.p.log2()).to_array();
+                threads.extend(table.row(row).iter().map(thread));
+            }
         }
         let storage = vk::BufferUsageFlags::STORAGE_BUFFER;
         Ok(Self {

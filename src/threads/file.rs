@@ -5,9 +5,10 @@
 //! | bytes | content |
 //! |---|---|
 //! | 8 | magic `THREADS\0` |
-//! | 4 | u32 format version, now 1 |
+//! | 4 | u32 format version, now 2 |
 //! | 4 | u32 length H of the header |
 //! | H | header, JSON: `method` ("paper"), `material`, `count`, `rows`, `seed` |
+//! | 12 rows | albedo of each row as three f32, linear Rec. 709 |
 //! | 12 rows count | samples as three f32 theta, phi (radians), p (1/sr); thread k of row r is sample r count + k |
 //! | 32 | BLAKE3 digest of everything before |
 //!
@@ -23,7 +24,7 @@ use super::{Sample, ThreadTable};
 use crate::error::{Error, Result};
 
 /// Version of the file format and of the threads in it: to be raised when either changes, since caches depend on it.
-pub const FORMAT_VERSION: u32 = 1;
+pub const FORMAT_VERSION: u32 = 2;
 
 const MAGIC: &[u8; 8] = b"THREADS\0";
 const DIGEST_BYTES: usize = blake3::OUT_LEN;
@@ -61,11 +62,9 @@ fn encode(table: &ThreadTable) -> Vec<u8> {
     bytes.extend(FORMAT_VERSION.to_le_bytes());
     bytes.extend((header.len() as u32).to_le_bytes());
     bytes.extend(header);
-    for sample in &table.samples {
-        for value in [sample.theta, sample.phi, sample.p] {
-            bytes.extend(value.to_le_bytes());
-        }
-    }
+    bytes.extend_from_slice(bytemuck::cast_slice(&to_little_endian(table.albedo.as_flattened())));
+    let samples = table.samples.iter().flat_map(|s| [s.theta, s.phi, s.p]).collect::<Vec<_>>();
+    bytes.extend_from_slice(bytemuck::cast_slice(&to_little_endian(&samples)));
     let digest = blake3::hash(&bytes);
     bytes.extend(digest.as_bytes());
     bytes
@@ -86,20 +85,29 @@ fn decode(bytes: &[u8]) -> Result<ThreadTable, String> {
     let (&length, rest) = rest.split_first_chunk().ok_or("is cut short")?;
     let (header, payload) = rest.split_at_checked(u32::from_le_bytes(length) as usize).ok_or("is cut short")?;
     let header: Header = serde_json::from_slice(header).map_err(|error| format!("has a bad header ({error})"))?;
-    let expected = header.count.checked_mul(header.rows).and_then(|samples| samples.checked_mul(12));
+    // Of three numbers each: a row's albedo, and its samples.
+    let expected = header.count.checked_add(1).and_then(|per_row| per_row.checked_mul(header.rows)?.checked_mul(12));
     if header.method != "paper" || header.count == 0 || header.rows == 0 || expected != Some(payload.len()) {
         return Err("has a header that does not fit its content".into());
     }
     let values = payload.as_chunks().0.iter().map(|&value| f32::from_le_bytes(value)).collect::<Vec<f32>>();
-    let samples: Vec<Sample> = values.as_chunks().0.iter().map(|&[theta, phi, p]| Sample { theta, phi, p }).collect();
+    let (albedo, samples) = values.as_chunks().0.split_at(header.rows);
+    let samples: Vec<Sample> = samples.iter().map(|&[theta, phi, p]| Sample { theta, phi, p }).collect();
     // A foreign writer can get the checksum right and a number wrong.
     let is_usable =
         |s: &Sample| (0.0..FRAC_PI_2).contains(&s.theta) && s.phi.is_finite() && s.p > 0.0 && s.p.is_finite();
     if !samples.iter().all(is_usable) {
         return Err("holds a sample below the horizon or without a pdf".into());
     }
+    if !albedo.as_flattened().iter().all(|value| (0.0..=f32::MAX).contains(value)) {
+        return Err("holds an albedo that is none".into());
+    }
     let Header { material, count, rows, seed, .. } = header;
-    Ok(ThreadTable { rows, count, seed, material, samples })
+    Ok(ThreadTable { rows, count, seed, material, albedo: albedo.to_vec(), samples })
+}
+
+fn to_little_endian(values: &[f32]) -> Vec<[u8; 4]> {
+    values.iter().map(|value| value.to_le_bytes()).collect()
 }
 
 #[cfg(test)]
@@ -108,7 +116,7 @@ mod tests {
 
     fn table() -> ThreadTable {
         let samples = (0..6).map(|i| Sample { theta: 0.2 * i as f32, phi: i as f32 - 3.0, p: 0.5 }).collect();
-        ThreadTable { rows: 3, count: 2, seed: 9, material: "a \"name\"".into(), samples }
+        ThreadTable { rows: 3, count: 2, seed: 9, material: "a \"name\"".into(), albedo: vec![[0.5; 3]; 3], samples }
     }
 
     #[test]

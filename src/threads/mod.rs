@@ -9,13 +9,11 @@
 //! | 3.2.3, peaks | [`peaks`] |
 //! | the whole | [`generate()`] |
 //!
-//! Two corrections that the paper does not have are [`shares`] and [`calibration`]; each says why it is there.
 use std::f64::consts::FRAC_PI_2;
 
 use glam::{DVec3, dvec3};
 
 mod cache;
-pub mod calibration;
 pub mod cones;
 mod file;
 pub mod forces;
@@ -111,6 +109,8 @@ pub struct ThreadTable {
     pub seed: u64,
     /// Name of the material, for people.
     pub material: String,
+    /// Directional albedo of each row, linear Rec. 709: the integral of f cos that equation (4) divides by.
+    pub albedo: Vec<[f32; 3]>,
     /// Row by row: thread k of row r is `samples[r * count + k]`.
     pub samples: Vec<Sample>,
 }
