@@ -20,7 +20,6 @@ pub mod forces;
 mod generate;
 pub mod peaks;
 mod plot;
-pub mod shares;
 pub mod slice;
 pub mod smoothing;
 #[cfg(test)]
