@@ -44,7 +44,9 @@ impl Mesh {
     /// faces that share the position takes its place, weighted by their angles there. Degenerate triangles are dropped.
     pub fn load(path: &Path) -> Result<Self> {
         if path.extension().is_none_or(|extension| !extension.eq_ignore_ascii_case("obj")) {
-            return Err(Error::in_file(path, "is no known kind of mesh", "give a Wavefront .obj file"));
+            let names = builtin_names().join(", ");
+            let remedy = format!("give a Wavefront .obj file, or a built-in: {names}");
+            return Err(Error::in_file(path, "is no known kind of mesh", remedy));
         }
         let bytes = std::fs::read(path).map_err(|cause| Error::unreadable(path, cause))?;
         // Names in old files are in any encoding; the numbers are ASCII in all of them.
