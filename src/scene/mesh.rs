@@ -53,11 +53,11 @@ impl Mesh {
         let obj = read_obj(&String::from_utf8_lossy(&bytes))
             .map_err(|problem| Error::in_file(path, problem, "repair or export it again"))?;
         let (mesh, dropped) = clean(&obj);
-        if dropped > 0 {
-            tracing::warn!("{}: dropped {dropped} degenerate triangles", path.display());
-        }
         if mesh.indices.is_empty() {
             return Err(Error::in_file(path, "has no triangle with an area", "give a mesh with faces"));
+        }
+        if dropped > 0 {
+            tracing::warn!("{}: dropped {dropped} degenerate triangles", path.display());
         }
         tracing::debug!("{}: {} triangles, {} vertices", path.display(), mesh.indices.len() / 3, mesh.positions.len());
         Ok(mesh)
