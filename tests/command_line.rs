@@ -8,7 +8,18 @@ use std::path::Path;
 use tempfile::TempDir;
 use threadlight::output::{Picture, read_image};
 
-const SIZE: &str = "--size 96x72 --threads 8";
+/// What makes a render quick: few pixels, few threads, and an environment that takes no time.
+const SMALL: &str = "--size 96x72 --threads 8 --environment map.hdr";
+
+/// A folder with a small environment in it, `map.hdr`: different in all directions.
+fn workplace() -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let mut map = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 8 +X 16\n".to_vec();
+    // Mantissas between 100 and 255; exponent 128 stands for 2^0 / 256.
+    map.extend((0..128_u32).flat_map(|i| [100 + i as u8, 200 - (i * i % 97) as u8, 100 + (i * 7 % 101) as u8, 128]));
+    fs::write(folder.path().join("map.hdr"), map).unwrap();
+    folder
+}
 
 /// The program in `folder`, with its cache there and `arguments` separated by spaces.
 fn threadlight(folder: &TempDir, arguments: &str) -> Command {
@@ -58,8 +69,8 @@ fn printed(command: &mut Command) -> String {
 
 #[test]
 fn the_built_in_scene_renders_without_validation_messages_and_with_sane_statistics() {
-    let folder = tempfile::tempdir().unwrap();
-    let said = printed(&mut render(&folder, &format!("{SIZE} --repeat 3 --stats stats.json -o image.png")));
+    let folder = workplace();
+    let said = printed(&mut render(&folder, &"--size 96x72 --threads 8 --repeat 3 --stats stats.json -o image.png"));
     assert!(said.is_empty(), "{said}");
 
     let image = picture(&folder, "image.png");
@@ -105,10 +116,10 @@ fn the_built_in_scene_renders_without_validation_messages_and_with_sane_statisti
 
 #[test]
 fn the_same_command_gives_the_same_picture_with_any_state_of_the_cache() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = workplace();
     for (name, flags) in [("cold", ""), ("warm", ""), ("none", "--no-cache")] {
         for kind in ["png", "exr"] {
-            printed(&mut render(&folder, &format!("{SIZE} {flags} -o {name}.{kind}")));
+            printed(&mut render(&folder, &format!("{SMALL} {flags} -o {name}.{kind}")));
         }
     }
     for name in ["warm", "none"] {
@@ -117,21 +128,21 @@ fn the_same_command_gives_the_same_picture_with_any_state_of_the_cache() {
         assert!(cold.rgba.iter().flatten().all(|value| value.is_finite()));
         assert!(cold.rgba == other.rgba, "{name}");
     }
-    printed(&mut render(&folder, &format!("{SIZE} --seed 7 -o seed.exr")));
+    printed(&mut render(&folder, &format!("{SMALL} --seed 7 -o seed.exr")));
     assert!(picture(&folder, "cold.exr").rgba != picture(&folder, "seed.exr").rgba, "the seed has no effect");
 }
 
 #[test]
 fn no_cache_leaves_no_cache() {
-    let folder = tempfile::tempdir().unwrap();
-    printed(&mut render(&folder, &format!("{SIZE} --no-cache -o image.png")));
+    let folder = workplace();
+    printed(&mut render(&folder, &format!("{SMALL} --no-cache -o image.png")));
     assert!(!cache(&folder).exists());
 }
 
 #[test]
 fn threads_are_cached_and_damage_is_repaired() {
-    let folder = tempfile::tempdir().unwrap();
-    let run = |name: &str| render(&folder, &format!("{SIZE} --stats {name}.json -o {name}.png")).output().unwrap();
+    let folder = workplace();
+    let run = |name: &str| render(&folder, &format!("{SMALL} --stats {name}.json -o {name}.png")).output().unwrap();
     let state = |name: &str| stats(&folder, &format!("{name}.json"))["thread_cache"].as_str().unwrap().to_owned();
     run("first");
     run("second");
@@ -158,17 +169,14 @@ fn threads_are_cached_and_damage_is_repaired() {
 
 #[test]
 fn the_exr_header_tells_how_the_picture_was_made() {
-    let folder = tempfile::tempdir().unwrap();
-    printed(&mut render(
-        &folder,
-        &format!("{SIZE} --material silver --environment sky --stats stats.json -o image.exr"),
-    ));
+    let folder = workplace();
+    printed(&mut render(&folder, &format!("{SMALL} --material silver --stats stats.json -o image.exr")));
     let (attributes, stats) = (picture(&folder, "image.exr").attributes, stats(&folder, "stats.json"));
     for (name, value) in [
         ("method", "paper"),
         ("threads", "8"),
         ("material", "silver"),
-        ("environment", "sky"),
+        ("environment", "map.hdr"),
         ("device", stats["device"].as_str().unwrap()),
         ("threadlight_version", env!("CARGO_PKG_VERSION")),
     ] {
@@ -180,9 +188,9 @@ fn the_exr_header_tells_how_the_picture_was_made() {
 
 #[test]
 fn without_a_background_the_picture_is_transparent_past_the_objects() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = workplace();
     for name in ["image.png", "image.exr"] {
-        printed(&mut render(&folder, &format!("{SIZE} --background none -o {name}")));
+        printed(&mut render(&folder, &format!("{SMALL} --background none -o {name}")));
         let image = picture(&folder, name);
         assert!(image.alpha);
         assert_eq!(at(&image, 0, 0), [0.0; 4], "{name}");
@@ -240,7 +248,7 @@ fn write_two_spheres(folder: &TempDir) {
 
 #[test]
 fn a_scene_file_with_two_objects_and_two_materials_renders() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = workplace();
     write_two_spheres(&folder);
     printed(&mut render(&folder, "scene/scene.toml -o image.exr --stats stats.json"));
     let image = picture(&folder, "image.exr");
@@ -258,13 +266,13 @@ fn a_scene_file_with_two_objects_and_two_materials_renders() {
 
 #[test]
 fn flags_override_the_scene_file() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = workplace();
     write_two_spheres(&folder);
-    let flags = "--size 40x20 --threads 8 --subpixels 1 --material clay --environment studio --background environment";
+    let flags = "--size 40x20 --threads 8 --subpixels 1 --material clay --environment map.hdr --background environment";
     printed(&mut render(&folder, &format!("scene/scene.toml {flags} -o image.exr --stats stats.json")));
     let (image, stats) = (picture(&folder, "image.exr"), stats(&folder, "stats.json"));
     assert_eq!((image.width, image.height, image.alpha), (40, 20, false));
-    assert_eq!((image.attributes["material"].as_str(), image.attributes["environment"].as_str()), ("clay", "studio"));
+    assert_eq!((image.attributes["material"].as_str(), image.attributes["environment"].as_str()), ("clay", "map.hdr"));
     assert_eq!((stats["threads"].as_u64(), stats["subpixels"].as_u64()), (Some(8), Some(1)));
     // Both objects are still there, and a mesh takes the place of both.
     let covered = stats["covered_subpixels"].as_u64().unwrap();
@@ -280,9 +288,9 @@ fn flags_override_the_scene_file() {
 
 #[test]
 fn the_environment_turns_with_the_rotation() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = workplace();
     for (name, flags) in [("0", ""), ("360", "--rotation 360"), ("90", "--rotation 90"), ("minus", "--rotation -270")] {
-        printed(&mut render(&folder, &format!("{SIZE} {flags} -o {name}.exr")));
+        printed(&mut render(&folder, &format!("{SMALL} {flags} -o {name}.exr")));
     }
     let difference = |a: &str, b: &str| {
         let (a, b) = (picture(&folder, &format!("{a}.exr")), picture(&folder, &format!("{b}.exr")));
@@ -295,35 +303,35 @@ fn the_environment_turns_with_the_rotation() {
 
 #[test]
 fn the_plan_lists_passes_and_what_was_culled() {
-    let folder = tempfile::tempdir().unwrap();
-    let linear = printed(&mut render(&folder, &format!("{SIZE} --print-plan -o image.exr")));
+    let folder = workplace();
+    let linear = printed(&mut render(&folder, &format!("{SMALL} --print-plan -o image.exr")));
     let (passes, rest) = linear.split_once("\nculled\n").expect("something is culled for an EXR");
     for pass in ["geometry_cache", "classify", "shade", "background", "read_radiance"] {
         assert!(passes.contains(&format!("  {pass}\n")), "{linear}");
     }
     assert!(rest.trim_start().starts_with("tone_map ") && rest.contains("aliasing"), "{linear}");
     // With nothing to write but the plan.
-    let display = printed(&mut render(&folder, &format!("{SIZE} --print-plan --background none")));
+    let display = printed(&mut render(&folder, &format!("{SMALL} --print-plan --background none")));
     assert!(display.contains("  tone_map\n") && !display.contains("background"), "{display}");
 }
 
 #[test]
 fn the_cpu_driver_answers_to_its_name() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = workplace();
     if !printed(&mut threadlight(&folder, "devices")).contains("llvmpipe") {
         return println!("skipped: this machine has no lavapipe");
     }
     for device in ["lavapipe", "llvmpipe", "LLVMPIPE"] {
-        printed(&mut threadlight(&folder, &format!("render {SIZE} --validate --device {device} -o {device}.png")));
+        printed(&mut threadlight(&folder, &format!("render {SMALL} --validate --device {device} -o {device}.png")));
         assert!(bytes(&folder, "lavapipe.png") == bytes(&folder, &format!("{device}.png")), "{device}");
     }
 }
 
 #[test]
 fn a_machine_without_a_driver_is_told_what_to_install() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = workplace();
     let absent = folder.path().join("absent.json");
-    let mut command = threadlight(&folder, &format!("render {SIZE} -o image.png"));
+    let mut command = threadlight(&folder, &format!("render {SMALL} -o image.png"));
     let output = command.env("VK_DRIVER_FILES", &absent).env("VK_ICD_FILENAMES", &absent).output().unwrap();
     let reason = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(1), "{reason}");
@@ -333,7 +341,7 @@ fn a_machine_without_a_driver_is_told_what_to_install() {
 
 #[test]
 fn threads_are_written_and_read_back_the_same() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = workplace();
     for name in ["a.threads", "b.threads"] {
         threadlight(&folder, &format!("threads gold --count 4 --seed 3 --no-cache -o {name}")).assert().success();
     }
@@ -344,7 +352,7 @@ fn threads_are_written_and_read_back_the_same() {
 
 #[test]
 fn what_can_be_named_is_listed() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = workplace();
     let list = printed(&mut threadlight(&folder, "materials"));
     for name in ["gold", "conductor", "lambert", "studio", "sphere", "paper", ".binary", ".hdr", ".obj"] {
         assert!(list.contains(name), "{name} is not in\n{list}");
@@ -353,7 +361,7 @@ fn what_can_be_named_is_listed() {
 
 #[test]
 fn every_subcommand_has_help() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = workplace();
     let help = printed(&mut threadlight(&folder, "--help"));
     for subcommand in ["render", "threads", "materials", "devices", "completions"] {
         assert!(help.contains(&format!("\n  {subcommand} ")), "{help}");
@@ -390,7 +398,7 @@ fn every_subcommand_has_help() {
 
 #[test]
 fn shells_get_their_completions() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = workplace();
     for shell in ["bash", "zsh", "fish"] {
         let script = printed(&mut threadlight(&folder, &format!("completions {shell}")));
         assert!(script.contains("print-plan") && script.contains("threadlight"), "{shell}");
@@ -400,7 +408,7 @@ fn shells_get_their_completions() {
 #[test]
 fn a_reader_that_has_seen_enough_is_no_error() {
     use std::process::{Command, Stdio};
-    let folder = tempfile::tempdir().unwrap();
+    let folder = workplace();
     for arguments in [&["completions", "bash"][..], &["materials"], &["devices"]] {
         let mut command = Command::new(env!("CARGO_BIN_EXE_threadlight"));
         let mut child = command.args(arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
@@ -414,12 +422,12 @@ fn a_reader_that_has_seen_enough_is_no_error() {
 
 #[test]
 fn pictures_replace_older_ones_whole_and_leave_nothing_beside_them() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = workplace();
     fs::write(folder.path().join("image.png"), "older").unwrap();
-    printed(&mut render(&folder, &format!("{SIZE} --no-cache --stats stats.json -o image.png")));
+    printed(&mut render(&folder, &format!("{SMALL} --no-cache --stats stats.json -o image.png")));
     assert_eq!(picture(&folder, "image.png").width, 96);
     let mut files: Vec<_> =
         fs::read_dir(Path::new(folder.path())).unwrap().map(|entry| entry.unwrap().file_name()).collect();
     files.sort();
-    assert_eq!(files, ["image.png", "stats.json"]);
+    assert_eq!(files, ["image.png", "map.hdr", "stats.json"]);
 }
