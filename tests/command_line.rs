@@ -70,7 +70,7 @@ fn printed(command: &mut Command) -> String {
 #[test]
 fn the_built_in_scene_renders_without_validation_messages_and_with_sane_statistics() {
     let folder = workplace();
-    let said = printed(&mut render(&folder, &"--size 96x72 --threads 8 --repeat 3 --stats stats.json -o image.png"));
+    let said = printed(&mut render(&folder, "--size 96x72 --threads 8 --repeat 3 --stats stats.json -o image.png"));
     assert!(said.is_empty(), "{said}");
 
     let image = picture(&folder, "image.png");

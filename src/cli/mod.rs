@@ -37,7 +37,7 @@ pub struct Arguments {
 
 #[derive(Subcommand)]
 enum Command {
-    Render(render::Render),
+    Render(Box<render::Render>),
     Threads(threads::Threads),
     Materials(materials::Materials),
     Devices(devices::Devices),
@@ -61,7 +61,8 @@ impl Arguments {
 pub fn mistake(error: &clap::Error) -> String {
     let text = error.to_string();
     let paragraphs = text.trim_start_matches("error: ").split("\n\n");
-    let of_use = paragraphs.filter(|paragraph| !["Usage:", "For more"].iter().any(|start| paragraph.starts_with(start)));
+    let of_use =
+        paragraphs.filter(|paragraph| !["Usage:", "For more"].iter().any(|start| paragraph.starts_with(start)));
     let lines = of_use.map(|paragraph| paragraph.split_whitespace().collect::<Vec<_>>().join(" "));
     lines.collect::<Vec<_>>().join("; ") + "; see --help"
 }

@@ -356,6 +356,74 @@ mod tests {
     }
 
     #[test]
+    fn no_mixture_of_hostile_words_panics_or_gives_a_mesh_that_cannot_be_drawn() {
+        const WORDS: &[&str] = &[
+            "\nv",
+            "\nvn",
+            "\nvt",
+            "\nf",
+            "\nf 1 2 3",
+            "\nv 0 0",
+            "\nl",
+            "\np",
+            "\no",
+            "\ng a",
+            "\nusemtl",
+            "\nmtllib",
+            "#",
+            "",
+            "0",
+            "1",
+            "2",
+            "3",
+            "-1",
+            "-2",
+            "0.5",
+            "1e30",
+            "1e-40",
+            "nan",
+            "inf",
+            "x",
+            "\u{e9}",
+            "1//1",
+            "2//1",
+            "3//1",
+            "1/1/1",
+            "3/2/-1",
+            "2//",
+            "//",
+            "/",
+            "1/2/3/4",
+            "4294967297",
+            "9223372036854775807",
+            "-9223372036854775808",
+            "18446744073709551616",
+            "1//6148914691236517206",
+            "1//-6148914691236517206",
+            "1/9223372036854775807/1",
+        ];
+        // Knuth's MMIX generator; its high bits are the good ones.
+        let mut state = 1_u64;
+        let mut next = || {
+            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            WORDS[(state >> 33) as usize % WORDS.len()]
+        };
+        let mut meshes = 0;
+        for _ in 0..20_000 {
+            let mut text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nf 1//1 2 3".to_owned();
+            (0..8).for_each(|_| text.extend([" ", next()]));
+            let Ok(obj) = read_obj(&text) else { continue };
+            let (mesh, _) = clean(&obj);
+            meshes += 1;
+            assert!(mesh.positions.iter().all(|position| position.is_finite()), "{text}");
+            assert!(mesh.normals.len() == mesh.positions.len() && mesh.indices.len() % 3 == 0, "{text}");
+            assert!(mesh.normals.iter().all(|normal| normal.is_normalized()), "{text}");
+            assert!(mesh.indices.iter().all(|&index| (index as usize) < mesh.positions.len()), "{text}");
+        }
+        assert!(meshes > 1000, "{meshes}");
+    }
+
+    #[test]
     fn the_dragon_loads() {
         let data = std::env::var("THREADLIGHT_DATA").unwrap_or("../shared/data".into());
         let path = Path::new(&data).join("mesh/dragon_100k.obj");
