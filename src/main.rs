@@ -1,7 +1,7 @@
 //! Threadlight's command line: parse, call, exit code.
 //!
 //! Exit codes: 0 done; 1 the machine could not (Vulkan, memory, validation messages); 2 the input was wrong;
-//! 130 cancelled by Ctrl-C.
+//! 130 cancelled by Ctrl-C. Whatever went wrong is one line on standard error.
 
 mod cli;
 
@@ -11,15 +11,33 @@ use threadlight::Error;
 use threadlight::vulkan::VulkanError;
 
 fn main() -> ExitCode {
-    let arguments = cli::Arguments::parse();
+    let arguments = match cli::Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        Err(error) if is_mistake(&error) => return fail(2, &cli::mistake(&error)),
+        Err(help_or_version) => help_or_version.exit(),
+    };
     cli::start_logging(arguments.verbose);
     match arguments.run() {
         Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("threadlight: {error:#}");
-            ExitCode::from(exit_code(&error))
-        }
+        // Whoever reads our output has seen enough of it, such as `head`.
+        Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
+        Err(error) => fail(exit_code(&error), &format!("{error:#}")),
     }
+}
+
+/// Says on one line what went wrong.
+fn fail(code: u8, problem: &str) -> ExitCode {
+    eprintln!("threadlight: {}", problem.replace('\n', " "));
+    ExitCode::from(code)
+}
+
+/// Whether clap means an error, rather than help or the version that was asked for.
+fn is_mistake(error: &clap::Error) -> bool {
+    error.use_stderr() && error.kind() != clap::error::ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand
+}
+
+fn is_broken_pipe(error: &anyhow::Error) -> bool {
+    error.downcast_ref::<std::io::Error>().is_some_and(|cause| cause.kind() == std::io::ErrorKind::BrokenPipe)
 }
 
 fn exit_code(error: &anyhow::Error) -> u8 {

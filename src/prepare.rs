@@ -93,10 +93,20 @@ pub fn prepare(scene: &Scene, cache: Option<&Path>, observer: &dyn Observer) -> 
     }
     let environment = scene.environment.load()?;
     let image = &scene.image;
-    let camera = scene.camera.unwrap_or_else(|| {
-        let (center, radius) = bounding_sphere(&meshes, &objects);
-        Camera::framing(center, radius, image.aspect())
-    });
+    for object in &objects {
+        check_size(&meshes[object.mesh].0, world_sphere(&meshes, object))?;
+    }
+    let camera = match scene.camera {
+        Some(camera) => camera,
+        None => {
+            let (center, radius) = bounding_sphere(&meshes, &objects);
+            let camera = Camera::framing(center, radius, image.aspect());
+            camera.validate().map_err(|problem| {
+                Error::input("[camera]", format!("cannot be chosen: {problem}"), "give eye and target in the scene file")
+            })?;
+            camera
+        }
+    };
     let view = View {
         camera,
         width: image.width,
@@ -141,15 +151,31 @@ pub fn prepare(scene: &Scene, cache: Option<&Path>, observer: &dyn Observer) -> 
     })
 }
 
+/// Centre and radius of a sphere in world space that holds `object`.
+fn world_sphere(meshes: &[(String, Mesh)], object: &Object) -> (DVec3, f64) {
+    let (center, radius) = meshes[object.mesh].1.bounding_sphere();
+    let m = object.to_world.matrix3;
+    let scale = m.x_axis.length().max(m.y_axis.length()).max(m.z_axis.length());
+    (object.to_world.transform_point3(center.as_dvec3()), f64::from(radius) * scale)
+}
+
+/// An error for objects so large, small or far off that single precision, in which the GPU computes, would not hold areas
+/// of their triangles.
+fn check_size(mesh: &str, (center, radius): (DVec3, f64)) -> Result<()> {
+    const SMALLEST: f64 = 1e-9;
+    const LARGEST: f64 = 1e9;
+    let remedy = format!("scale and place it such that both are from {SMALLEST:e} to {LARGEST:e}");
+    let (reach, size) = (center.length() + radius, 2.0 * radius);
+    // Written so that a NaN fails too.
+    if size >= SMALLEST && reach <= LARGEST {
+        return Ok(());
+    }
+    Err(Error::input(mesh, format!("is {size:.2e} in size and reaches {reach:.2e} from the origin"), remedy))
+}
+
 /// A sphere around the bounding spheres of all objects: centre of their box, and the radius that reaches the farthest.
 fn bounding_sphere(meshes: &[(String, Mesh)], objects: &[Object]) -> (DVec3, f64) {
-    let spheres = objects.iter().map(|object| {
-        let (center, radius) = meshes[object.mesh].1.bounding_sphere();
-        let m = object.to_world.matrix3;
-        let scale = m.x_axis.length().max(m.y_axis.length()).max(m.z_axis.length());
-        (object.to_world.transform_point3(center.as_dvec3()), f64::from(radius) * scale)
-    });
-    let spheres: Vec<_> = spheres.collect();
+    let spheres: Vec<_> = objects.iter().map(|object| world_sphere(meshes, object)).collect();
     let low = spheres.iter().fold(DVec3::INFINITY, |low, (center, radius)| low.min(*center - *radius));
     let high = spheres.iter().fold(DVec3::NEG_INFINITY, |high, (center, radius)| high.max(*center + *radius));
     let middle = (low + high) / 2.0;

@@ -1,5 +1,6 @@
 //! `threadlight completions`: scripts that teach a shell the command line.
 use clap::CommandFactory;
+use std::io::Write;
 
 /// Prints a completion script for a shell.
 #[derive(clap::Args)]
@@ -10,12 +11,9 @@ pub struct Completions {
 
 impl Completions {
     pub fn run(self) -> anyhow::Result<()> {
-        clap_complete::generate(
-            self.shell,
-            &mut super::Arguments::command(),
-            "threadlight",
-            &mut std::io::stdout().lock(),
-        );
-        Ok(())
+        // Not straight to standard output, as clap_complete panics where it cannot write.
+        let mut script = Vec::new();
+        clap_complete::generate(self.shell, &mut super::Arguments::command(), "threadlight", &mut script);
+        Ok(std::io::stdout().write_all(&script)?)
     }
 }

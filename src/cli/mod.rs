@@ -9,6 +9,7 @@ mod threads;
 
 use clap::{Parser, Subcommand};
 use std::io::IsTerminal;
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use threadlight::brdf::Brdf;
 use threadlight::scene::MaterialSource;
@@ -36,7 +37,7 @@ pub struct Arguments {
 
 #[derive(Subcommand)]
 enum Command {
-    Render(render::Render),
+    Render(Box<render::Render>),
     Threads(threads::Threads),
     Materials(materials::Materials),
     Devices(devices::Devices),
@@ -54,6 +55,16 @@ impl Arguments {
             Command::Completions(completions) => completions.run(),
         }
     }
+}
+
+/// What is wrong with the command line, on one line: clap's error and its tips, without the usage.
+pub fn mistake(error: &clap::Error) -> String {
+    let text = error.to_string();
+    let paragraphs = text.trim_start_matches("error: ").split("\n\n");
+    let of_use =
+        paragraphs.filter(|paragraph| !["Usage:", "For more"].iter().any(|start| paragraph.starts_with(start)));
+    let lines = of_use.map(|paragraph| paragraph.split_whitespace().collect::<Vec<_>>().join(" "));
+    lines.collect::<Vec<_>>().join("; ") + "; see --help"
 }
 
 /// Sends the library's log to standard error; RUST_LOG overrides the flag.
@@ -84,6 +95,11 @@ fn material_of(text: &str) -> MaterialSource {
 /// The folder that threads and pipelines are cached in; none with `--no-cache`.
 fn cache_folder(no_cache: bool) -> Option<PathBuf> {
     (!no_cache).then(threadlight::threads::default_directory).flatten()
+}
+
+/// Parses a number in `range`; the error is that it must be `what`.
+fn number(range: RangeInclusive<f64>, what: &'static str) -> impl Fn(&str) -> Result<f64, String> + Clone {
+    move |text| text.parse().ok().filter(|number| range.contains(number)).ok_or_else(|| format!("use {what}"))
 }
 
 /// The last part of a path, without its extension.

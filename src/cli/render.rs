@@ -1,13 +1,18 @@
 //! `threadlight render`: a picture of a scene.
 use super::progress::Progress;
-use super::{cache_folder, material_of};
+use super::{cache_folder, material_of, number};
 use anyhow::Context;
-use std::path::{Path, PathBuf};
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::value_parser;
+use std::io::Write;
+use std::path::PathBuf;
 use threadlight::output::{self, ExrHeader, Format};
 use threadlight::pipeline::{Renderer, Rendering, Wanted};
 use threadlight::prepare::{Prepared, prepare};
-use threadlight::scene::{Background, MaterialSettings, ObjectSettings, Scene, Source, mesh};
-use threadlight::threads::CacheState;
+use threadlight::scene::{
+    Background, EXPOSURE, GAMMA, MAX_SIZE_PX, MAX_SUBPIXELS, MaterialSettings, ObjectSettings, Scene, Source, mesh,
+};
+use threadlight::threads::{CacheState, MAX_COUNT};
 use threadlight::vulkan::{Device, Instance};
 use threadlight::{Error, environment};
 
@@ -21,7 +26,7 @@ Examples:
 
 /// Renders a scene to a PNG or EXR file. Flags override the scene file.
 #[derive(clap::Args)]
-#[command(after_help = EXAMPLES)]
+#[command(after_help = EXAMPLES, allow_negative_numbers = true)]
 pub struct Render {
     /// Scene file (TOML); without one, the built-in scene: a gold sphere in a studio.
     scene: Option<PathBuf>,
@@ -38,25 +43,25 @@ pub struct Render {
     #[arg(long, value_name = "NAME")]
     method: Option<String>,
     /// Sample threads per pixel, 1 to 1024.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=MAX_COUNT as i64))]
     threads: Option<u32>,
     /// Sub-pixels per axis, 1 to 4.
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", value_parser = value_parser!(u32).range(1..=i64::from(MAX_SUBPIXELS)))]
     subpixels: Option<u32>,
-    /// Size of the picture in pixels.
+    /// Size of the picture in pixels, each side 1 to 16384.
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     size: Option<(u32, u32)>,
     /// Factor on radiance before display.
-    #[arg(long, value_name = "X")]
+    #[arg(long, value_name = "X", value_parser = number(EXPOSURE, "a finite number that is not negative"))]
     exposure: Option<f64>,
     /// Display values are radiance to the power of 1/X.
-    #[arg(long, value_name = "X")]
+    #[arg(long, value_name = "X", value_parser = number(GAMMA, "a finite number above 0"))]
     gamma: Option<f64>,
     /// What is seen behind the objects.
-    #[arg(long, value_name = "environment|none")]
-    background: Option<String>,
+    #[arg(long, value_name = "environment|none", value_parser = background(), hide_possible_values = true)]
+    background: Option<Background>,
     /// Turns the environment about the vertical axis, counter-clockwise seen from above, in degrees.
-    #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
+    #[arg(long, value_name = "DEG", value_parser = number(f64::MIN..=f64::MAX, "a finite number"))]
     rotation: Option<f64>,
     /// Seed of everything random; the same seed gives the same bytes.
     #[arg(long, value_name = "N")]
@@ -68,7 +73,7 @@ pub struct Render {
     #[arg(long)]
     validate: bool,
     /// Render this often; times are medians.
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = value_parser!(u32).range(1..))]
     repeat: u32,
     /// Write times, counts and memory as JSON.
     #[arg(long, value_name = "FILE")]
@@ -122,9 +127,6 @@ impl Render {
             let remedy = "name a picture with -o FILE.png, or ask for --stats or --print-plan";
             return Err(Error::input("render", "has nothing to write", remedy).into());
         }
-        if self.repeat == 0 {
-            return Err(Error::input("--repeat 0", "renders nothing", "use 1 or more").into());
-        }
         // Whatever is wrong with the command is said before the work begins.
         let format = self.output.as_deref().map(Format::of).transpose()?;
         for path in self.output.iter().chain(&self.stats) {
@@ -150,7 +152,7 @@ impl Render {
         drop(device);
 
         if self.print_plan {
-            print!("{}", rendering.plan);
+            write!(std::io::stdout(), "{}", rendering.plan)?;
         }
         if let Some(path) = &self.output {
             let view = &prepared.view;
@@ -193,16 +195,6 @@ impl Render {
         if let Some(name) = &self.environment {
             scene.environment.source = Source::named(name, environment::builtin_names());
         }
-        if let Some(background) = &self.background {
-            scene.image.background = match background.as_str() {
-                "environment" => Background::Environment,
-                "none" => Background::None,
-                _ => {
-                    let subject = format!("--background {background}");
-                    return Err(Error::input(subject, "is not known", "use environment or none"));
-                }
-            };
-        }
         if let Some((width, height)) = self.size {
             (scene.image.width, scene.image.height) = (width, height);
         }
@@ -217,9 +209,8 @@ impl Render {
         lay(&self.subpixels, &mut scene.image.subpixels);
         lay(&self.exposure, &mut scene.image.exposure);
         lay(&self.gamma, &mut scene.image.gamma);
+        lay(&self.background, &mut scene.image.background);
         lay(&self.rotation, &mut scene.environment.rotation_deg);
-        // The flags get the same checks as the keys of a scene file, by being read as one.
-        Scene::parse(&scene.to_toml()?, Path::new(""))?;
         Ok(scene)
     }
 
@@ -268,6 +259,13 @@ fn stats<'a>(
 
 /// `640x480`.
 fn parse_size(text: &str) -> Result<(u32, u32), String> {
-    let sides = text.split_once(['x', 'X']).and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
-    sides.ok_or_else(|| "write width x height in pixels, such as 640x480".to_owned())
+    let side = |text: &str| text.parse().ok().filter(|side| (1..=MAX_SIZE_PX).contains(side));
+    let sides = text.split_once(['x', 'X']).and_then(|(width, height)| Some((side(width)?, side(height)?)));
+    sides.ok_or_else(|| format!("use width x height in pixels, each 1 to {MAX_SIZE_PX}, such as 640x480"))
+}
+
+/// `environment` or `none`.
+fn background() -> impl TypedValueParser<Value = Background> {
+    PossibleValuesParser::new(["environment", "none"])
+        .map(|name| if name == "none" { Background::None } else { Background::Environment })
 }

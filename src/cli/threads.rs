@@ -1,12 +1,13 @@
 //! `threadlight threads`: makes, writes and draws the sample threads of a material.
 use super::progress::Progress;
 use super::{cache_folder, material_of, stem};
+use clap::value_parser;
 use std::path::PathBuf;
 use threadlight::Error;
 use threadlight::output;
 use threadlight::prepare::load_material;
 use threadlight::scene::MaterialSource;
-use threadlight::threads::{self, CacheState, Settings};
+use threadlight::threads::{self, CacheState, MAX_COUNT, Settings};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -15,12 +16,12 @@ Examples:
 
 /// Makes the sample threads of a material; writes them to a file, or draws them on the hemisphere.
 #[derive(clap::Args)]
-#[command(after_help = EXAMPLES)]
+#[command(after_help = EXAMPLES, allow_negative_numbers = true)]
 pub struct Threads {
     /// A built-in name, a MERL .binary, or a .toml with a model and its parameters.
     material: String,
     /// Number of threads, 1 to 1024.
-    #[arg(long, value_name = "N", default_value_t = 100)]
+    #[arg(long, value_name = "N", default_value_t = 100, value_parser = value_parser!(u32).range(1..=MAX_COUNT as i64))]
     count: u32,
     /// Seed of everything random; the same seed gives the same bytes.
     #[arg(long, value_name = "N", default_value_t = 0)]

@@ -7,10 +7,11 @@ use serde::{Deserialize, Serialize};
 use toml::Spanned;
 
 use super::{
-    Camera, DEFAULT_MATERIAL, EnvironmentSettings, ImageSettings, MaterialSettings, MaterialSource, ObjectSettings,
-    Scene, ShadingSettings, Source,
+    Camera, DEFAULT_MATERIAL, EXPOSURE, EnvironmentSettings, GAMMA, ImageSettings, MAX_SIZE_PX, MAX_SUBPIXELS,
+    MaterialSettings, MaterialSource, ObjectSettings, Scene, ShadingSettings, Source,
 };
 use crate::error::{Error, Result};
+use crate::threads::MAX_COUNT;
 
 /// A whole scene file.
 #[derive(Deserialize)]
@@ -41,7 +42,7 @@ struct RawEnvironmentKeys {
     builtin: Option<String>,
     #[serde(default, deserialize_with = "finite")]
     rotation_deg: f64,
-    #[serde(default = "one", deserialize_with = "not_negative")]
+    #[serde(default = "one", deserialize_with = "intensity")]
     intensity: f64,
 }
 
@@ -231,27 +232,32 @@ fn integer<'de, D: Deserializer<'de>>(deserializer: D, range: std::ops::RangeInc
 
 /// Width or height of an image.
 pub(super) fn size_px<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u32, D::Error> {
-    integer(deserializer, 1..=16384)
+    integer(deserializer, 1..=MAX_SIZE_PX)
 }
 
 /// Sub-pixels along an axis.
 pub(super) fn subpixels<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u32, D::Error> {
-    integer(deserializer, 1..=4)
+    integer(deserializer, 1..=MAX_SUBPIXELS)
 }
 
 /// Number of threads.
 pub(super) fn threads<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u32, D::Error> {
-    integer(deserializer, 1..=1024)
+    integer(deserializer, 1..=MAX_COUNT as u32)
 }
 
-/// A finite number from 0.
-pub(super) fn not_negative<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
-    checked(deserializer, 0.0..=f64::MAX, "finite and not negative")
+/// Factor of radiance before display.
+pub(super) fn exposure<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    checked(deserializer, EXPOSURE, "finite and not negative")
 }
 
-/// A finite number above 0.
-pub(super) fn positive<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
-    checked(deserializer, f64::MIN_POSITIVE..=f64::MAX, "finite and above 0")
+/// Exponent of the display.
+pub(super) fn gamma<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    checked(deserializer, GAMMA, "finite and above 0")
+}
+
+/// Factor of the environment's radiance: shaders have it in single precision.
+fn intensity<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    checked(deserializer, 0.0..=f64::from(f32::MAX), "finite and not negative")
 }
 
 fn finite<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {

@@ -1,5 +1,6 @@
 //! Triangle meshes: read from OBJ and cleaned so that nothing degenerate reaches the rasteriser, or built in.
 use std::collections::HashMap;
+use std::fmt::Write;
 use std::path::Path;
 
 use glam::{DVec3, Vec3};
@@ -43,19 +44,20 @@ impl Mesh {
     /// faces that share the position takes its place, weighted by their angles there. Degenerate triangles are dropped.
     pub fn load(path: &Path) -> Result<Self> {
         if path.extension().is_none_or(|extension| !extension.eq_ignore_ascii_case("obj")) {
-            return Err(Error::in_file(path, "is no known kind of mesh", "give a Wavefront .obj file"));
+            let names = builtin_names().join(", ");
+            let remedy = format!("give a Wavefront .obj file, or a built-in: {names}");
+            return Err(Error::in_file(path, "is no known kind of mesh", remedy));
         }
         let bytes = std::fs::read(path).map_err(|cause| Error::unreadable(path, cause))?;
         // Names in old files are in any encoding; the numbers are ASCII in all of them.
-        let obj = Obj::parse(&String::from_utf8_lossy(&bytes)).map_err(|(line, problem)| {
-            Error::in_file(path, format!("line {line}: {problem}"), "repair or export it again")
-        })?;
-        let (mesh, dropped) = obj.into_mesh();
-        if dropped > 0 {
-            tracing::warn!("{}: dropped {dropped} degenerate triangles", path.display());
-        }
+        let obj = read_obj(&String::from_utf8_lossy(&bytes))
+            .map_err(|problem| Error::in_file(path, problem, "repair or export it again"))?;
+        let (mesh, dropped) = clean(&obj);
         if mesh.indices.is_empty() {
             return Err(Error::in_file(path, "has no triangle with an area", "give a mesh with faces"));
+        }
+        if dropped > 0 {
+            tracing::warn!("{}: dropped {dropped} degenerate triangles", path.display());
         }
         tracing::debug!("{}: {} triangles, {} vertices", path.display(), mesh.indices.len() / 3, mesh.positions.len());
         Ok(mesh)
@@ -110,112 +112,107 @@ fn cube_sphere(cells: usize) -> Mesh {
     mesh
 }
 
-/// What is of use in a Wavefront OBJ file.
+/// The triangles in the text of an OBJ, each corner with an index into the positions and one into the normals; a corner
+/// without a normal has one of length 0. The error is what is wrong.
+fn read_obj(text: &str) -> Result<tobj::Mesh, String> {
+    let options = tobj::LoadOptions { triangulate: true, ..Default::default() };
+    let no_materials = |_: &Path| Ok(Default::default());
+    let (models, _) = tobj::load_obj_buf(&mut geometry_lines(text)?.as_bytes(), &options, no_materials)
+        .map_err(|cause| format!("is not a sound OBJ: {cause}"))?;
+    // Without o, g and usemtl there is one model.
+    let mesh = models.into_iter().next().map(|model| model.mesh).unwrap_or_default();
+    match vectors(&mesh.positions).into_iter().find(|position| !position.is_finite()) {
+        Some(position) => Err(format!("has a vertex that is not finite, {position}")),
+        None => Ok(mesh),
+    }
+}
+
+/// The lines of an OBJ that are the mesh, such that tobj reads them right: of `v` the coordinates, `vn`, and `f` with its
+/// corners as `position//normal`.
 ///
-/// Read here rather than by a crate: the one that fits misplaces normals when some vertices lack them, overflows on absurd
-/// indices, refuses names that are not UTF-8, and cannot say which line is wrong.
-#[derive(Default)]
-struct Obj {
-    positions: Vec<Vec3>,
-    normals: Vec<Vec3>,
-    /// Of each triangle's corners: index of the position, and of the normal where there is one.
-    triangles: Vec<[(u32, Option<u32>); 3]>,
-}
-
-impl Obj {
-    /// Parses a whole file; an error is the number of the line and what is wrong there.
-    fn parse(text: &str) -> Result<Self, (usize, String)> {
-        let mut obj = Self::default();
-        for (index, line) in text.lines().enumerate() {
-            obj.parse_line(line).map_err(|problem| (index + 1, problem))?;
-        }
-        Ok(obj)
-    }
-
-    fn parse_line(&mut self, line: &str) -> Result<(), String> {
+/// The rest goes since tobj takes polylines (`l`) for faces, wants colours for all vertices or none, and begins a new mesh at
+/// every group and material, whose vertices then are no longer shared. Corners without a normal get one of length 0,
+/// the last in the file, as from tobj they would get that of the corner before. Indices of normals are checked here: unlike
+/// those of positions, tobj takes 0 for none, and multiplies absurd ones until they overflow.
+fn geometry_lines(text: &str) -> Result<String, String> {
+    let normals = text.lines().filter(|line| line.split_ascii_whitespace().next() == Some("vn")).count() as i64;
+    let (mut lines, mut normals_before) = (String::with_capacity(text.len()), 0);
+    for (index, line) in text.lines().enumerate() {
         let mut words = line.split_ascii_whitespace();
-        match words.next() {
-            Some("v") => {
-                let position = parse_vector(words)?;
-                if !position.is_finite() {
-                    return Err(format!("position {position} is not finite"));
-                }
-                self.positions.push(position);
+        let Some(keyword @ ("v" | "vn" | "f")) = words.next() else { continue };
+        lines += keyword;
+        normals_before += i64::from(keyword == "vn");
+        if keyword == "f" {
+            for word in words {
+                let mut numbers = word.split('/');
+                let position = numbers.next().unwrap_or_default();
+                let normal = match numbers.nth(1).unwrap_or_default() {
+                    "" => normals + 1,
+                    number => number
+                        .parse()
+                        .ok()
+                        .filter(|number| (1..=normals).contains(number) || (-normals_before..0).contains(number))
+                        .ok_or_else(|| format!("line {}: there is no normal {number}", index + 1))?,
+                };
+                // Writing to a string cannot fail.
+                let _ = write!(lines, " {position}//{normal}");
             }
-            Some("vn") => self.normals.push(parse_vector(words)?),
-            Some("f") => {
-                let corners = words.map(|word| self.parse_corner(word)).collect::<Result<Vec<_>, _>>()?;
-                let [first, rest @ ..] = &corners[..] else { return Err("a face has no vertices".into()) };
-                self.triangles.extend(rest.windows(2).map(|pair| [*first, pair[0], pair[1]]));
-            }
-            _ => {}
+        } else {
+            words.take(3).for_each(|word| lines.extend([" ", word]));
         }
-        Ok(())
+        lines.push('\n');
     }
-
-    /// A corner of a face: `v`, `v/vt`, `v//vn` or `v/vt/vn`; negative numbers count back from the latest.
-    fn parse_corner(&self, word: &str) -> Result<(u32, Option<u32>), String> {
-        let index = |number: &str, of: &str, count: usize| {
-            let number: i64 = number.parse().map_err(|_| format!("`{word}` is no vertex of a face"))?;
-            let index = if number < 0 { number.saturating_add_unsigned(count as u64) } else { number - 1 };
-            let found = u32::try_from(index).ok().filter(|&index| (index as usize) < count);
-            found.ok_or(format!("{of} {number} is out of range, there are {count} before this line"))
-        };
-        let mut numbers = word.split('/');
-        let position = index(numbers.next().unwrap_or_default(), "vertex", self.positions.len())?;
-        let normal = numbers.nth(1).filter(|number| !number.is_empty());
-        Ok((position, normal.map(|number| index(number, "normal", self.normals.len())).transpose()?))
-    }
-
-    /// Joins corners with the same position and normal into vertices; gives also the number of dropped triangles.
-    fn into_mesh(self) -> (Mesh, usize) {
-        // Normals that are none count as missing.
-        let normal_at = |index: u32| {
-            let normal = self.normals[index as usize].as_dvec3();
-            (normal.is_finite() && normal.length_squared() > 0.0).then(|| normal.normalize())
-        };
-        let mut mean_normals = vec![DVec3::ZERO; self.positions.len()];
-        let mut vertices = HashMap::new();
-        let (mut mesh, mut dropped, mut missing) = (Mesh::default(), 0, Vec::new());
-        for triangle in &self.triangles {
-            let [a, b, c] = triangle.map(|(position, _)| self.positions[position as usize].as_dvec3());
-            let area = (b - a).cross(c - a);
-            let longest = (b - a).length_squared().max((c - a).length_squared()).max((c - b).length_squared());
-            // A height of a millionth of the length is rounding of single precision, and the normal is noise.
-            if area.length() <= 1e-6 * longest {
-                dropped += 1;
-                continue;
-            }
-            let normal = area.normalize();
-            for ((position, _), [at, next, before]) in triangle.iter().zip([[a, b, c], [b, c, a], [c, a, b]]) {
-                mean_normals[*position as usize] += (next - at).angle_between(before - at) * normal;
-            }
-            for &(position, normal) in triangle {
-                let normal = normal.filter(|&normal| normal_at(normal).is_some());
-                let index = *vertices.entry((position, normal)).or_insert_with(|| {
-                    if normal.is_none() {
-                        missing.push((mesh.positions.len(), position));
-                    }
-                    mesh.positions.push(self.positions[position as usize]);
-                    mesh.normals.push(normal.and_then(normal_at).unwrap_or_default().as_vec3());
-                    mesh.positions.len() as u32 - 1
-                });
-                mesh.indices.push(index);
-            }
-        }
-        for (vertex, position) in missing {
-            // Faces back to back cancel: any direction is as good, as long as it is one.
-            mesh.normals[vertex] = mean_normals[position as usize].try_normalize().unwrap_or(DVec3::Y).as_vec3();
-        }
-        (mesh, dropped)
-    }
+    Ok(lines + "vn 0 0 0\n")
 }
 
-/// The first three numbers of a line.
-fn parse_vector<'a>(words: impl Iterator<Item = &'a str>) -> Result<Vec3, String> {
-    let mut numbers = words.map(|word| word.parse::<f32>().map_err(|_| format!("`{word}` is no number")));
-    let mut next = || numbers.next().unwrap_or(Err("three numbers are needed".into()));
-    Ok(Vec3::new(next()?, next()?, next()?))
+/// Joins corners with the same position and normal into vertices; gives also the number of dropped triangles.
+fn clean(obj: &tobj::Mesh) -> (Mesh, usize) {
+    let (positions, normals) = (vectors(&obj.positions), vectors(&obj.normals));
+    // Normals that are none count as missing.
+    let normal_at = |index: u32| {
+        let normal = normals[index as usize].as_dvec3();
+        (normal.is_finite() && normal.length_squared() > 0.0).then(|| normal.normalize())
+    };
+    let mut mean_normals = vec![DVec3::ZERO; positions.len()];
+    let mut vertices = HashMap::new();
+    let (mut mesh, mut dropped, mut missing) = (Mesh::default(), 0, Vec::new());
+    let triangles = obj.indices.as_chunks::<3>().0.iter().zip(obj.normal_indices.as_chunks::<3>().0);
+    for (triangle, triangle_normals) in triangles {
+        let [a, b, c] = triangle.map(|position| positions[position as usize].as_dvec3());
+        let area = (b - a).cross(c - a);
+        let longest = (b - a).length_squared().max((c - a).length_squared()).max((c - b).length_squared());
+        // A height of a millionth of the length is rounding of single precision, and the normal is noise.
+        if area.length() <= 1e-6 * longest {
+            dropped += 1;
+            continue;
+        }
+        let face_normal = area.normalize();
+        for (&position, [at, next, before]) in triangle.iter().zip([[a, b, c], [b, c, a], [c, a, b]]) {
+            mean_normals[position as usize] += (next - at).angle_between(before - at) * face_normal;
+        }
+        for (&position, &normal) in triangle.iter().zip(triangle_normals) {
+            let normal = normal_at(normal).map(|direction| (normal, direction));
+            let index = *vertices.entry((position, normal.map(|(index, _)| index))).or_insert_with(|| {
+                if normal.is_none() {
+                    missing.push((mesh.positions.len(), position));
+                }
+                mesh.positions.push(positions[position as usize]);
+                mesh.normals.push(normal.map(|(_, direction)| direction).unwrap_or_default().as_vec3());
+                mesh.positions.len() as u32 - 1
+            });
+            mesh.indices.push(index);
+        }
+    }
+    for (vertex, position) in missing {
+        // Faces back to back cancel: any direction is as good, as long as it is one.
+        mesh.normals[vertex] = mean_normals[position as usize].try_normalize().unwrap_or(DVec3::Y).as_vec3();
+    }
+    (mesh, dropped)
+}
+
+/// Every three numbers as a vector.
+fn vectors(numbers: &[f32]) -> Vec<Vec3> {
+    numbers.as_chunks().0.iter().map(|&vector| Vec3::from_array(vector)).collect()
 }
 
 #[cfg(test)]
@@ -306,36 +303,124 @@ mod tests {
 
     #[test]
     fn what_is_not_geometry_is_ignored_and_indices_may_be_relative() {
-        let mesh = load(b"# caf\xe9\nmtllib none.mtl\no a\nusemtl b\ns 1\nv 0 0 0 1 0 0\nv 1 0 0\r\nvt 0 0\nv 0 1 0\ng c\nl 1 2\nf -3/1 -2/1 -1/9\n").unwrap();
+        let mesh = load(b"# caf\xe9\nmtllib none.mtl\no a\nusemtl b\ns 1\nv 0 0 0 1 0 0\nv 1 0 0\r\nvt 0 0\nv 0 1 0\ng c\nl 1 2\nl 3 2 1\np 1\nf -3/1 -2/1 -1/9\n").unwrap();
         assert_eq!(mesh.indices, [0, 1, 2]);
         assert_eq!(mesh.normals, [Vec3::Z; 3]);
     }
 
     #[test]
-    fn hostile_files_are_errors_that_name_file_and_line() {
-        let triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
-        for (text, line, what) in [
-            (format!("{triangle}f 1 2 4"), "line 4", "vertex 4"),
-            (format!("{triangle}f 1 2 0"), "line 4", "vertex 0"),
-            (format!("{triangle}f 1 2 -4"), "line 4", "vertex -4"),
-            (format!("{triangle}f 1 2 -9223372036854775808"), "line 4", "out of range"),
-            (format!("{triangle}f 1//1 2 3"), "line 4", "normal 1"),
-            (format!("{triangle}f 1 2 99999999999999999999"), "line 4", "99999"),
-            (format!("{triangle}f"), "line 4", "no vertices"),
-            (format!("{triangle}v 1 2"), "line 4", "three numbers"),
-            (format!("{triangle}v 1 2 nan"), "line 4", "not finite"),
-            (format!("{triangle}v 1 2 1e99"), "line 4", "not finite"),
-            (format!("{triangle}v 1 2 x"), "line 4", "`x`"),
-            (format!("{triangle}f 1 1 1"), "test.obj", "no triangle"),
-            (triangle.into(), "test.obj", "no triangle"),
-            (String::new(), "test.obj", "no triangle"),
+    fn groups_and_materials_do_not_cut_the_mesh() {
+        let grouped = CUBE.replace("\nf 3", "\no lid\nusemtl red\nf 3");
+        assert_eq!(load(grouped).unwrap(), load(CUBE).unwrap());
+    }
+
+    #[test]
+    fn hostile_files_are_errors_that_name_the_file() {
+        let triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\n";
+        for (text, what) in [
+            (format!("{triangle}f 1 2 4"), "vertex index out of bounds"),
+            (format!("{triangle}f 1 2 0"), "vertex index out of bounds"),
+            (format!("{triangle}f 1 2 -4"), "vertex index out of bounds"),
+            (format!("{triangle}f 1 2 -9223372036854775808"), "vertex index out of bounds"),
+            (format!("{triangle}f 1 2 9223372036854775807"), "vertex index out of bounds"),
+            (format!("{triangle}f 1 2 4294967299"), "vertex index out of bounds"),
+            (format!("{triangle}f 1 2 //1"), "vertex index out of bounds"),
+            (format!("{triangle}f 9"), "vertex index out of bounds"),
+            (format!("{triangle}f 1 9"), "vertex index out of bounds"),
+            (format!("{triangle}f 1 2 99999999999999999999"), "face parse error"),
+            (format!("{triangle}f 1 2 x"), "face parse error"),
+            (format!("{triangle}f 1//1 2//2 3"), "line 5: there is no normal 2"),
+            (format!("{triangle}f 1//0 2 3"), "line 5: there is no normal 0"),
+            (format!("{triangle}f 1//-2 2 3\nvn 0 0 1"), "line 5: there is no normal -2"),
+            (format!("{triangle}f 1//-9223372036854775808 2 3"), "no normal -9223372036854775808"),
+            (format!("{triangle}f 1//99999999999999999999 2 3"), "no normal 99999999999999999999"),
+            (format!("{triangle}f 1/1/x 2 3"), "no normal x"),
+            (format!("{triangle}f"), "invalid polygon"),
+            (format!("{triangle}v 1 2"), "position parse error"),
+            (format!("{triangle}v 1 2 x"), "position parse error"),
+            (format!("{triangle}vn 1 2"), "normal parse error"),
+            (format!("{triangle}v 1 2 nan\nf 1 2 4"), "not finite"),
+            (format!("{triangle}v 1 2 1e99\nf 1 2 4"), "not finite"),
+            (format!("{triangle}f 1 1 1"), "no triangle"),
+            (format!("{triangle}f 1 2"), "no triangle"),
+            (format!("{triangle}l 1 2 3"), "no triangle"),
+            (triangle.into(), "no triangle"),
+            (String::new(), "no triangle"),
         ] {
             let error = load(&text).unwrap_err().to_string();
-            assert!(error.contains("test.obj") && error.contains(line) && error.contains(what), "{error}");
+            assert!(error.contains("test.obj") && error.contains(what) && !error.contains('\n'), "{text}: {error}");
         }
         assert!(Mesh::load(Path::new("missing.obj")).unwrap_err().to_string().contains("missing.obj"));
         assert!(Mesh::load(Path::new("mesh.ply")).unwrap_err().to_string().contains(".obj"));
         assert!(Mesh::builtin("cube").unwrap_err().to_string().contains("sphere"));
+    }
+
+    #[test]
+    fn no_mixture_of_hostile_words_panics_or_gives_a_mesh_that_cannot_be_drawn() {
+        const WORDS: &[&str] = &[
+            "\nv",
+            "\nvn",
+            "\nvt",
+            "\nf",
+            "\nf 1 2 3",
+            "\nv 0 0",
+            "\nl",
+            "\np",
+            "\no",
+            "\ng a",
+            "\nusemtl",
+            "\nmtllib",
+            "#",
+            "",
+            "0",
+            "1",
+            "2",
+            "3",
+            "-1",
+            "-2",
+            "0.5",
+            "1e30",
+            "1e-40",
+            "nan",
+            "inf",
+            "x",
+            "\u{e9}",
+            "1//1",
+            "2//1",
+            "3//1",
+            "1/1/1",
+            "3/2/-1",
+            "2//",
+            "//",
+            "/",
+            "1/2/3/4",
+            "4294967297",
+            "9223372036854775807",
+            "-9223372036854775808",
+            "18446744073709551616",
+            "1//6148914691236517206",
+            "1//-6148914691236517206",
+            "1/9223372036854775807/1",
+        ];
+        // Knuth's MMIX generator; its high bits are the good ones.
+        let mut state = 1_u64;
+        let mut next = || {
+            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            WORDS[(state >> 33) as usize % WORDS.len()]
+        };
+        let mut meshes = 0;
+        for _ in 0..20_000 {
+            let mut text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nf 1//1 2 3".to_owned();
+            (0..8).for_each(|_| text.extend([" ", next()]));
+            let Ok(obj) = read_obj(&text) else { continue };
+            let (mesh, _) = clean(&obj);
+            meshes += 1;
+            assert!(mesh.positions.iter().all(|position| position.is_finite()), "{text}");
+            assert!(mesh.normals.len() == mesh.positions.len() && mesh.indices.len() % 3 == 0, "{text}");
+            assert!(mesh.normals.iter().all(|normal| normal.is_normalized()), "{text}");
+            assert!(mesh.indices.iter().all(|&index| (index as usize) < mesh.positions.len()), "{text}");
+        }
+        assert!(meshes > 1000, "{meshes}");
     }
 
     #[test]

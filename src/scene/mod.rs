@@ -1,4 +1,5 @@
 //! What is rendered: image settings, camera, environment, materials and objects, as a scene file or flags name them.
+use std::ops::RangeInclusive;
 use std::path::PathBuf;
 
 use glam::{DMat3, DQuat, EulerRot, Mat4, Quat, Vec3};
@@ -20,6 +21,15 @@ pub const DEFAULT_MATERIAL: &str = "gold";
 pub const DEFAULT_ENVIRONMENT: &str = "studio";
 /// The shading method of a scene that names none.
 pub const DEFAULT_METHOD: &str = "paper";
+
+/// Most columns and most rows of an image.
+pub const MAX_SIZE_PX: u32 = 16384;
+/// Most sub-pixels along an axis of a pixel.
+pub const MAX_SUBPIXELS: u32 = 4;
+/// What the exposure may be: shaders have it in single precision.
+pub const EXPOSURE: RangeInclusive<f64> = 0.0..=f32::MAX as f64;
+/// What the gamma may be: shaders have it in single precision.
+pub const GAMMA: RangeInclusive<f64> = f32::MIN_POSITIVE as f64..=f32::MAX as f64;
 
 /// A scene, as yet only named: meshes, materials and environment are not loaded.
 #[derive(Clone, Debug, PartialEq)]
@@ -52,10 +62,10 @@ pub struct ImageSettings {
     #[serde(deserialize_with = "file::subpixels")]
     pub subpixels: u32,
     /// Display value = clamp(exposure L, 0, 1)^(1/gamma); not negative.
-    #[serde(deserialize_with = "file::not_negative")]
+    #[serde(deserialize_with = "file::exposure")]
     pub exposure: f64,
     /// See `exposure`; positive.
-    #[serde(deserialize_with = "file::positive")]
+    #[serde(deserialize_with = "file::gamma")]
     pub gamma: f64,
     /// What is seen past the objects.
     pub background: Background,

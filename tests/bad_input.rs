@@ -1,0 +1,334 @@
+//! Bad input: a reason on one line that names what is at fault, exit code 2, no panic and nothing written.
+use assert_cmd::Command;
+use std::fs;
+use std::path::Path;
+use tempfile::TempDir;
+
+/// Cells of a MERL table, and the bytes of its three planes.
+const MERL_CELLS: usize = 90 * 90 * 180;
+
+/// A folder of hostile files, with an empty folder `out` in it for what must not be written.
+fn workplace() -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    fs::create_dir(folder.path().join("out")).unwrap();
+    folder
+}
+
+/// Runs threadlight with `arguments` (separated by spaces) in `folder` and checks how it refuses: `names` are in the reason.
+fn refuses(folder: &TempDir, arguments: &str, names: &[&str]) {
+    let before = listing(folder.path());
+    let output = Command::new(env!("CARGO_BIN_EXE_threadlight"))
+        .current_dir(folder)
+        .env("THREADLIGHT_CACHE", folder.path().join("cache"))
+        .env_remove("RUST_LOG")
+        .args(arguments.split(' '))
+        .output()
+        .unwrap();
+    let said = format!("threadlight {arguments}\n{}", String::from_utf8_lossy(&output.stderr));
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert!(output.stdout.is_empty(), "{said}");
+    let reason = String::from_utf8(output.stderr).unwrap();
+    assert!(reason.starts_with("threadlight: ") && reason.ends_with('\n'), "{said}");
+    assert_eq!(reason.lines().count(), 1, "{said}");
+    assert!(!reason.contains("panicked"), "{said}");
+    for name in names {
+        assert!(reason.contains(name), "{said}does not name {name}");
+    }
+    assert_eq!(listing(folder.path()), before, "{said}");
+}
+
+/// Every file in `folder` and below, but for the cache, with its size.
+fn listing(folder: &Path) -> Vec<(String, u64)> {
+    let mut files = Vec::new();
+    for entry in fs::read_dir(folder).unwrap().map(Result::unwrap).filter(|entry| entry.file_name() != "cache") {
+        files.push((entry.path().display().to_string(), entry.metadata().unwrap().len()));
+        if entry.path().is_dir() {
+            files.extend(listing(&entry.path()));
+        }
+    }
+    files.sort();
+    files
+}
+
+/// `render` with `flags` and a picture to write.
+fn render(flags: &str) -> String {
+    format!("render --size 8x6 --threads 2 -o out/image.png {flags}")
+}
+
+#[test]
+fn numbers_out_of_range_name_the_flag_and_the_range() {
+    let folder = workplace();
+    for (flag, value, range) in [
+        ("--threads", "0", "1..=1024"),
+        ("--threads", "1025", "1..=1024"),
+        ("--threads", "-1", "1..=1024"),
+        ("--threads", "99999999999999999999", "--threads"),
+        ("--threads", "many", "--threads"),
+        ("--size", "0x0", "1 to 16384"),
+        ("--size", "640", "640x480"),
+        ("--size", "640x", "640x480"),
+        ("--size", "16385x1", "1 to 16384"),
+        ("--subpixels", "0", "1..=4"),
+        ("--subpixels", "5", "1..=4"),
+        ("--exposure", "NaN", "finite"),
+        ("--exposure", "inf", "finite"),
+        ("--exposure", "-1", "not negative"),
+        ("--gamma", "0", "above 0"),
+        ("--gamma", "nan", "finite"),
+        ("--rotation", "inf", "finite"),
+        ("--seed", "-1", "--seed"),
+        ("--repeat", "0", "0 is not in 1"),
+    ] {
+        refuses(&folder, &format!("render -o out/image.png {flag} {value}"), &[flag, value, range]);
+    }
+    refuses(&folder, "threads gold --count 0 -o out/gold.threads", &["--count", "1..=1024"]);
+    refuses(&folder, "threads gold --count 1025 -o out/gold.threads", &["--count", "1..=1024"]);
+    // More sub-pixels than an image of the device holds, though each flag is within its range.
+    refuses(&folder, "render --threads 2 --size 16384x1 --subpixels 4 -o out/image.png", &["65536 x 4", "--size"]);
+}
+
+#[test]
+fn unknown_names_are_told_with_the_known_ones() {
+    let folder = workplace();
+    refuses(&folder, &render("--material unobtainium"), &["unobtainium", "gold"]);
+    refuses(&folder, &render("--environment mars"), &["mars", "studio", ".hdr"]);
+    refuses(&folder, &render("--mesh cube"), &["cube", "sphere", ".obj"]);
+    refuses(&folder, &render("--method magic"), &["magic", "paper"]);
+    refuses(&folder, &render("--device abacus"), &["--device abacus", "name one of"]);
+    refuses(&folder, &render("--background black"), &["--background", "black", "environment, none"]);
+    refuses(&folder, "threads unobtainium -o out/a.threads", &["unobtainium", "gold"]);
+    refuses(&folder, "completions abacus", &["abacus", "bash"]);
+    refuses(&folder, "rendre", &["rendre", "render"]);
+    refuses(&folder, &render("--treads 4"), &["--treads", "--threads"]);
+}
+
+#[test]
+fn a_command_that_would_write_nothing_is_refused() {
+    let folder = workplace();
+    refuses(&folder, "render", &["-o"]);
+    refuses(&folder, "threads gold", &["-o"]);
+    refuses(&folder, "threads", &["<MATERIAL>"]);
+    refuses(&folder, "render -o", &["--output"]);
+}
+
+#[test]
+fn outputs_that_cannot_be_written_are_refused_before_any_work() {
+    let folder = workplace();
+    fs::create_dir(folder.path().join("folder.png")).unwrap();
+    fs::write(folder.path().join("file"), "").unwrap();
+    for (flags, name) in [
+        ("-o absent/image.png", "absent/image.png"),
+        ("-o folder.png", "folder.png"),
+        ("-o file/image.png", "file/image.png"),
+        ("-o out/image.jpg", "image.jpg"),
+        ("-o out/image", "out/image"),
+        ("-o out/image.png --stats absent/stats.json", "absent/stats.json"),
+        ("-o out/image.png --stats folder.png", "folder.png"),
+    ] {
+        refuses(&folder, &format!("render --threads 1 {flags}"), &[name]);
+    }
+    refuses(&folder, "threads gold -o absent/gold.threads", &["absent/gold.threads"]);
+    refuses(&folder, "threads gold -o out/gold.threads --plot absent/gold.png", &["absent/gold.png"]);
+    // Nothing was computed in vain.
+    assert!(!folder.path().join("cache").exists());
+}
+
+#[test]
+fn a_picture_from_before_survives_a_refusal() {
+    let folder = workplace();
+    fs::write(folder.path().join("out/image.png"), "precious").unwrap();
+    refuses(&folder, &render("--mesh missing.obj"), &["missing.obj"]);
+    assert_eq!(fs::read(folder.path().join("out/image.png")).unwrap(), b"precious");
+}
+
+#[test]
+fn hostile_meshes_are_refused() {
+    let folder = workplace();
+    let triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\n";
+    for (name, text) in [
+        ("empty.obj", String::new()),
+        ("no_faces.obj", triangle.into()),
+        ("line.obj", format!("{triangle}l 1 2 3\nf 1 2\n")),
+        ("flat.obj", format!("{triangle}f 1 1 2\n")),
+        ("beyond.obj", format!("{triangle}f 1 2 4\n")),
+        ("zero.obj", format!("{triangle}f 1 2 0\n")),
+        ("behind.obj", format!("{triangle}f 1 2 -4\n")),
+        ("absurd.obj", format!("{triangle}f 1 2 -9223372036854775808\n")),
+        ("endless.obj", format!("{triangle}f 1 2 99999999999999999999\n")),
+        ("normal.obj", format!("{triangle}f 1//1 2//1 3//2\n")),
+        ("absurd_normal.obj", format!("{triangle}f 1//1 2//1 3//9223372036854775807\n")),
+        ("nan.obj", format!("{triangle}v 1 nan 0\nf 1 2 4\n")),
+        ("infinite.obj", format!("{triangle}v 1 1e99 0\nf 1 2 4\n")),
+        ("short.obj", format!("{triangle}v 1 2\nf 1 2 3\n")),
+        ("words.obj", format!("{triangle}v one two three\nf 1 2 3\n")),
+        ("huge.obj", "v 1e38 1e38 0\nv -1e38 0 3e38\nv 0 1e38 1e38\nf 1 2 3\n".into()),
+        ("mesh.ply", "ply\n".into()),
+    ] {
+        fs::write(folder.path().join(name), text).unwrap();
+        refuses(&folder, &render(&format!("--mesh {name}")), &[name]);
+    }
+    fs::create_dir(folder.path().join("folder.obj")).unwrap();
+    fs::write(folder.path().join("noise.obj"), noise(4096)).unwrap();
+    for name in ["folder.obj", "missing.obj", "noise.obj"] {
+        refuses(&folder, &render(&format!("--mesh {name}")), &[name]);
+    }
+}
+
+#[test]
+fn hostile_measured_materials_are_refused() {
+    let folder = workplace();
+    let header = |dims: [i32; 3]| dims.map(i32::to_le_bytes).concat();
+    let whole = |value: f64| [header([90, 90, 180]), value.to_le_bytes().repeat(3 * MERL_CELLS)].concat();
+    let zeros = whole(0.0);
+    let mut nan = zeros.clone();
+    nan.splice(zeros.len() - 8.., f64::NAN.to_le_bytes());
+    let mut infinite = whole(0.5);
+    infinite.splice(20..28, f64::INFINITY.to_le_bytes());
+    for (name, bytes, reason) in [
+        ("missing", None, "cannot be read"),
+        ("empty", Some(&b""[..]), "too short"),
+        ("header", Some(&zeros[..11]), "too short"),
+        ("cut", Some(&zeros[..zeros.len() - 1]), "bytes"),
+        ("half", Some(&zeros[..zeros.len() / 2]), "bytes"),
+        ("long", Some(&[&zeros[..], b"x"].concat()), "bytes"),
+        ("dims", Some(&header([90, 90, 360])), "90 x 90 x 360"),
+        ("negative_dims", Some(&header([-90, -90, 180])), "-90 x -90 x 180"),
+        ("large_dims", Some(&header([i32::MAX; 3])), "2147483647"),
+        ("zero", Some(&zeros), "zero"),
+        ("negative", Some(&whole(-1.0)), "invalid"),
+        ("nan", Some(&nan), "NaN"),
+        ("infinite", Some(&infinite), "inf"),
+    ] {
+        let name = format!("{name}.binary");
+        if let Some(bytes) = bytes {
+            fs::write(folder.path().join(&name), bytes).unwrap();
+        }
+        refuses(&folder, &render(&format!("--material {name}")), &[&name, reason]);
+    }
+    refuses(&folder, "threads zero.binary --count 2 -o out/zero.threads", &["zero.binary"]);
+}
+
+#[test]
+fn hostile_material_descriptions_are_refused() {
+    let folder = workplace();
+    for (name, text, key) in [
+        ("empty.toml", "", "model"),
+        ("syntax.toml", "model = ", "TOML"),
+        ("model.toml", "model = 'wood'", "wood"),
+        ("number.toml", "model = 3", "model"),
+        ("unknown.toml", "model = 'lambert'\nreflectance = 0.5\nshine = 1", "shine"),
+        ("missing.toml", "model = 'lambert'", "reflectance"),
+        ("range.toml", "model = 'lambert'\nreflectance = [0.5, 0.5, 1.5]", "reflectance"),
+        ("nan.toml", "model = 'lambert'\nreflectance = nan", "reflectance"),
+        ("rgb.toml", "model = 'lambert'\nreflectance = [0.5, 0.5]", "reflectance"),
+        ("kind.toml", "model = 'conductor'\ndistribution = 'phong'\nalpha = 0.1\neta = 1\nk = 1", "distribution"),
+        ("alpha.toml", "model = 'conductor'\ndistribution = 'ggx'\nalpha = 0\neta = 1\nk = 1", "alpha"),
+        ("material.jpg", "", "material.jpg"),
+    ] {
+        fs::write(folder.path().join(name), text).unwrap();
+        refuses(&folder, &render(&format!("--material {name}")), &[name, key]);
+    }
+    fs::write(folder.path().join("noise.toml"), noise(256)).unwrap();
+    refuses(&folder, &render("--material noise.toml"), &["noise.toml"]);
+}
+
+#[test]
+fn hostile_environments_are_refused() {
+    let folder = workplace();
+    let hdr = |size: &str| format!("#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n{size}\n").into_bytes();
+    let exr = |names: &[&str]| {
+        use exr::prelude::*;
+        let channels = names.iter().map(|&name| AnyChannel::new(name, FlatSamples::F32(vec![1.0; 8]))).collect();
+        let channels = AnyChannels::sort(channels);
+        let layer = Layer::new((4, 2), LayerAttributes::default(), Encoding::default(), channels);
+        let mut bytes = std::io::Cursor::new(Vec::new());
+        Image::from_layer(layer).write().to_buffered(&mut bytes).unwrap();
+        bytes.into_inner()
+    };
+    let colour = exr(&["R", "G", "B"]);
+    for (name, bytes, reason) in [
+        ("empty.hdr", vec![], "Radiance"),
+        ("text.hdr", b"hello\n".to_vec(), "Radiance"),
+        ("cut.hdr", [hdr("-Y 4 +X 8"), vec![128; 4 * 31]].concat(), "Radiance"),
+        ("huge.hdr", hdr("-Y 1000000 +X 1000000"), "2^28"),
+        ("none.hdr", hdr("-Y 0 +X 0"), "none.hdr"),
+        ("empty.exr", vec![], "EXR"),
+        ("cut.exr", colour[..colour.len() - 9].to_vec(), "EXR"),
+        ("head.exr", colour[..60].to_vec(), "EXR"),
+        ("depth.exr", exr(&["Z"]), "R, G, B"),
+        ("red.exr", exr(&["R", "A"]), "R, G, B"),
+        ("map.jpg", b"hello".to_vec(), ".hdr"),
+        ("noise.hdr", noise(4096), "Radiance"),
+        ("noise.exr", noise(4096), "EXR"),
+    ] {
+        fs::write(folder.path().join(name), bytes).unwrap();
+        refuses(&folder, &render(&format!("--environment {name}")), &[name, reason]);
+    }
+    for name in ["folder.hdr", "folder.exr"] {
+        fs::create_dir(folder.path().join(name)).unwrap();
+        refuses(&folder, &render(&format!("--environment {name}")), &[name]);
+    }
+    for name in ["missing.hdr", "missing.exr"] {
+        refuses(&folder, &render(&format!("--environment {name}")), &[name]);
+    }
+}
+
+#[test]
+fn hostile_scene_files_are_refused() {
+    let folder = workplace();
+    for (text, key) in [
+        ("[image\nwidth = 8", "line 1"),
+        ("[image]\nwidth = ", "line 2"),
+        ("[image]\nwidth = 0", "width"),
+        ("[image]\nwidht = 8", "widht"),
+        ("[image]\nsubpixels = 5", "subpixels"),
+        ("[image]\nexposure = nan", "exposure"),
+        ("[image]\nexposure = 1e39", "exposure"),
+        ("[image]\ngamma = 0", "gamma"),
+        ("[image]\nbackground = 'black'", "black"),
+        ("[shading]\nthreads = 0", "threads"),
+        ("[shading]\nthreads = 1025", "threads"),
+        ("[shading]\nmethod = 'magic'", "magic"),
+        ("[scene]", "scene"),
+        ("[environment]\nbuiltin = 'mars'", "mars"),
+        ("[environment]\nintensity = -1", "intensity"),
+        ("[environment]\nintensity = 1e39", "intensity"),
+        ("[environment]\nfile = 'missing.hdr'", "missing.hdr"),
+        ("[[object]]\nbuiltin = 'cube'", "cube"),
+        ("[[object]]\nmesh = 'missing.obj'", "missing.obj"),
+        ("[[object]]\nbuiltin = 'sphere'\nmaterial = 'velvet'", "velvet"),
+        ("[[object]]\nbuiltin = 'sphere'\nscale = 0", "scale"),
+        ("[[object]]\nbuiltin = 'sphere'\nscale = 1e38", "sphere"),
+        ("[[object]]\nbuiltin = 'sphere'\nscale = 1e-38", "sphere"),
+        ("[[object]]\nbuiltin = 'sphere'\ntranslate = [1e38, 0, 0]", "sphere"),
+        ("[[object]]\nbuiltin = 'sphere'\ntranslate = [5e8, 5e8, 5e8]\nscale = 1e-9", "camera"),
+        ("[[material]]\nname = 'm'\nmodel = 'wood'\n[[object]]\nbuiltin = 'sphere'\nmaterial = 'm'", "wood"),
+        ("[[material]]\nname = 'm'\nmodel = 'lambert'\n[[object]]\nbuiltin = 'sphere'", "reflectance"),
+        ("[[material]]\nname = 'm'\nfile = 'missing.binary'\n[[object]]\nbuiltin = 'sphere'", "missing.binary"),
+        ("[[material]]\nname = 'm'\nbuiltin = 'velvet'\n[[object]]\nbuiltin = 'sphere'", "velvet"),
+        ("[camera]\neye = [0, 0, 0]", "target"),
+        ("[camera]\neye = [0, 0, 4]\nfov_y_deg = 180", "fov_y_deg"),
+    ] {
+        println!("{text}");
+        fs::write(folder.path().join("bad.toml"), text).unwrap();
+        refuses(&folder, "render bad.toml -o out/image.png", &[key]);
+    }
+    fs::write(folder.path().join("bad.toml"), "[image]\nwidth = 0").unwrap();
+    refuses(&folder, "render bad.toml -o out/image.png", &["bad.toml", "line 2", "1 to 16384"]);
+    fs::write(folder.path().join("noise.toml"), noise(256)).unwrap();
+    fs::create_dir(folder.path().join("folder.toml")).unwrap();
+    for name in ["noise.toml", "folder.toml", "missing.toml"] {
+        refuses(&folder, &format!("render {name} -o out/image.png"), &[name]);
+    }
+}
+
+/// Bytes without meaning, always the same.
+fn noise(count: usize) -> Vec<u8> {
+    let mut state = 1_u64;
+    let mut next = || {
+        // Knuth's MMIX generator; its high bits are the good ones.
+        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (state >> 56) as u8
+    };
+    (0..count).map(|_| next()).collect()
+}

@@ -1,0 +1,433 @@
+//! The program as its user meets it: pictures, statistics, cache, scene files, help.
+//!
+//! Renders on the device that THREADLIGHT_TEST_DEVICE names, or else on the one that the program prefers, always validated.
+use assert_cmd::Command;
+use serde_json::Value;
+use std::fs;
+use std::path::Path;
+use tempfile::TempDir;
+use threadlight::output::{Picture, read_image};
+
+/// What makes a render quick: few pixels, few threads, and an environment that takes no time.
+const SMALL: &str = "--size 96x72 --threads 8 --environment map.hdr";
+
+/// A folder with a small environment in it, `map.hdr`: different in all directions.
+fn workplace() -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let mut map = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 8 +X 16\n".to_vec();
+    // Mantissas between 100 and 255; exponent 128 stands for 2^0 / 256.
+    map.extend((0..128_u32).flat_map(|i| [100 + i as u8, 200 - (i * i % 97) as u8, 100 + (i * 7 % 101) as u8, 128]));
+    fs::write(folder.path().join("map.hdr"), map).unwrap();
+    folder
+}
+
+/// The program in `folder`, with its cache there and `arguments` separated by spaces.
+fn threadlight(folder: &TempDir, arguments: &str) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_threadlight"));
+    command.current_dir(folder).env("THREADLIGHT_CACHE", cache(folder)).env_remove("RUST_LOG");
+    command.args(arguments.split(' ').filter(|argument| !argument.is_empty()));
+    command
+}
+
+fn cache(folder: &TempDir) -> std::path::PathBuf {
+    folder.path().join("cache")
+}
+
+/// `render` with validation on the device to test on.
+fn render(folder: &TempDir, arguments: &str) -> Command {
+    let mut command = threadlight(folder, &format!("render --validate {arguments}"));
+    if let Some(device) = std::env::var_os("THREADLIGHT_TEST_DEVICE") {
+        command.arg("--device").arg(device);
+    }
+    command
+}
+
+fn bytes(folder: &TempDir, name: &str) -> Vec<u8> {
+    fs::read(folder.path().join(name)).unwrap()
+}
+
+fn picture(folder: &TempDir, name: &str) -> Picture {
+    read_image(&folder.path().join(name)).unwrap()
+}
+
+/// The value at `column`, `row` of a picture.
+fn at(picture: &Picture, column: u32, row: u32) -> [f32; 4] {
+    picture.rgba[(row * picture.width + column) as usize]
+}
+
+fn stats(folder: &TempDir, name: &str) -> Value {
+    serde_json::from_slice(&bytes(folder, name)).unwrap()
+}
+
+/// What a command printed; it must succeed and have nothing to complain about.
+fn printed(command: &mut Command) -> String {
+    let output = command.output().unwrap();
+    let complaints = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success() && complaints.is_empty(), "{complaints}");
+    String::from_utf8(output.stdout).unwrap()
+}
+
+#[test]
+fn the_built_in_scene_renders_without_validation_messages_and_with_sane_statistics() {
+    let folder = workplace();
+    let said = printed(&mut render(&folder, "--size 96x72 --threads 8 --repeat 3 --stats stats.json -o image.png"));
+    assert!(said.is_empty(), "{said}");
+
+    let image = picture(&folder, "image.png");
+    assert_eq!((image.width, image.height, image.alpha), (96, 72, false));
+    // Gold in the middle: more red than blue.
+    let [red, _, blue, _] = at(&image, 48, 36);
+    assert!(red > 1.2 * blue, "{red} {blue}");
+
+    let stats = stats(&folder, "stats.json");
+    let number = |key: &str| stats[key].as_f64().unwrap_or_else(|| panic!("{key}: {}", stats[key]));
+    let text = |key: &str| stats[key].as_str().unwrap_or_else(|| panic!("{key}: {}", stats[key]));
+    assert!(!text("device").is_empty());
+    assert_eq!((text("method"), text("thread_cache")), ("paper", "miss"));
+    for (key, value) in
+        [("threads", 8.0), ("subpixels", 2.0), ("width", 96.0), ("height", 72.0), ("validation_messages", 0.0)]
+    {
+        assert_eq!(number(key), value, "{key}");
+    }
+    // The default camera sees the unit sphere from 3.93735 away: an ellipse of nearly that part of the image.
+    let distance: f64 = (1.5_f64.powi(2) + 1.0 + 3.5_f64.powi(2)).sqrt();
+    let radius_px = 72.0 * 2.0 / 2.0 / (18_f64.to_radians().tan() * (distance * distance - 1.0).sqrt());
+    let covered = number("covered_subpixels");
+    let circle = std::f64::consts::PI * radius_px * radius_px;
+    assert!((covered / circle - 1.0).abs() < 0.02, "{covered} {circle}");
+    // Interior pixels share one sum over the threads, other sub-pixels have one each.
+    let (interior, edge, lookups) = (number("interior_pixels"), number("edge_pixels"), number("lookups"));
+    assert_eq!(lookups, 8.0 * (interior + (covered - 4.0 * interior)));
+    assert!(interior > 0.0 && edge > 0.0 && covered > 4.0 * interior && covered <= 4.0 * (interior + edge));
+
+    let passes = stats["passes"].as_array().unwrap();
+    let names: Vec<_> = passes.iter().map(|pass| pass["name"].as_str().unwrap()).collect();
+    for name in ["geometry_cache", "classify", "shade", "background", "tone_map"] {
+        assert!(names.contains(&name), "{name} is not among {names:?}");
+    }
+    let gpu_ms = |pass: &Value| pass["gpu_ms"].as_f64().unwrap();
+    assert!(passes.iter().all(|pass| gpu_ms(pass) >= 0.0));
+    assert!(passes.iter().map(gpu_ms).sum::<f64>() > 0.0);
+    assert!(number("frame_ms") > 0.0 && number("thread_generation_ms") > 0.0);
+    // At least radiance and geometry cache, at most what such a picture could ever need.
+    let memory = number("device_memory_bytes");
+    assert!(memory > 96.0 * 72.0 * (16.0 + 4.0 * 8.0) && memory < 1e9, "{memory}");
+}
+
+#[test]
+fn the_same_command_gives_the_same_picture_with_any_state_of_the_cache() {
+    let folder = workplace();
+    for (name, flags) in [("cold", ""), ("warm", ""), ("none", "--no-cache")] {
+        for kind in ["png", "exr"] {
+            printed(&mut render(&folder, &format!("{SMALL} {flags} -o {name}.{kind}")));
+        }
+    }
+    for name in ["warm", "none"] {
+        assert!(bytes(&folder, "cold.png") == bytes(&folder, &format!("{name}.png")), "{name}");
+        let (cold, other) = (picture(&folder, "cold.exr"), picture(&folder, &format!("{name}.exr")));
+        assert!(cold.rgba.iter().flatten().all(|value| value.is_finite()));
+        assert!(cold.rgba == other.rgba, "{name}");
+    }
+    printed(&mut render(&folder, &format!("{SMALL} --seed 7 -o seed.exr")));
+    assert!(picture(&folder, "cold.exr").rgba != picture(&folder, "seed.exr").rgba, "the seed has no effect");
+}
+
+#[test]
+fn no_cache_leaves_no_cache() {
+    let folder = workplace();
+    printed(&mut render(&folder, &format!("{SMALL} --no-cache -o image.png")));
+    assert!(!cache(&folder).exists());
+}
+
+#[test]
+fn threads_are_cached_and_damage_is_repaired() {
+    let folder = workplace();
+    let run = |name: &str| render(&folder, &format!("{SMALL} --stats {name}.json -o {name}.png")).output().unwrap();
+    let state = |name: &str| stats(&folder, &format!("{name}.json"))["thread_cache"].as_str().unwrap().to_owned();
+    run("first");
+    run("second");
+    assert_eq!((state("first").as_str(), state("second").as_str()), ("miss", "hit"));
+
+    // Cut the threads and overwrite the pipelines.
+    let files: Vec<_> = fs::read_dir(cache(&folder)).unwrap().map(|entry| entry.unwrap().path()).collect();
+    assert!(files.len() >= 2, "{files:?}");
+    for file in &files {
+        let content = fs::read(file).unwrap();
+        let threads = file.extension().is_some_and(|extension| extension == "threads");
+        fs::write(file, if threads { content[..content.len() / 2].to_vec() } else { vec![0x5a; content.len()] })
+            .unwrap();
+    }
+    let output = run("damaged");
+    let warning = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success() && warning.contains("WARN") && warning.contains(".threads"), "{warning}");
+    run("repaired");
+    assert_eq!((state("damaged").as_str(), state("repaired").as_str()), ("miss", "hit"));
+    for name in ["second", "damaged", "repaired"] {
+        assert!(bytes(&folder, "first.png") == bytes(&folder, &format!("{name}.png")), "{name}");
+    }
+}
+
+#[test]
+fn the_exr_header_tells_how_the_picture_was_made() {
+    let folder = workplace();
+    printed(&mut render(&folder, &format!("{SMALL} --material silver --stats stats.json -o image.exr")));
+    let (attributes, stats) = (picture(&folder, "image.exr").attributes, stats(&folder, "stats.json"));
+    for (name, value) in [
+        ("method", "paper"),
+        ("threads", "8"),
+        ("material", "silver"),
+        ("environment", "map.hdr"),
+        ("device", stats["device"].as_str().unwrap()),
+        ("threadlight_version", env!("CARGO_PKG_VERSION")),
+    ] {
+        assert_eq!(attributes[name], value, "{name}");
+    }
+    let seconds: f64 = attributes["seconds"].parse().unwrap();
+    assert!((seconds * 1e3 - stats["frame_ms"].as_f64().unwrap()).abs() < 1e-6 * seconds * 1e3);
+}
+
+#[test]
+fn without_a_background_the_picture_is_transparent_past_the_objects() {
+    let folder = workplace();
+    for name in ["image.png", "image.exr"] {
+        printed(&mut render(&folder, &format!("{SMALL} --background none -o {name}")));
+        let image = picture(&folder, name);
+        assert!(image.alpha);
+        assert_eq!(at(&image, 0, 0), [0.0; 4], "{name}");
+        assert_eq!(at(&image, 48, 36)[3], 1.0, "{name}");
+        // The silhouette is anti-aliased in quarters.
+        let partial = image.rgba.iter().filter(|pixel| pixel[3] > 0.0 && pixel[3] < 1.0).count();
+        assert!(partial > 20, "{name}: {partial}");
+    }
+}
+
+/// A red sphere on the left and a green one on the right, in white light.
+const TWO_SPHERES: &str = r#"
+[image]
+width = 64
+height = 32
+background = "none"
+[camera]
+eye = [0, 0, 10]
+target = [0, 0, 0]
+fov_y_deg = 25
+[environment]
+builtin = "white"
+[shading]
+threads = 9
+[[material]]
+name = "red"
+model = "lambert"
+reflectance = [0.5, 0, 0]
+[[material]]
+name = "green"
+file = "materials/green.toml"
+[[object]]
+mesh = "meshes/square.obj"
+material = "red"
+translate = [-2, 0, 0]
+[[object]]
+builtin = "sphere"
+material = "green"
+translate = [2, 0, 0]
+scale = 1.5
+"#;
+
+/// Writes the scene above and the files it names into a folder of their own below `folder`.
+fn write_two_spheres(folder: &TempDir) {
+    let place = |name: &str| folder.path().join("scene").join(name);
+    for (name, text) in [
+        ("scene.toml", TWO_SPHERES),
+        ("materials/green.toml", "model = \"lambert\"\nreflectance = [0, 0.5, 0]\n"),
+        ("meshes/square.obj", "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nf 1 2 3 4\n"),
+    ] {
+        fs::create_dir_all(place(name).parent().unwrap()).unwrap();
+        fs::write(place(name), text).unwrap();
+    }
+}
+
+#[test]
+fn a_scene_file_with_two_objects_and_two_materials_renders() {
+    let folder = workplace();
+    write_two_spheres(&folder);
+    printed(&mut render(&folder, "scene/scene.toml -o image.exr --stats stats.json"));
+    let image = picture(&folder, "image.exr");
+    assert_eq!((image.width, image.height), (64, 32));
+    assert_eq!(image.attributes["material"], "red, green");
+    assert_eq!(image.attributes["threads"], "9");
+    // A Lambertian surface in a white furnace shows its reflectance; 9 of the paper's threads come near it.
+    let (left, right) = (at(&image, 17, 16), at(&image, 46, 16));
+    for (pixel, channel) in [(left, 0), (right, 1)] {
+        assert!((pixel[channel] - 0.5).abs() < 0.1, "{pixel:?}");
+        assert_eq!((pixel[1 - channel], pixel[2], pixel[3]), (0.0, 0.0, 1.0));
+    }
+    assert_eq!(at(&image, 32, 16), [0.0; 4]);
+}
+
+#[test]
+fn flags_override_the_scene_file() {
+    let folder = workplace();
+    write_two_spheres(&folder);
+    let flags = "--size 40x20 --threads 8 --subpixels 1 --material clay --environment map.hdr --background environment";
+    printed(&mut render(&folder, &format!("scene/scene.toml {flags} -o image.exr --stats stats.json")));
+    let (image, stats) = (picture(&folder, "image.exr"), stats(&folder, "stats.json"));
+    assert_eq!((image.width, image.height, image.alpha), (40, 20, false));
+    assert_eq!((image.attributes["material"].as_str(), image.attributes["environment"].as_str()), ("clay", "map.hdr"));
+    assert_eq!((stats["threads"].as_u64(), stats["subpixels"].as_u64()), (Some(8), Some(1)));
+    // Both objects are still there, and a mesh takes the place of both.
+    let covered = stats["covered_subpixels"].as_u64().unwrap();
+    printed(&mut render(&folder, &format!("scene/scene.toml {flags} --mesh sphere -o one.exr --stats stats.json")));
+    assert!(self::stats(&folder, "stats.json")["covered_subpixels"].as_u64().unwrap() < covered);
+
+    // Display: a doubled exposure doubles linear values, which the gamma then bends.
+    printed(&mut render(&folder, "scene/scene.toml --gamma 1 --exposure 1 -o dark.png"));
+    printed(&mut render(&folder, "scene/scene.toml --gamma 2 --exposure 0.5 -o bent.png"));
+    let (dark, bent) = (at(&picture(&folder, "dark.png"), 17, 16)[0], at(&picture(&folder, "bent.png"), 17, 16)[0]);
+    assert!(((0.5 * dark).sqrt() - bent).abs() < 0.005, "{dark} {bent}");
+}
+
+#[test]
+fn the_environment_turns_with_the_rotation() {
+    let folder = workplace();
+    for (name, flags) in [("0", ""), ("360", "--rotation 360"), ("90", "--rotation 90"), ("minus", "--rotation -270")] {
+        printed(&mut render(&folder, &format!("{SMALL} {flags} -o {name}.exr")));
+    }
+    let difference = |a: &str, b: &str| {
+        let (a, b) = (picture(&folder, &format!("{a}.exr")), picture(&folder, &format!("{b}.exr")));
+        let values = a.rgba.iter().flatten().zip(b.rgba.iter().flatten());
+        values.map(|(a, b)| (a - b).abs()).sum::<f32>() / a.rgba.len() as f32
+    };
+    assert!(difference("0", "360") < 1e-3 && difference("90", "minus") < 1e-3);
+    assert!(difference("0", "90") > 0.05, "{}", difference("0", "90"));
+}
+
+#[test]
+fn the_plan_lists_passes_and_what_was_culled() {
+    let folder = workplace();
+    let linear = printed(&mut render(&folder, &format!("{SMALL} --print-plan -o image.exr")));
+    let (passes, rest) = linear.split_once("\nculled\n").expect("something is culled for an EXR");
+    for pass in ["geometry_cache", "classify", "shade", "background", "read_radiance"] {
+        assert!(passes.contains(&format!("  {pass}\n")), "{linear}");
+    }
+    assert!(rest.trim_start().starts_with("tone_map ") && rest.contains("aliasing"), "{linear}");
+    // With nothing to write but the plan.
+    let display = printed(&mut render(&folder, &format!("{SMALL} --print-plan --background none")));
+    assert!(display.contains("  tone_map\n") && !display.contains("background"), "{display}");
+}
+
+#[test]
+fn the_cpu_driver_answers_to_its_name() {
+    let folder = workplace();
+    if !printed(&mut threadlight(&folder, "devices")).contains("llvmpipe") {
+        return println!("skipped: this machine has no lavapipe");
+    }
+    for device in ["lavapipe", "llvmpipe", "LLVMPIPE"] {
+        printed(&mut threadlight(&folder, &format!("render {SMALL} --validate --device {device} -o {device}.png")));
+        assert!(bytes(&folder, "lavapipe.png") == bytes(&folder, &format!("{device}.png")), "{device}");
+    }
+}
+
+#[test]
+fn a_machine_without_a_driver_is_told_what_to_install() {
+    let folder = workplace();
+    let absent = folder.path().join("absent.json");
+    let mut command = threadlight(&folder, &format!("render {SMALL} -o image.png"));
+    let output = command.env("VK_DRIVER_FILES", &absent).env("VK_ICD_FILENAMES", &absent).output().unwrap();
+    let reason = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{reason}");
+    assert!(reason.lines().count() == 1 && reason.contains("mesa-vulkan-drivers"), "{reason}");
+    assert!(!folder.path().join("image.png").exists());
+}
+
+#[test]
+fn threads_are_written_and_read_back_the_same() {
+    let folder = workplace();
+    for name in ["a.threads", "b.threads"] {
+        threadlight(&folder, &format!("threads gold --count 4 --seed 3 --no-cache -o {name}")).assert().success();
+    }
+    assert!(bytes(&folder, "a.threads") == bytes(&folder, "b.threads"));
+    let table = threadlight::threads::read(&folder.path().join("a.threads")).unwrap();
+    assert_eq!((table.count, table.rows, table.seed, table.material.as_str()), (4, 90, 3, "gold"));
+}
+
+#[test]
+fn what_can_be_named_is_listed() {
+    let folder = workplace();
+    let list = printed(&mut threadlight(&folder, "materials"));
+    for name in ["gold", "conductor", "lambert", "studio", "sphere", "paper", ".binary", ".hdr", ".obj"] {
+        assert!(list.contains(name), "{name} is not in\n{list}");
+    }
+}
+
+#[test]
+fn every_subcommand_has_help() {
+    let folder = workplace();
+    let help = printed(&mut threadlight(&folder, "--help"));
+    for subcommand in ["render", "threads", "materials", "devices", "completions"] {
+        assert!(help.contains(&format!("\n  {subcommand} ")), "{help}");
+        let help = printed(&mut threadlight(&folder, &format!("{subcommand} --help")));
+        assert!(help.contains("Usage: threadlight ") && help.contains("--verbose"), "{help}");
+    }
+    let help = printed(&mut threadlight(&folder, "render --help"));
+    for flag in [
+        "--mesh",
+        "--material",
+        "--environment",
+        "--method",
+        "--threads",
+        "--subpixels",
+        "--size",
+        "--exposure",
+        "--gamma",
+        "--background",
+        "--rotation",
+        "--seed",
+        "--device",
+        "--validate",
+        "--repeat",
+        "--stats",
+        "--print-plan",
+        "--no-cache",
+        "--output",
+        "Examples:",
+    ] {
+        assert!(help.contains(flag), "{flag} is not in\n{help}");
+    }
+    assert!(printed(&mut threadlight(&folder, "--version")).contains(env!("CARGO_PKG_VERSION")));
+}
+
+#[test]
+fn shells_get_their_completions() {
+    let folder = workplace();
+    for shell in ["bash", "zsh", "fish"] {
+        let script = printed(&mut threadlight(&folder, &format!("completions {shell}")));
+        assert!(script.contains("print-plan") && script.contains("threadlight"), "{shell}");
+    }
+}
+
+#[test]
+fn a_reader_that_has_seen_enough_is_no_error() {
+    use std::process::{Command, Stdio};
+    let folder = workplace();
+    for arguments in [&["completions", "bash"][..], &["materials"], &["devices"]] {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_threadlight"));
+        let mut child = command.args(arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        drop(child.stdout.take());
+        let output = child.wait_with_output().unwrap();
+        let complaints = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success() && complaints.is_empty(), "{arguments:?} {complaints}");
+    }
+    assert!(!cache(&folder).exists());
+}
+
+#[test]
+fn pictures_replace_older_ones_whole_and_leave_nothing_beside_them() {
+    let folder = workplace();
+    fs::write(folder.path().join("image.png"), "older").unwrap();
+    printed(&mut render(&folder, &format!("{SMALL} --no-cache --stats stats.json -o image.png")));
+    assert_eq!(picture(&folder, "image.png").width, 96);
+    let mut files: Vec<_> =
+        fs::read_dir(Path::new(folder.path())).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+    files.sort();
+    assert_eq!(files, ["image.png", "map.hdr", "stats.json"]);
+}
