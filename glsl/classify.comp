@@ -11,12 +11,17 @@ layout(constant_id = 0) const uint SUBPIXELS = 2; // per axis
 
 layout(set = 0, binding = 0) uniform utexture2D geometry;
 layout(set = 0, binding = 1, std430) buffer Counters {
-    PixelClass classes[2];
+    TileClass classes[2];
+    uint pixels[2];
     uint covered_subpixels;
     uint covered_edge_subpixels;
 } counters;
-// Interior pixels from the front, edge pixels from the back.
-layout(set = 0, binding = 2, std430) writeonly buffer PixelList {
+// The interior tiles, then, from the middle, the edge tiles.
+layout(set = 0, binding = 2, std430) writeonly buffer TileList {
+    uint tiles[];
+} tile_list;
+// For each tile of the image the places of its pixels in it: interior ones from the front, edge ones from the back.
+layout(set = 0, binding = 4, std430) writeonly buffer PixelList {
     uint pixels[];
 } pixel_list;
 layout(set = 0, binding = 3, rgba32f) uniform writeonly image2D radiance;
@@ -28,7 +33,6 @@ layout(push_constant) uniform Push {
 } push;
 
 shared uint listed[2];
-shared uint first[2];
 shared uint covered_total;
 shared uint covered_edge_total;
 
@@ -65,9 +69,11 @@ void main() {
         }
     }
     uint kind = smooth_surface && covered == SUBPIXELS * SUBPIXELS ? INTERIOR : EDGE;
-    uint place = 0;
+    uint tile = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
     if (covered > 0) {
-        place = atomicAdd(listed[kind], 1);
+        uint place = atomicAdd(listed[kind], 1);
+        uint slot = kind == INTERIOR ? place : TILE_PIXELS - 1 - place;
+        pixel_list.pixels[tile * TILE_PIXELS + slot] = gl_LocalInvocationIndex;
         atomicAdd(covered_total, covered);
         if (kind == EDGE) {
             atomicAdd(covered_edge_total, covered);
@@ -75,24 +81,17 @@ void main() {
     }
     barrier();
 
-    // One addition to each global counter a workgroup, and the pixels of a tile stay neighbours in the list.
     if (gl_LocalInvocationIndex < 2 && listed[gl_LocalInvocationIndex] > 0) {
         uint k = gl_LocalInvocationIndex;
-        first[k] = atomicAdd(counters.classes[k].count, listed[k]);
-        uint groups = (first[k] + listed[k] + SHADE_GROUP_SIZE - 1) / SHADE_GROUP_SIZE;
-        atomicMax(counters.classes[k].groups_x, min(groups, MAX_GROUPS));
+        uint place = atomicAdd(counters.classes[k].tile_count, 1);
+        tile_list.tiles[k * gl_NumWorkGroups.x * gl_NumWorkGroups.y + place] = pack_tile(tile, listed[k]);
+        atomicMax(counters.classes[k].groups_x, min(place + 1, MAX_GROUPS));
         atomicMax(counters.classes[k].groups_y, 1);
         atomicMax(counters.classes[k].groups_z, 1);
+        atomicAdd(counters.pixels[k], listed[k]);
     }
     if (gl_LocalInvocationIndex == 0 && covered_total > 0) {
         atomicAdd(counters.covered_subpixels, covered_total);
         atomicAdd(counters.covered_edge_subpixels, covered_edge_total);
-    }
-    barrier();
-
-    if (covered > 0) {
-        uint index = first[kind] + place;
-        uint last = push.size_px.x * push.size_px.y - 1;
-        pixel_list.pixels[kind == INTERIOR ? index : last - index] = pixel.x | pixel.y << 16;
     }
 }

@@ -1,7 +1,8 @@
 // What both stages of the geometry cache know of the object being drawn.
 
 layout(push_constant) uniform Object {
-    // Object space to world axes with the eye at the origin: the eye's own coordinates keep the precision.
+    // Object space to world axes with the eye at the origin (the eye's own coordinates keep the precision), in units of
+    // the scene's extent.
     mat4x3 to_eye;
     // Unit vectors of the camera and what its image plane spans (right and up divided by the half-extents).
     vec4 right_over_extent; // w: unused

@@ -13,7 +13,8 @@ void main() {
     vec3 from_eye = (object.to_eye * vec4(position, 1.0)).xyz;
     eye_position = from_eye;
     // Cofactors of the linear part: the normal matrix up to scale, right for mirrored and sheared objects too.
-    mat3 linear_part = mat3(object.to_eye);
+    // Taken relative to the object's scale, whose square could leave the range of floats.
+    mat3 linear_part = mat3(object.to_eye) / length(object.to_eye[0]);
     mat3 cofactors = mat3(cross(linear_part[1], linear_part[2]), cross(linear_part[2], linear_part[0]),
                           cross(linear_part[0], linear_part[1]));
     world_normal = cofactors * normal;

@@ -17,9 +17,12 @@ const float TURNING_DEG = 15.0;
 
 layout(set = 0, binding = 0) uniform utexture2D geometry;
 layout(set = 0, binding = 1, std430) readonly buffer Counters {
-    PixelClass classes[2];
+    TileClass classes[2];
 } counters;
-layout(set = 0, binding = 2, std430) readonly buffer PixelList {
+layout(set = 0, binding = 2, std430) readonly buffer TileList {
+    uint tiles[];
+} tile_list;
+layout(set = 0, binding = 9, std430) readonly buffer PixelList {
     uint pixels[];
 } pixel_list;
 layout(set = 0, binding = 3, rgba32f) uniform writeonly image2D radiance;
@@ -62,12 +65,17 @@ void main() {
         group_lookups = 0;
     }
     const uint subpixel_count = SUBPIXELS * SUBPIXELS;
-    uint count = counters.classes[push.kind].count;
-    uint last = push.size_px.x * push.size_px.y - 1;
+    uvec2 tiles = (push.size_px + TILE_SIDE - 1) / TILE_SIDE;
     bool interior = push.kind == INTERIOR;
-    for (uint index = gl_GlobalInvocationID.x; index < count; index += SHADE_GROUP_SIZE * gl_NumWorkGroups.x) {
-        uint packed = pixel_list.pixels[interior ? index : last - index];
-        uvec2 pixel = uvec2(packed & 0xffffu, packed >> 16);
+    for (uint t = gl_WorkGroupID.x; t < counters.classes[push.kind].tile_count; t += gl_NumWorkGroups.x) {
+        uint packed = tile_list.tiles[push.kind * tiles.x * tiles.y + t];
+        if (gl_LocalInvocationIndex >= tile_pixel_count(packed)) {
+            continue;
+        }
+        uint tile = tile_index(packed);
+        uint slot = interior ? gl_LocalInvocationIndex : TILE_PIXELS - 1 - gl_LocalInvocationIndex;
+        uint place = pixel_list.pixels[tile * TILE_PIXELS + slot];
+        uvec2 pixel = uvec2(tile % tiles.x, tile / tiles.x) * TILE_SIDE + uvec2(place % TILE_SIDE, place / TILE_SIDE);
         vec3 sum = vec3(0.0);
         uint covered = 0;
         for (uint j = 0; j < subpixel_count; ++j) {

@@ -1,21 +1,38 @@
-// The list of pixels to shade, shared by the pass that makes it and the one that consumes it.
+// The tiles to shade, shared by the pass that lists them and the one that consumes them.
 // Twin of the layout: src/passes/classify.rs.
+//
+// Pixels are packed tile by tile rather than over the whole image: then the pixels of one workgroup of the shade pass are
+// the same, in the same order, in every run. On a CPU device the last bit of a lookup depends on the lookups of its neighbours.
 
-// One class of pixels: the arguments of an indirect dispatch, and how many pixels are listed.
-struct PixelClass {
-    uint groups_x;
-    uint groups_y;
-    uint groups_z;
-    uint count;
-};
+// Pixels on the side of a tile; a tile is a workgroup of both passes.
+const uint TILE_SIDE = 8u;
+const uint TILE_PIXELS = TILE_SIDE * TILE_SIDE;
 
 // Interior pixels see one smooth surface in all their sub-pixels and share one sum over the threads;
 // edge pixels do not, and sum over all threads in each covered sub-pixel.
 const uint INTERIOR = 0u;
 const uint EDGE = 1u;
 
-// Pixels per workgroup of the shade pass.
-const uint SHADE_GROUP_SIZE = 64u;
+// The tiles that hold pixels of one class: the arguments of an indirect dispatch, and how many tiles are listed.
+struct TileClass {
+    uint groups_x;
+    uint groups_y;
+    uint groups_z;
+    uint tile_count;
+};
 
-// The limit on workgroups that every device has; beyond it a workgroup takes several blocks of pixels.
+// The limit on workgroups that every device has; beyond it a workgroup takes several tiles.
 const uint MAX_GROUPS = 65535u;
+
+// A listed tile: its index, row by row, and how many of its pixels are of the class (1 to 64).
+uint pack_tile(uint tile, uint pixel_count) {
+    return tile << 6 | (pixel_count - 1u);
+}
+
+uint tile_index(uint packed) {
+    return packed >> 6;
+}
+
+uint tile_pixel_count(uint packed) {
+    return (packed & 63u) + 1u;
+}

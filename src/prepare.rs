@@ -102,7 +102,11 @@ pub fn prepare(scene: &Scene, cache: Option<&Path>, observer: &dyn Observer) -> 
             let (center, radius) = bounding_sphere(&meshes, &objects);
             let camera = Camera::framing(center, radius, image.aspect());
             camera.validate().map_err(|problem| {
-                Error::input("[camera]", format!("cannot be chosen: {problem}"), "give eye and target in the scene file")
+                Error::input(
+                    "[camera]",
+                    format!("cannot be chosen: {problem}"),
+                    "give eye and target in the scene file",
+                )
             })?;
             camera
         }

@@ -97,7 +97,9 @@ fn the_built_in_scene_renders_without_validation_messages_and_with_sane_statisti
     assert!((covered / circle - 1.0).abs() < 0.02, "{covered} {circle}");
     // Interior pixels share one sum over the threads, other sub-pixels have one each.
     let (interior, edge, lookups) = (number("interior_pixels"), number("edge_pixels"), number("lookups"));
-    assert_eq!(lookups, 8.0 * (interior + (covered - 4.0 * interior)));
+    // Where the normal almost faces the eye two sums are blended: there, and nowhere else, are lookups made twice.
+    let once = 8.0 * (interior + (covered - 4.0 * interior));
+    assert!(lookups > once && lookups < 1.1 * once, "{lookups} lookups, {once} without blending");
     assert!(interior > 0.0 && edge > 0.0 && covered > 4.0 * interior && covered <= 4.0 * (interior + edge));
 
     let passes = stats["passes"].as_array().unwrap();

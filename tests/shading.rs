@@ -74,7 +74,7 @@ fn the_shader_agrees_with_its_cpu_twin() {
                 }
             }
             let counters = rendering.counters;
-            assert_eq!((counters.interior.count as usize, counters.edge.count as usize), (interior, edge), "{name}");
+            assert_eq!((counters.interior_pixels as usize, counters.edge_pixels as usize), (interior, edge), "{name}");
             assert_eq!(counters.covered_subpixels as usize, covered, "{name}");
             assert!(interior > 300 && edge > 30, "{interior} interior and {edge} edge pixels are no test");
         }

@@ -12,23 +12,27 @@ use std::sync::Arc;
 /// belong to visibly different normals.
 pub const SMOOTH_DEG: f32 = 10.0;
 
-/// One class of pixels: arguments of an indirect dispatch and a count. `PixelClass` in glsl/tiles.glsl.
+/// Pixels on the side of a tile. `TILE_SIDE` in glsl/tiles.glsl.
+const TILE_SIDE: u32 = 8;
+
+/// The tiles of one class: arguments of an indirect dispatch and a count. `TileClass` in glsl/tiles.glsl.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
-pub struct PixelClass {
+pub struct TileClass {
     groups: [u32; 3],
-    /// Pixels in the class.
-    pub count: u32,
+    /// Tiles that hold pixels of the class.
+    pub tile_count: u32,
 }
 
 /// What the pass counts. `Counters` in glsl/classify.comp.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 pub struct Counters {
+    tiles: [TileClass; 2],
     /// Pixels that see one smooth surface in all sub-pixels.
-    pub interior: PixelClass,
+    pub interior_pixels: u32,
     /// Pixels at an edge of something.
-    pub edge: PixelClass,
+    pub edge_pixels: u32,
     /// Sub-pixels that see a surface.
     pub covered_subpixels: u32,
     /// Those among them that are in edge pixels.
@@ -38,7 +42,7 @@ pub struct Counters {
 impl Counters {
     /// Byte offset of the dispatch arguments of class `kind`: 0 interior, 1 edge.
     pub fn arguments_of(kind: u32) -> u64 {
-        u64::from(kind) * size_of::<PixelClass>() as u64
+        u64::from(kind) * size_of::<TileClass>() as u64
     }
 }
 
@@ -70,7 +74,9 @@ impl Classify {
 pub struct Tiles {
     /// [`Counters`].
     pub counters: Buffer,
-    /// x + 65536 y of each pixel: interior ones from the front, edge ones from the back.
+    /// The tiles that hold interior pixels, then, from the middle, those that hold edge pixels.
+    pub tiles: Buffer,
+    /// For each tile of the image the places of its pixels in it: interior ones from the front, edge ones from the back.
     pub pixels: Buffer,
     /// Linear radiance times coverage, and coverage.
     pub radiance: Image,
@@ -81,22 +87,26 @@ pub fn classify<'a>(graph: &mut FrameGraph<'a>, classify: &'a Classify, geometry
     let (width, height) = (view.width, view.height);
     let counters = graph.buffer("counters", BufferDesc { size_bytes: size_of::<Counters>() as u64 });
     let counters = clear(graph, "clear_counters", counters);
-    let pixels = graph.buffer("pixel_list", BufferDesc { size_bytes: 4 * u64::from(width) * u64::from(height) });
+    let tile_count = u64::from(width.div_ceil(TILE_SIDE)) * u64::from(height.div_ceil(TILE_SIDE));
+    let tiles = graph.buffer("tile_list", BufferDesc { size_bytes: 2 * 4 * tile_count });
+    let pixels = graph.buffer("pixel_list", BufferDesc { size_bytes: 4 * u64::from(TILE_SIDE.pow(2)) * tile_count });
     let radiance = graph.image("radiance", ImageDesc { format: vk::Format::R32G32B32A32_SFLOAT, width, height });
     let mut pass = graph.pass("classify");
     pass.read(geometry, Access::SampledCompute);
     let counters = pass.modify(counters, Access::StorageWriteCompute);
+    let tiles = pass.write(tiles, Access::StorageWriteCompute);
     let pixels = pass.write(pixels, Access::StorageWriteCompute);
     let radiance = pass.write(radiance, Access::StorageWriteCompute);
     pass.record(Box::new(move |commands, resources| {
         let bindings = Bindings::new()
             .image("geometry", resources.image(geometry))
             .buffer("counters", resources.buffer(counters))
+            .buffer("tile_list", resources.buffer(tiles))
             .buffer("pixel_list", resources.buffer(pixels))
             .image("radiance", resources.image(radiance));
         let push = Push { size_px: [width, height], cos_smooth: SMOOTH_DEG.to_radians().cos() };
         let groups = Groups::Direct(tiles_of(view));
         commands.dispatch(&classify.pipeline, &bindings, bytemuck::bytes_of(&push), groups)
     }));
-    Tiles { counters, pixels, radiance }
+    Tiles { counters, tiles, pixels, radiance }
 }

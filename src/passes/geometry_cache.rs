@@ -15,6 +15,10 @@ use std::sync::Arc;
 const GEOMETRY_FORMAT: vk::Format = vk::Format::R32G32_UINT;
 const DEPTH_FORMAT: vk::Format = vk::Format::D32_SFLOAT;
 
+/// Distance of the near plane in units of the scene's extent: with reversed, infinite depth it costs no precision to keep it
+/// nearer than any surface that a camera outside of the scene sees.
+const NEAR_PLANE: f64 = 1e-6;
+
 /// The triangles of a mesh on the device.
 pub struct DeviceMesh {
     positions: Buffer,
@@ -100,10 +104,10 @@ impl GeometryCache {
         let half_height = (view.camera.fov_y_deg.to_radians() / 2.0).tan();
         let half_width = half_height * f64::from(view.width) / f64::from(view.height);
         let pack = |v: DVec3, w: f64| v.extend(w).as_vec4().to_array();
-        let near = self.near_plane(view);
+        let unit = self.extent(view);
         let draw = |object: &Object| {
             let DAffine3 { matrix3, translation } = object.to_world;
-            let column = |column: DVec3| pack(column, 0.0);
+            let column = |column: DVec3| pack(column / unit, 0.0);
             let push = Push {
                 to_eye: [
                     column(matrix3.x_axis),
@@ -114,7 +118,7 @@ impl GeometryCache {
                 ],
                 right_over_extent: pack(right / half_width, 0.0),
                 up_over_extent: pack(up / half_height, 0.0),
-                forward: pack(forward, near),
+                forward: pack(forward, NEAR_PLANE),
                 material: object.material,
             };
             (&self.meshes[object.mesh], push)
@@ -122,9 +126,9 @@ impl GeometryCache {
         self.objects.iter().map(draw).collect()
     }
 
-    /// Distance of the near plane: with reversed, infinite depth it costs no precision to keep it tiny. A millionth of
-    /// the way to the far side of the scene is nearer than any surface that a camera outside of it sees.
-    fn near_plane(&self, view: &View) -> f64 {
+    /// Distance from the eye to the far side of the scene: the unit of length in which it is drawn, so that neither tiny nor
+    /// huge scenes leave the range of single precision.
+    fn extent(&self, view: &View) -> f64 {
         let far_side = |object: &Object| {
             let (center, radius) = self.meshes[object.mesh].bounds;
             let m = object.to_world.matrix3;
@@ -133,8 +137,8 @@ impl GeometryCache {
             center.distance(view.camera.eye) + scale * f64::from(radius)
         };
         let farthest = self.objects.iter().map(far_side).fold(0.0, f64::max);
-        // An object that is a single point at the eye leaves 0, which would divide depth by zero.
-        if farthest > 0.0 { farthest * 1e-6 } else { 1e-6 }
+        // A scene that is a single point at the eye has no extent, and nothing to be seen in any unit.
+        if farthest > 0.0 { farthest } else { 1.0 }
     }
 }
 

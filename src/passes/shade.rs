@@ -227,13 +227,14 @@ pub fn shade<'a>(
     tiles: &Tiles,
     view: &'a View,
 ) -> Shaded {
-    let Tiles { counters, pixels, radiance } = *tiles;
+    let Tiles { counters, tiles, pixels, radiance } = *tiles;
     let lookups = graph.buffer("lookups", BufferDesc { size_bytes: size_of::<u64>() as u64 });
     let lookups = clear(graph, "clear_lookups", lookups);
     let mut pass = graph.pass("shade");
     pass.read(geometry, Access::SampledCompute);
     pass.read(counters, Access::Indirect);
     pass.read(counters, Access::StorageReadCompute);
+    pass.read(tiles, Access::StorageReadCompute);
     pass.read(pixels, Access::StorageReadCompute);
     let radiance = pass.modify(radiance, Access::StorageWriteCompute);
     let lookups = pass.modify(lookups, Access::StorageWriteCompute);
@@ -243,6 +244,7 @@ pub fn shade<'a>(
         let bindings = Bindings::new()
             .image("geometry", resources.image(geometry))
             .buffer("counters", counters)
+            .buffer("tile_list", resources.buffer(tiles))
             .buffer("pixel_list", resources.buffer(pixels))
             .image("radiance", resources.image(radiance))
             .sampled("environment_pyramid", &light.pyramid, &light.sampler)

@@ -35,8 +35,8 @@ impl Validated {
 
 /// The built-in sphere of one material in a built-in environment.
 pub fn sphere(material: MaterialSource, environment: &str, threads: u32, (width, height): (u32, u32)) -> Scene {
-    let mut scene = Scene::default();
-    scene.materials = vec![MaterialSettings { name: "m".to_owned(), source: material }];
+    let mut scene =
+        Scene { materials: vec![MaterialSettings { name: "m".to_owned(), source: material }], ..Scene::default() };
     scene.objects[0].material = "m".to_owned();
     scene.environment.source = Source::Builtin(environment.to_owned());
     scene.shading.threads = threads;
