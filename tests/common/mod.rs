@@ -84,8 +84,29 @@ pub fn data() -> Option<PathBuf> {
     folder.is_dir().then_some(folder)
 }
 
-/// A MERL file of a made-up material: diffuse and a lobe, with -1 below the horizon as in the database.
+/// A MERL file of a made-up material: diffuse and a lobe.
 pub fn merl_like_table() -> Vec<u8> {
+    merl_file(|theta_h, theta_d| {
+        let fresnel = 0.04 + 0.96 * (1.0 - theta_d.cos()).powi(5);
+        let lobe = 8.0 * fresnel * (-(theta_h.tan() / 0.15).powi(2)).exp();
+        [0.12, 0.05, 0.02].map(|diffuse| diffuse + lobe)
+    })
+}
+
+/// A MERL file of alumina-oxide as it was measured at phi_d = 90 degrees, held constant over phi_d; `None` without the data.
+pub fn alumina_oxide() -> Option<Vec<u8>> {
+    let slice = std::fs::read(data()?.join("merl/slices/alumina-oxide.slice")).ok()?;
+    let values: Vec<f32> = slice.chunks_exact(4).map(|v| f32::from_le_bytes([v[0], v[1], v[2], v[3]])).collect();
+    Some(merl_file(|theta_h, theta_d| {
+        // Rows are theta_d in degrees, columns theta_h in its square-root bins.
+        let row = theta_d.to_degrees() as usize;
+        let column = (90.0 * (theta_h / std::f64::consts::FRAC_PI_2).sqrt()) as usize;
+        [0, 1, 2].map(|channel| f64::from(values[3 * (90 * row + column) + channel]))
+    }))
+}
+
+/// A MERL file of a BRDF of theta_h and theta_d (radians, bin centres), with -1 below the horizon as in the database.
+fn merl_file(brdf: impl Fn(f64, f64) -> [f64; 3]) -> Vec<u8> {
     let mut bytes: Vec<u8> = [90_i32, 90, 180].iter().flat_map(|size| size.to_le_bytes()).collect();
     for (channel, scale) in [1.0, 1.15, 1.66].iter().enumerate() {
         for cell in 0..90 * 90 * 180 {
@@ -93,11 +114,8 @@ pub fn merl_like_table() -> Vec<u8> {
             let theta_h = ((theta_h as f64 + 0.5) / 90.0).powi(2) * std::f64::consts::FRAC_PI_2;
             let (theta_d, phi_d) = ((theta_d as f64 + 0.5).to_radians(), (phi_d as f64 + 0.5).to_radians());
             let swing = theta_h.sin() * theta_d.sin() * phi_d.cos();
-            let fresnel = 0.04 + 0.96 * (1.0 - theta_d.cos()).powi(5);
-            let lobe = 8.0 * fresnel * (-(theta_h.tan() / 0.15).powi(2)).exp();
-            let value = [0.12, 0.05, 0.02][channel] + lobe;
             let below = theta_h.cos() * theta_d.cos() - swing.abs() < 0.0;
-            let stored = if below { -1.0 } else { value * 1500.0 / scale };
+            let stored = if below { -1.0 } else { brdf(theta_h, theta_d)[channel] * 1500.0 / scale };
             bytes.extend_from_slice(&stored.to_le_bytes());
         }
     }
