@@ -116,10 +116,10 @@ fn a_white_furnace_shows_the_albedo() {
     let table = folder.path().join("table.binary");
     std::fs::write(&table, common::merl_like_table()).unwrap();
     materials.push(("table", threadlight::scene::MaterialSource::File(table)));
-    if let Some(merl) =
-        common::data().map(|_| std::path::PathBuf::from("target/merl/alumina-oxide.binary")).filter(|f| f.is_file())
-    {
-        materials.push(("alumina-oxide", threadlight::scene::MaterialSource::File(merl)));
+    if let Some(bytes) = common::alumina_oxide() {
+        let table = folder.path().join("alumina-oxide.binary");
+        std::fs::write(&table, bytes).unwrap();
+        materials.push(("alumina-oxide", threadlight::scene::MaterialSource::File(table)));
     }
     for (name, material) in materials {
         let mut scene = sphere(material, "white", 100, (160, 120));
