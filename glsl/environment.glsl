@@ -9,8 +9,7 @@ float texel_solid_angle(float face_size, vec3 d) {
     return 4.0 / (face_size * face_size) * m * m * m;
 }
 
-// Level of the pyramid whose texels around `d` have a solid angle, of which the logarithm to base 2 is given (Colbert
-// and Krivanek 2007).
-float level_of(float log2_solid_angle_sr, float face_size, vec3 d) {
-    return 0.5 * (log2_solid_angle_sr - log2(texel_solid_angle(face_size, d)));
+// Level of the pyramid whose texels around `d` have this solid angle (Colbert and Krivanek 2007).
+float level_of(float solid_angle_sr, float face_size, vec3 d) {
+    return 0.5 * log2(solid_angle_sr / texel_solid_angle(face_size, d));
 }

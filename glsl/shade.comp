@@ -60,6 +60,21 @@ uint lookups = 0;
 
 shared uint group_lookups;
 
+// Each sub-pixel looks where its part of the threads points, and the directions of one fill the gaps between those of another,
+// but only where their normals agree. Normals d apart reflect 2 d apart, and gaps stay open once that is half of their
+// width: then each lookup has to stand for the 4 d beside it in either direction. With R the length of the mean normal,
+// the mean square deviation is 2 (1 - R), and for 2 x 2 sub-pixels that is d^2 / 2, so (4 d)^2 = 64 (1 - R), for each of
+// the other sub-pixels.
+float footprint(uvec2 pixel) {
+    vec3 sum = vec3(0.0);
+    for (uint j = 0; j < SUBPIXELS * SUBPIXELS; ++j) {
+        uvec2 subpixel = pixel * SUBPIXELS + uvec2(j % SUBPIXELS, j / SUBPIXELS);
+        sum += geometry_normal(texelFetch(geometry, ivec2(subpixel), 0).xy);
+    }
+    const float count = float(SUBPIXELS * SUBPIXELS);
+    return max(64.0 * (count - 1.0) * (1.0 - length(sum) / count), 0.0);
+}
+
 void main() {
     if (gl_LocalInvocationIndex == 0) {
         group_lookups = 0;
@@ -78,6 +93,7 @@ void main() {
         uvec2 pixel = uvec2(tile % tiles.x, tile / tiles.x) * TILE_SIDE + uvec2(place % TILE_SIDE, place / TILE_SIDE);
         vec3 sum = vec3(0.0);
         uint covered = 0;
+        float footprint_sr = interior ? footprint(pixel) : 0.0;
         for (uint j = 0; j < subpixel_count; ++j) {
             uvec2 subpixel = pixel * SUBPIXELS + uvec2(j % SUBPIXELS, j / SUBPIXELS);
             uvec2 texel = texelFetch(geometry, ivec2(subpixel), 0).xy;
@@ -88,6 +104,7 @@ void main() {
             vec2 position = (vec2(subpixel) + 0.5) / vec2(push.size_px * SUBPIXELS);
             vec3 w_o = -normalize(camera_ray(push.camera, position));
             Surface surface = make_surface(to_environment(geometry_normal(texel)), to_environment(w_o));
+            surface.footprint_sr = footprint_sr;
             Material material = materials[geometry_material(texel)];
             sum += interior ? estimate(surface, material, j, subpixel_count) : estimate(surface, material, 0, 1);
         }

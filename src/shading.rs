@@ -18,6 +18,8 @@ pub struct Surface {
     pub w_o: Vec3,
     /// Angle between the normal and w_o in radians; above 90 degrees where an interpolated normal faces away.
     pub theta_o: f32,
+    /// Solid angle by which lookups grow where sub-pixels share one sum over the threads; else 0.
+    pub footprint_sr: f32,
 }
 
 impl Surface {
@@ -28,7 +30,12 @@ impl Surface {
         let sin_theta_o = across.length();
         // The reason for 1e-6 stands in the shader.
         let x = if sin_theta_o > 1e-6 { across / sin_theta_o } else { any_tangent(n) };
-        Self { frame: Mat3::from_cols(x, n.cross(x), n), w_o, theta_o: sin_theta_o.atan2(cos_theta_o) }
+        Self {
+            frame: Mat3::from_cols(x, n.cross(x), n),
+            w_o,
+            theta_o: sin_theta_o.atan2(cos_theta_o),
+            footprint_sr: 0.0,
+        }
     }
 }
 
@@ -127,13 +134,17 @@ impl Paper<'_> {
         (self.first..self.threads.count).step_by(self.stride)
     }
 
-    fn add_term(&self, sum: &mut WeightedSum, frame: Mat3, w_i: Vec3, w_o: Vec3, log2_p: f32) {
+    fn add_term(&self, sum: &mut WeightedSum, frame: Mat3, w_i: Vec3, w_o: Vec3, log2_p: f32, solid_angle_sr: f32) {
         let direction = frame * w_i;
-        let solid_angle = (-(self.threads.count as f32).log2() - log2_p).exp2();
-        let radiance = self.light.lookup(direction, self.light.level_of(solid_angle, direction));
+        let radiance = self.light.lookup(direction, self.light.level_of(solid_angle_sr, direction));
         let weight = self.brdf.evaluate(w_i.as_dvec3(), w_o.as_dvec3()).as_vec3() * (w_i.z * (-log2_p).exp2());
         sum.weight += weight;
         sum.radiance += weight * radiance;
+    }
+
+    fn lookup_solid_angle(&self, surface: &Surface, log2_p: f32) -> f32 {
+        let share_sr = (-log2_p).exp2() / self.threads.count as f32;
+        (share_sr + surface.footprint_sr).min(share_sr * self.stride as f32)
     }
 
     fn threads_following_view(&self, surface: &Surface, rows: &Rows) -> Vec3 {
@@ -141,7 +152,9 @@ impl Paper<'_> {
         let mut sum = WeightedSum::default();
         for k in self.partition() {
             let between = self.thread(rows.below, k).lerp(self.thread(rows.above, k), rows.t);
-            self.add_term(&mut sum, surface.frame, between.truncate().normalize(), w_o, between.w);
+            let solid_angle_sr = self.lookup_solid_angle(surface, between.w);
+            let w_i = between.truncate().normalize();
+            self.add_term(&mut sum, surface.frame, w_i, w_o, between.w, solid_angle_sr);
         }
         sum.weighted_mean()
     }
@@ -156,7 +169,9 @@ impl Paper<'_> {
             let cos_theta_d = w_o.dot(h);
             let w_i = 2.0 * cos_theta_d * h - w_o;
             if w_i.z > 0.0 {
-                self.add_term(&mut sum, frame, w_i, w_o, thread.w + (h.z / cos_theta_d).log2());
+                let log2_p = thread.w + (h.z / cos_theta_d).log2();
+                let solid_angle_sr = self.lookup_solid_angle(surface, log2_p);
+                self.add_term(&mut sum, frame, w_i, w_o, log2_p, solid_angle_sr);
             }
         }
         sum.weighted_mean()
@@ -190,6 +205,14 @@ pub fn is_interior(texels: &[UVec2]) -> bool {
     })
 }
 
+/// Solid angle in sr by which lookups grow in a pixel of these sub-pixels. Twin of `footprint` in glsl/shade.comp, which
+/// derives it.
+fn footprint(texels: &[UVec2]) -> f32 {
+    let sum: Vec3 = texels.iter().filter_map(|texel| unpack_geometry(*texel)).map(|(normal, _)| normal).sum();
+    let count = texels.len() as f32;
+    (64.0 * (count - 1.0) * (1.0 - sum.length() / count)).max(0.0)
+}
+
 /// Linear radiance times coverage, and coverage, of the pixel that sees `texels`: its sub-pixels, row by row.
 /// Twin of `main` in glsl/shade.comp.
 pub fn shade(
@@ -205,6 +228,7 @@ pub fn shade(
     let [cos, sin] = view.rotation();
     let to_environment = |d: Vec3| Vec3::new(cos * d.x - sin * d.z, d.y, sin * d.x + cos * d.z);
     let interior = is_interior(texels);
+    let footprint_sr = if interior { footprint(texels) } else { 0.0 };
     let mut sum = Vec3::ZERO;
     let mut covered = 0;
     for (j, texel) in texels.iter().enumerate() {
@@ -212,7 +236,7 @@ pub fn shade(
         covered += 1;
         let subpixel = pixel * view.subpixels + UVec2::new(j as u32 % view.subpixels, j as u32 / view.subpixels);
         let w_o = -rays.ray((subpixel.as_vec2() + 0.5) / size.as_vec2()).normalize();
-        let surface = Surface::new(to_environment(normal), to_environment(w_o));
+        let surface = Surface { footprint_sr, ..Surface::new(to_environment(normal), to_environment(w_o)) };
         let (brdf, threads) = &materials[material];
         let (first, stride) = if interior { (j, texels.len()) } else { (0, 1) };
         sum += Paper { brdf, threads, light, first, stride }.estimate(&surface, to_environment(rays.right()));

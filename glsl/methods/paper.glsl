@@ -4,8 +4,7 @@
 // Twin: Paper in src/shading.rs.
 
 // Row by row of theta_o: the row's albedo, then thread by thread the direction in the shading frame, and the logarithm
-// to base 2 of its pdf in 1/sr. Between rows the logarithm is nearer to the pdf than a linear blend, and it is what the
-// level needs.
+// to base 2 of its pdf in 1/sr. Between rows the logarithm is nearer to the pdf than a linear blend.
 layout(set = 0, binding = 7, std430) readonly buffer Threads {
     vec4 threads[];
 };
@@ -22,11 +21,18 @@ struct WeightedSum {
     vec3 radiance;
 };
 
+// Solid angle of the lookup for a sample of this pdf: its share of the hemisphere, 1 / (m p), and the footprint, up to what
+// the partition's samples need to fill the hemisphere by themselves.
+float lookup_solid_angle(Surface surface, Material material, Partition share, float log2_p) {
+    float share_sr = exp2(-log2_p) / float(material.thread_count);
+    return min(share_sr + surface.footprint_sr, share_sr * float(share.stride));
+}
+
 // Adds one term of equation (2), but for 1/m; all directions in `frame`.
-void add_term(inout WeightedSum sum, Material material, mat3 frame, vec3 w_i, vec3 w_o, float log2_p) {
+void add_term(inout WeightedSum sum, Material material, mat3 frame, vec3 w_i, vec3 w_o, float log2_p, float solid_angle_sr) {
     ++lookups;
     vec3 direction = frame * w_i;
-    float level = level_of(-log2(float(material.thread_count)) - log2_p, push.face_size, direction);
+    float level = level_of(solid_angle_sr, push.face_size, direction);
     vec3 radiance = textureLod(environment_pyramid, direction, level).rgb;
     vec3 weight = brdf(material, w_i, w_o) * (w_i.z * exp2(-log2_p));
     sum.weight += weight;
@@ -66,7 +72,8 @@ vec3 threads_following_view(Surface surface, Material material, Rows rows, Parti
     WeightedSum sum = WeightedSum(vec3(0.0), vec3(0.0));
     for (uint k = share.first; k < material.thread_count; k += share.stride) {
         vec4 between = mix(threads[below + k], threads[above + k], rows.t);
-        add_term(sum, material, surface.frame, normalize(between.xyz), w_o, between.w);
+        float solid_angle_sr = lookup_solid_angle(surface, material, share, between.w);
+        add_term(sum, material, surface.frame, normalize(between.xyz), w_o, between.w, solid_angle_sr);
     }
     return weighted_mean(sum);
 }
@@ -84,7 +91,9 @@ vec3 threads_of_facing_view(Surface surface, Material material, Partition share)
         float cos_theta_d = dot(w_o, h);
         vec3 w_i = 2.0 * cos_theta_d * h - w_o;
         if (w_i.z > 0.0) {
-            add_term(sum, material, frame, w_i, w_o, thread.w + log2(h.z / cos_theta_d));
+            float log2_p = thread.w + log2(h.z / cos_theta_d);
+            float solid_angle_sr = lookup_solid_angle(surface, material, share, log2_p);
+            add_term(sum, material, frame, w_i, w_o, log2_p, solid_angle_sr);
         }
     }
     return weighted_mean(sum);
