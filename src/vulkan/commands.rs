@@ -109,30 +109,30 @@ impl Commands {
             // SAFETY: the command buffer is recording; the label is ended below.
             unsafe { debug.cmd_begin_debug_utils_label(self.raw, &info) };
         }
-        let queries = self.queries.filter(|_| is_timed(self.timed.len()));
-        let first_query = 2 * self.timed.len() as u32;
-        let timestamp = |query: u32, stage| {
-            if let Some(queries) = queries {
-                // SAFETY: the query was reset at the start of this frame and is written once in it.
-                unsafe { device.synchronization2.cmd_write_timestamp2(self.raw, stage, queries, query) };
-            }
-        };
         // Both wait for all work before them, so that passes are timed one by one even where they could overlap.
-        timestamp(first_query, vk::PipelineStageFlags2::ALL_COMMANDS);
-        if queries.is_some() {
+        let timed = is_timed(self.timed.len()) && self.queries.is_some();
+        let first_query = 2 * self.timed.len() as u32;
+        if timed {
             self.timed.push(name.to_owned());
+            self.write_timestamp(first_query);
         }
         let result = pass(self);
-        if let Some(queries) = queries {
-            let stage = vk::PipelineStageFlags2::ALL_COMMANDS;
-            // SAFETY: as above.
-            unsafe { device.synchronization2.cmd_write_timestamp2(self.raw, stage, queries, first_query + 1) };
+        if timed {
+            self.write_timestamp(first_query + 1);
         }
         if let Some(debug) = &device.debug {
             // SAFETY: begun above.
             unsafe { debug.cmd_end_debug_utils_label(self.raw) };
         }
         result
+    }
+
+    /// Writes the time at which everything recorded so far has finished.
+    fn write_timestamp(&mut self, query: u32) {
+        let Some(queries) = self.queries else { return };
+        let stage = vk::PipelineStageFlags2::ALL_COMMANDS;
+        // SAFETY: the query was reset at the start of this frame and is written once in it.
+        unsafe { self.device.synchronization2.cmd_write_timestamp2(self.raw, stage, queries, query) };
     }
 
     /// Runs a compute shader.
