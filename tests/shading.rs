@@ -3,7 +3,6 @@ mod common;
 
 use common::{Validated, analytic_materials, model, ready, sphere};
 use glam::{UVec2, Vec3, Vec4};
-use threadlight::environment::Pyramid;
 use threadlight::pipeline::{Rendering, Wanted};
 use threadlight::prepare::Prepared;
 use threadlight::scene::{Scene, Source};
@@ -53,12 +52,11 @@ fn the_shader_agrees_with_its_cpu_twin() {
             scene.environment.intensity = 1.7;
             let prepared = ready(&scene);
             let rendering = gpu.render(&prepared, EVERYTHING);
-            let materials: Vec<_> = prepared.materials.iter().map(|m| (m.brdf.clone(), m.threads.clone())).collect();
-            let light = Pyramid::box_filtered(&prepared.environment);
+            let twin = shading::Twin::new(&prepared).unwrap();
             let (mut interior, mut edge, mut covered) = (0, 0, 0);
             for pixel in pixels(&prepared) {
                 let texels = texels_of(&prepared, &rendering, pixel);
-                let expected = shading::shade(&prepared.view, pixel, &texels, &materials, &light, 1.7);
+                let expected = twin.shade(pixel, &texels);
                 let found = Vec4::from(rendering.radiance[(pixel.y * 48 + pixel.x) as usize]);
                 assert_eq!(found.w, expected.w, "{name}, {environment}: coverage at {pixel}");
                 let difference = (found - expected).abs().max_element();

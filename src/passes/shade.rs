@@ -81,9 +81,8 @@ impl DeviceMaterials {
                 slices.extend(SliceTable::new(brdf).cdfs);
             }
         }
-        let storage = |name, contents: &[u8]| {
-            Buffer::with_contents(device, name, vk::BufferUsageFlags::STORAGE_BUFFER, contents)
-        };
+        let storage =
+            |name, contents: &[u8]| Buffer::with_contents(device, name, vk::BufferUsageFlags::STORAGE_BUFFER, contents);
         let optional = |name, contents: &[u8]| (!contents.is_empty()).then(|| storage(name, contents)).transpose();
         Ok(Self {
             records: storage("materials", bytemuck::cast_slice(&records))?,

@@ -24,7 +24,7 @@ pub mod slice;
 pub mod slice_table;
 pub mod smoothing;
 #[cfg(test)]
-mod test_materials;
+pub(crate) mod test_materials;
 
 pub use cache::{CacheState, default_directory, load_or_generate};
 pub use file::{FORMAT_VERSION, read, write};
