@@ -47,20 +47,17 @@ struct CdfStep {
     float within;
 };
 
+// Binary search by halving strides, for at most 128 steps. Unrolled, since a compiler's limit on iterations (lavapipe's is 65535
+// in all) had better be left to samples.
 CdfStep invert_cdf(uint start, uint steps, float mass) {
-    uint low = 0;
-    uint high = steps; // slices[low] <= mass < slices[high]: empty steps are never met
-    while (high - low > 1) {
-        uint middle = (low + high) / 2;
-        if (slices[start + middle] <= mass) {
-            low = middle;
-        } else {
-            high = middle;
-        }
+    uint low = 0; // slices[low] <= mass < slices[low + 1] at the end: empty steps are never met
+    [[unroll]] for (int bit = 6; bit >= 0; --bit) {
+        uint next = low + (1u << bit);
+        low = next < steps && slices[start + min(next, steps)] <= mass ? next : low;
     }
     float from = slices[start + low];
     // Random numbers stand for the middle of their 2^-24.
-    return CdfStep(low, (mass - from + 0.5 / 16777216.0) / (slices[start + high] - from));
+    return CdfStep(low, (mass - from + 0.5 / 16777216.0) / (slices[start + low + 1] - from));
 }
 
 // A half vector from the row at `start`, uniform over the solid angle of its cell.
@@ -105,7 +102,7 @@ float brdf_pdf(SliceRows rows, vec3 w_i, vec3 w_o, vec3 h) {
     return mix(of_table, w_i.z * 0.318309886, DIFFUSE_SHARE);
 }
 
-// A direction and its density in 1/sr; a density of 0 stands for one below the horizon.
+// A direction and its density in 1/sr, which is 0 below the horizon.
 struct DirectionSample {
     vec3 w_i;
     float p;
@@ -126,7 +123,7 @@ DirectionSample sample_brdf(SliceRows rows, vec3 w_o, uvec4 bits) {
         w_i = 2.0 * dot(w_o, h) * h - w_o;
     }
     if (!(w_i.z > 0.0 && dot(w_o, h) > 0.0)) {
-        return DirectionSample(vec3(0.0, 0.0, 1.0), 0.0);
+        return DirectionSample(vec3(0.0), 0.0);
     }
     return DirectionSample(w_i, brdf_pdf(rows, w_i, w_o, h));
 }

@@ -1,5 +1,6 @@
 #version 450
 // Pass 2 of the paper (section 4.2): each sub-pixel evaluates its partition of the threads, the pixel is their sum.
+#extension GL_EXT_control_flow_attributes : require
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_samplerless_texture_functions : require
 #include "camera.glsl"

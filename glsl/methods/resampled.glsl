@@ -6,7 +6,7 @@
 #include "light_sampling.glsl"
 #include "importance_sampling.glsl"
 
-const uint CANDIDATES = 8; // even
+const int CANDIDATES = 8; // even
 
 vec3 estimate(Surface surface, Material material, uint first, uint stride) {
     vec3 w_o = view_direction(surface);
@@ -15,32 +15,23 @@ vec3 estimate(Surface surface, Material material, uint first, uint stride) {
     for (uint k = first; k < push.sample_count; k += stride) {
         float weight_sum = 0.0;
         vec3 kept = vec3(0.0);
-        for (uint c = 0; c < CANDIDATES; ++c) {
-            uint index = k * CANDIDATES + c;
-            vec3 w_i;
-            if (c % 2 == 0) {
-                DirectionSample drawn = sample_brdf(rows, w_o, random_bits(2 * index));
-                if (!(drawn.p > 0.0)) {
-                    continue;
+        [[unroll]] for (int c = 0; c < CANDIDATES; ++c) {
+            uint index = k * uint(CANDIDATES) + uint(c);
+            uvec4 bits = random_bits(2 * index);
+            vec3 w_i = c % 2 == 0 ? sample_brdf(rows, w_o, bits).w_i : sample_light(bits) * surface.frame;
+            if (w_i.z > 0.0) {
+                vec3 direction = surface.frame * w_i;
+                ++lookups;
+                vec4 texel = environment_texel(direction);
+                vec3 value = brdf(material, w_i, w_o) * texel.rgb * w_i.z;
+                float q = dot(value, vec3(0.2126, 0.7152, 0.0722));
+                float p = 0.5 * (brdf_pdf(rows, w_i, w_o, normalize(w_i + w_o)) + light_pdf(texel, direction));
+                float weight = q / p; // p > 0: brdf_pdf has a diffuse share
+                weight_sum += weight;
+                // Kept with probability weight / weight_sum: by the last candidate each in proportion.
+                if (weight > 0.0 && to_unit(random_bits(2 * index + 1)).x * weight_sum < weight) {
+                    kept = value / q;
                 }
-                w_i = drawn.w_i;
-            } else {
-                w_i = sample_light(random_bits(2 * index)) * surface.frame;
-                if (!(w_i.z > 0.0)) {
-                    continue;
-                }
-            }
-            vec3 direction = surface.frame * w_i;
-            ++lookups;
-            vec4 texel = environment_texel(direction);
-            vec3 value = brdf(material, w_i, w_o) * texel.rgb * w_i.z;
-            float q = dot(value, vec3(0.2126, 0.7152, 0.0722));
-            float p = 0.5 * (brdf_pdf(rows, w_i, w_o, normalize(w_i + w_o)) + light_pdf(texel, direction));
-            float weight = q / p; // p > 0: brdf_pdf has a diffuse share
-            weight_sum += weight;
-            // Kept with probability weight / weight_sum: by the last candidate each in proportion.
-            if (weight > 0.0 && to_unit(random_bits(2 * index + 1)).x * weight_sum < weight) {
-                kept = value / q;
             }
         }
         sum += kept * (weight_sum / float(CANDIDATES));
