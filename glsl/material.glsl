@@ -7,6 +7,7 @@ struct Material {
     uint first_thread; // where its threads start in the thread buffer
     uint thread_count;
     uint row_count;
+    uint first_slice;  // where its CDFs start in the buffer of slices
 };
 
 layout(set = 0, binding = 5, std430) readonly buffer Materials {

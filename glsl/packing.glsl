@@ -1,6 +1,6 @@
 // A texel of the geometry cache: what shading needs of a sub-pixel, in 8 bytes.
 // The view vector follows from the sub-pixel's place on the image, so it is not stored.
-// Twin: src/shading.rs.
+// Twin: src/shading/mod.rs.
 
 // Octahedral map of a unit vector to [-1, 1]^2 (Meyer et al. 2010); two 16-bit numbers hold it to 4e-5 rad.
 vec2 octahedral_encode(vec3 n) {

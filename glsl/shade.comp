@@ -1,5 +1,6 @@
 #version 450
 // Pass 2 of the paper (section 4.2): each sub-pixel evaluates its partition of the threads, the pixel is their sum.
+#extension GL_EXT_control_flow_attributes : require
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_samplerless_texture_functions : require
 #include "camera.glsl"
@@ -40,9 +41,10 @@ layout(push_constant) uniform Push {
     float face_size;        // of level 0 of the environment pyramid
     vec2 rotation;          // cosine and sine of the environment's rotation about +Y
     float radiance_scale;   // radiance of a texel of value 1
+    uint sample_count;      // threads, or samples, of a pixel
+    uvec2 seed;             // low and high half
 } push;
 
-#include "environment.glsl"
 #include "material.glsl"
 #include "brdf_models.glsl"
 
@@ -54,8 +56,12 @@ vec3 to_environment(vec3 d) {
 // Lookups in the environment that this invocation has made: methods count them.
 uint lookups = 0;
 
-// A method gives the sum over threads first, first + stride, ... of weight times environment: a partition of
-// the radiance that leaves `surface` towards the eye.
+// The sub-pixel that is being shaded: methods draw random numbers by its place.
+uvec2 subpixel = uvec2(0);
+
+// A method defines `vec3 estimate(Surface surface, Material material, uint first, uint stride)`: the sum over its threads or
+// samples first, first + stride, ... of weight times environment, a partition of the radiance that leaves `surface` towards
+// the eye. It includes what it looks up; nothing else of the scene is made or uploaded.
 #include "method.glsl"
 
 shared uint group_lookups;
@@ -95,7 +101,7 @@ void main() {
         uint covered = 0;
         float footprint_sr = interior ? footprint(pixel) : 0.0;
         for (uint j = 0; j < subpixel_count; ++j) {
-            uvec2 subpixel = pixel * SUBPIXELS + uvec2(j % SUBPIXELS, j / SUBPIXELS);
+            subpixel = pixel * SUBPIXELS + uvec2(j % SUBPIXELS, j / SUBPIXELS);
             uvec2 texel = texelFetch(geometry, ivec2(subpixel), 0).xy;
             if (!is_covered(texel)) {
                 continue;

@@ -1,4 +1,4 @@
-// A point to shade: its shading frame and view angle. Twin: Surface in src/shading.rs.
+// A point to shade: its shading frame and view angle. Twin: Surface in src/shading/mod.rs.
 
 struct Surface {
     // Columns: x, the part of w_o orthogonal to n; y = z cross x; z = n. In the environment's coordinates.
@@ -40,4 +40,10 @@ mat3 fixed_frame(vec3 n, vec3 axis) {
     // An axis within 1e-3 of n gives no direction that single precision could be trusted with.
     vec3 x = dot(along, along) > 1e-6 ? normalize(along) : any_tangent(n);
     return mat3(x, cross(n, x), n);
+}
+
+// Towards the eye in the shading frame, (sin theta_o, 0, cos theta_o). Interpolated normals may face away; cos_theta_o is
+// held at 1e-4 or more (89.994 degrees), so that BRDFs stay defined.
+vec3 view_direction(Surface surface) {
+    return normalize(vec3(dot(surface.frame[0], surface.w_o), 0.0, max(dot(surface.frame[2], surface.w_o), 1e-4)));
 }

@@ -1,5 +1,5 @@
 #version 450
-// Linear radiance to display values: clamp(exposure L, 0, 1)^(1/gamma). Twin: display_value in src/shading.rs.
+// Linear radiance to display values: clamp(exposure L, 0, 1)^(1/gamma). Twin: display_value in src/shading/mod.rs.
 
 layout(local_size_x = 8, local_size_y = 8) in;
 

@@ -1,6 +1,7 @@
 //! The shading methods: ways to estimate equation (1) that go through one shading interface.
 //!
-//! A method is one GLSL file in `glsl/methods/` that defines `estimate`, one CPU twin in `shading.rs`, and one line here.
+//! A method is one GLSL file in `glsl/methods/` that defines `estimate`, one CPU twin in `shading/`, and
+//! one line here in each list.
 use crate::vulkan::{Shader, compiled};
 use crate::{Error, Result};
 
@@ -9,16 +10,42 @@ use crate::{Error, Result};
 pub enum Method {
     /// The paper's threads: equations (2) to (10), box-filtered lookups.
     Paper,
+    /// Monte Carlo, uniform over the hemisphere.
+    Uniform,
+    /// Monte Carlo, in proportion to the cosine.
+    Cosine,
+    /// Monte Carlo, in proportion to BRDF times cosine (Matusik et al. 2003).
+    Importance,
+    /// The same with filtered lookups (Colbert and Krivanek 2007): biased.
+    Filtered,
+    /// Monte Carlo, in proportion to the environment's light (Agarwal et al. 2003).
+    Environment,
+    /// Resampled importance sampling of the whole product (Talbot et al. 2005).
+    Resampled,
 }
 
 impl Method {
     /// All of them.
-    pub const ALL: &[Self] = &[Self::Paper];
+    pub const ALL: &[Self] = &[
+        Self::Paper,
+        Self::Uniform,
+        Self::Cosine,
+        Self::Importance,
+        Self::Filtered,
+        Self::Environment,
+        Self::Resampled,
+    ];
 
     /// What the command line and scene files call it.
     pub fn name(self) -> &'static str {
         match self {
             Self::Paper => "paper",
+            Self::Uniform => "uniform",
+            Self::Cosine => "cosine",
+            Self::Importance => "importance",
+            Self::Filtered => "filtered",
+            Self::Environment => "environment",
+            Self::Resampled => "resampled",
         }
     }
 
@@ -37,6 +64,22 @@ impl Method {
     pub fn shader(self) -> &'static Shader {
         match self {
             Self::Paper => &compiled::SHADE_PAPER,
+            Self::Uniform => &compiled::SHADE_UNIFORM,
+            Self::Cosine => &compiled::SHADE_COSINE,
+            Self::Importance => &compiled::SHADE_IMPORTANCE,
+            Self::Filtered => &compiled::SHADE_FILTERED,
+            Self::Environment => &compiled::SHADE_ENVIRONMENT,
+            Self::Resampled => &compiled::SHADE_RESAMPLED,
         }
+    }
+
+    /// Whether it shades by sample threads, which take long to make; the others draw that many samples instead.
+    pub fn uses_threads(self) -> bool {
+        matches!(self, Self::Paper)
+    }
+
+    /// Whether the mean over seeds is equation (1), whatever the number of samples.
+    pub fn is_unbiased(self) -> bool {
+        !matches!(self, Self::Paper | Self::Filtered)
     }
 }

@@ -1,5 +1,4 @@
 //! The method on one screen: the frame as a graph of passes, and the renderer that runs it.
-use crate::environment::Pyramid;
 use crate::graph::{Access, Buffer, BufferDesc, Executable, Image};
 use crate::passes::*;
 use crate::prepare::Prepared;
@@ -83,7 +82,7 @@ impl Renderer {
     /// # Errors
     /// No device memory left, or a limit of the device exceeded.
     pub fn new(device: &Arc<Device>, cache_folder: Option<&Path>, prepared: &Prepared) -> Result<Self> {
-        let Prepared { view, method, intensity, environment, .. } = prepared;
+        let Prepared { view, method, intensity, environment, sampling, .. } = prepared;
         let largest = device.limits().max_image_dimension2_d;
         let [width, height] = view.cache_size();
         if width.max(height) > largest {
@@ -94,18 +93,24 @@ impl Renderer {
         let cache = PipelineCache::new(device, cache_folder)?;
         let meshes = prepared.meshes.iter().map(|(name, mesh)| DeviceMesh::new(device, name, mesh));
         let meshes = meshes.collect::<Result<_>>()?;
-        let materials = DeviceMaterials::new(device, prepared.materials.iter().map(|m| (&m.brdf, &m.threads)))?;
-        let light = DeviceLight::new(device, &Pyramid::box_filtered(environment), *intensity)?;
+        let brdfs = prepared.materials.iter().map(|material| (&material.brdf, material.threads.as_ref()));
+        let materials = DeviceMaterials::new(device, *method, brdfs)?;
+        let light = DeviceLight::new(device, *method, environment, *intensity)?;
         let background = prepared.show_environment.then(|| Background::new(device, &cache, environment, *intensity));
         Ok(Self {
             view: view.clone(),
             geometry_cache: GeometryCache::new(device, &cache, meshes, prepared.objects.clone())?,
             classify: Classify::new(device, &cache, view.subpixels)?,
-            shade: Shade::new(device, &cache, *method, view.subpixels, materials, light)?,
+            shade: Shade::new(device, &cache, *method, *sampling, view.subpixels, materials, light)?,
             background: background.transpose()?,
             tone_map: ToneMap::new(device, &cache)?,
             device: device.clone(),
         })
+    }
+
+    /// Starts the random numbers of later frames from `seed`: other noise, for methods that have any.
+    pub fn reseed(&mut self, seed: u64) {
+        self.shade.sampling.seed = seed;
     }
 
     /// Renders the frame `repeat` times and reads back what is `wanted`.

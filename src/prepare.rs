@@ -2,7 +2,7 @@
 use crate::brdf::Brdf;
 use crate::environment::Environment;
 use crate::method::Method;
-use crate::passes::{Object, View};
+use crate::passes::{Object, Sampling, View};
 use crate::scene::{Camera, MaterialSource, Mesh, Scene};
 use crate::threads::{self, CacheState, Observer, ThreadTable};
 use crate::{Error, Result};
@@ -14,6 +14,8 @@ use std::time::Duration;
 pub struct Prepared {
     /// How to estimate radiance.
     pub method: Method,
+    /// How many threads or samples, and which random numbers.
+    pub sampling: Sampling,
     /// Camera, resolution and display settings.
     pub view: View,
     /// Whether the environment is seen behind the objects.
@@ -40,8 +42,8 @@ pub struct PreparedMaterial {
     pub name: String,
     /// Its BRDF.
     pub brdf: Brdf,
-    /// Its threads.
-    pub threads: ThreadTable,
+    /// Its threads, for methods that use them.
+    pub threads: Option<ThreadTable>,
 }
 
 /// Reads a material: a built-in's name, or a file.
@@ -133,16 +135,20 @@ pub fn prepare(scene: &Scene, cache: Option<&Path>, observer: &dyn Observer) -> 
         })?;
         let settings =
             threads::Settings { count: scene.shading.threads as usize, seed: scene.shading.seed, ..Default::default() };
-        let (mut threads, state, time) = threads::load_or_generate(&brdf, &settings, cache, observer)?;
-        threads.material = name.to_owned();
-        thread_time += time;
-        if state == CacheState::Miss {
-            thread_cache = CacheState::Miss;
+        let mut material = PreparedMaterial { name: name.to_owned(), brdf, threads: None };
+        if method.uses_threads() {
+            let (threads, state, time) = threads::load_or_generate(&material.brdf, &settings, cache, observer)?;
+            thread_time += time;
+            if state == CacheState::Miss {
+                thread_cache = CacheState::Miss;
+            }
+            material.threads = Some(ThreadTable { material: name.to_owned(), ..threads });
         }
-        materials.push(PreparedMaterial { name: name.to_owned(), brdf, threads });
+        materials.push(material);
     }
     Ok(Prepared {
         method,
+        sampling: Sampling { count: scene.shading.threads, seed: scene.shading.seed },
         view,
         show_environment: image.background == crate::scene::Background::Environment,
         intensity: scene.environment.intensity,

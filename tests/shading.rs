@@ -1,30 +1,10 @@
 //! Pass 2 against its CPU twin, and against closed forms.
 mod common;
 
-use common::{Validated, analytic_materials, model, ready, sphere};
+use common::{EVERYTHING, Validated, analytic_materials, model, pixels, ready, sphere, texels_of};
 use glam::{UVec2, Vec3, Vec4};
-use threadlight::environment::Pyramid;
-use threadlight::pipeline::{Rendering, Wanted};
-use threadlight::prepare::Prepared;
 use threadlight::scene::{Scene, Source};
 use threadlight::shading;
-
-const EVERYTHING: Wanted = Wanted { radiance: true, display: false, geometry: true };
-
-/// The texels of the geometry cache that a pixel sees.
-fn texels_of(prepared: &Prepared, rendering: &Rendering, pixel: UVec2) -> Vec<UVec2> {
-    let (s, stride) = (prepared.view.subpixels, prepared.view.width * prepared.view.subpixels);
-    let texel = |j: u32| {
-        let at = pixel * s + UVec2::new(j % s, j / s);
-        UVec2::from(rendering.geometry[(at.y * stride + at.x) as usize])
-    };
-    (0..s * s).map(texel).collect()
-}
-
-fn pixels(prepared: &Prepared) -> impl Iterator<Item = UVec2> + use<> {
-    let (width, height) = (prepared.view.width, prepared.view.height);
-    (0..height).flat_map(move |y| (0..width).map(move |x| UVec2::new(x, y)))
-}
 
 #[test]
 fn the_shader_agrees_with_its_cpu_twin() {
@@ -53,12 +33,11 @@ fn the_shader_agrees_with_its_cpu_twin() {
             scene.environment.intensity = 1.7;
             let prepared = ready(&scene);
             let rendering = gpu.render(&prepared, EVERYTHING);
-            let materials: Vec<_> = prepared.materials.iter().map(|m| (m.brdf.clone(), m.threads.clone())).collect();
-            let light = Pyramid::box_filtered(&prepared.environment);
+            let twin = shading::Twin::new(&prepared).unwrap();
             let (mut interior, mut edge, mut covered) = (0, 0, 0);
             for pixel in pixels(&prepared) {
                 let texels = texels_of(&prepared, &rendering, pixel);
-                let expected = shading::shade(&prepared.view, pixel, &texels, &materials, &light, 1.7);
+                let expected = twin.shade(pixel, &texels);
                 let found = Vec4::from(rendering.radiance[(pixel.y * 48 + pixel.x) as usize]);
                 assert_eq!(found.w, expected.w, "{name}, {environment}: coverage at {pixel}");
                 let difference = (found - expected).abs().max_element();

@@ -1,7 +1,8 @@
 // The paper's estimate, equation (2), L_o = 1/m sum over k of f(s_k, o) L_i(s_k) (n . s_k) / p(s_k), divided by what it
 // gives in a white furnace and multiplied by what it should give there, the albedo. So no error of p, between rows
 // or in the proportion of colours, shows as a wrong brightness or tint.
-// Twin: Paper in src/shading.rs.
+// Twin: src/shading/paper.rs.
+#include "environment_pyramid.glsl"
 
 // Row by row of theta_o: the row's albedo, then thread by thread the direction in the shading frame, and the logarithm
 // to base 2 of its pdf in 1/sr. Between rows the logarithm is nearer to the pdf than a linear blend.

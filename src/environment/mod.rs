@@ -4,10 +4,12 @@ use std::f64::consts::{PI, TAU};
 use glam::DVec3;
 
 pub mod cube;
+mod light_map;
 mod load;
 mod procedural;
 pub mod pyramid;
 
+pub use light_map::{Alias, LightMap};
 pub use load::RepairCounts;
 pub use procedural::builtin_names;
 pub use pyramid::Pyramid;

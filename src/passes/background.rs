@@ -34,15 +34,7 @@ impl Background {
     /// # Errors
     /// No device memory left, or a map wider or higher than the device's images can be.
     pub fn new(device: &Arc<Device>, cache: &PipelineCache, environment: &Environment, intensity: f64) -> Result<Self> {
-        let largest = device.limits().max_image_dimension2_d as usize;
-        if environment.width.max(environment.height) > largest {
-            let (width, height) = (environment.width, environment.height);
-            return Err(crate::Error::input(
-                &environment.name,
-                format!("is {width} x {height} pixels, more than this device's images can have ({largest})"),
-                "scale it down, or leave the background out with --background none",
-            ));
-        }
+        check_map_size(device, environment, "scale it down, or leave the background out with --background none")?;
         // A sun as bright as the largest half float is white on any display, so here, unlike in shading, it is cut off.
         let texel = |rgb: &[f32; 3]| [rgb[0], rgb[1], rgb[2], 1.0].map(|value| f16::from_f32(value.min(65504.0)));
         let texels: Vec<[f16; 4]> = environment.texels.iter().map(texel).collect();
@@ -56,6 +48,17 @@ impl Background {
             radiance_scale: intensity as f32,
         })
     }
+}
+
+/// An error for a map wider or higher than the device's images can be.
+pub(super) fn check_map_size(device: &Device, environment: &Environment, remedy: &str) -> Result<()> {
+    let largest = device.limits().max_image_dimension2_d as usize;
+    let (width, height) = (environment.width, environment.height);
+    if width.max(height) <= largest {
+        return Ok(());
+    }
+    let problem = format!("is {width} x {height} pixels, more than this device's images can have ({largest})");
+    Err(crate::Error::input(&environment.name, problem, remedy))
 }
 
 /// Adds the environment where `radiance` is not wholly covered.

@@ -1,10 +1,11 @@
 //! Pass 2 of the paper (section 4.2): the radiance of every listed pixel, by its partition of the sample threads.
+use super::background::check_map_size;
 use super::{CameraRays, Counters, FrameGraph, Tiles, View, clear};
 use crate::brdf::Brdf;
-use crate::environment::Pyramid;
+use crate::environment::{Environment, LightMap, Pyramid};
 use crate::graph::{self, Access, BufferDesc, Image};
 use crate::method::Method;
-use crate::threads::{Sample, ThreadTable};
+use crate::threads::{Sample, SliceTable, ThreadTable};
 use crate::vulkan::{
     self, Bindings, Buffer, ComputePipeline, Device, Groups, ImageKind, ImageShape, PipelineCache, Sampler, SamplerKind,
 };
@@ -22,12 +23,15 @@ struct MaterialRecord {
     first_thread: u32,
     thread_count: u32,
     row_count: u32,
+    first_slice: u32,
+    padding: [u32; 3],
 }
 
-/// Materials, their threads and their tables on the device.
+/// Materials, their threads or CDFs, and their tables on the device.
 pub struct DeviceMaterials {
     records: Buffer,
-    threads: Buffer,
+    threads: Option<Buffer>,
+    slices: Option<Buffer>,
     tables: vulkan::Image,
     table_sampler: Sampler,
     /// Bit i: some material has model i.
@@ -35,19 +39,22 @@ pub struct DeviceMaterials {
 }
 
 impl DeviceMaterials {
-    /// Uploads `materials`, in the order of the indices that objects have.
+    /// Uploads what `method` looks up of `materials`, in the order of the indices that objects have.
     ///
     /// # Errors
     /// No device memory left, or more measured tables than a 3D image of the device holds.
     pub fn new<'m>(
         device: &Arc<Device>,
-        materials: impl IntoIterator<Item = (&'m Brdf, &'m ThreadTable)>,
+        method: Method,
+        materials: impl IntoIterator<Item = (&'m Brdf, Option<&'m ThreadTable>)>,
     ) -> Result<Self> {
+        let use_slices = method.shader().declares("Slices")?;
         let mut records = Vec::new();
         let mut threads: Vec<[f32; 4]> = Vec::new();
+        let mut slices: Vec<f32> = Vec::new();
         let mut tables = TableAtlas::default();
         let mut models_used = 0;
-        for (brdf, table) in materials {
+        for (brdf, thread_table) in materials {
             let mut parameters = brdf.gpu_parameters();
             if let Some(table) = brdf.table() {
                 // glsl/brdf/merl.glsl reads its place in the atlas from a.xy.
@@ -58,19 +65,29 @@ impl DeviceMaterials {
                 parameters,
                 model: brdf.model_index(),
                 first_thread: threads.len() as u32,
-                thread_count: table.count as u32,
-                row_count: table.rows as u32,
+                thread_count: thread_table.map_or(0, |table| table.count as u32),
+                row_count: thread_table.map_or(0, |table| table.rows as u32),
+                first_slice: slices.len() as u32,
+                padding: [0; 3],
             });
-            for (row, albedo) in table.albedo.iter().enumerate() {
-                threads.push([albedo[0], albedo[1], albedo[2], 0.0]);
-                let thread = |sample: &Sample| sample.direction().as_vec3().extend(sample.p.log2()).to_array();
-                threads.extend(table.row(row).iter().map(thread));
+            if let Some(table) = thread_table {
+                for (row, albedo) in table.albedo.iter().enumerate() {
+                    threads.push([albedo[0], albedo[1], albedo[2], 0.0]);
+                    let thread = |sample: &Sample| sample.direction().as_vec3().extend(sample.p.log2()).to_array();
+                    threads.extend(table.row(row).iter().map(thread));
+                }
+            }
+            if use_slices {
+                slices.extend(SliceTable::new(brdf).cdfs);
             }
         }
-        let storage = vk::BufferUsageFlags::STORAGE_BUFFER;
+        let storage =
+            |name, contents: &[u8]| Buffer::with_contents(device, name, vk::BufferUsageFlags::STORAGE_BUFFER, contents);
+        let optional = |name, contents: &[u8]| (!contents.is_empty()).then(|| storage(name, contents)).transpose();
         Ok(Self {
-            records: Buffer::with_contents(device, "materials", storage, bytemuck::cast_slice(&records))?,
-            threads: Buffer::with_contents(device, "threads", storage, bytemuck::cast_slice(&threads))?,
+            records: storage("materials", bytemuck::cast_slice(&records))?,
+            threads: optional("threads", bytemuck::cast_slice(&threads))?,
+            slices: optional("slices", bytemuck::cast_slice(&slices))?,
             tables: tables.upload(device)?,
             table_sampler: Sampler::new(device, "brdf tables", SamplerKind::WrappedLinear)?,
             models_used,
@@ -131,21 +148,52 @@ impl<'a> TableAtlas<'a> {
     }
 }
 
-/// The environment's pyramid on the device.
+/// What a method looks up of the environment, on the device.
 pub struct DeviceLight {
-    pyramid: vulkan::Image,
+    pyramid: Option<DevicePyramid>,
+    map: Option<vulkan::Image>,
+    aliases: Option<Buffer>,
+    intensity: f32,
+}
+
+/// The environment's pyramid on the device.
+struct DevicePyramid {
+    image: vulkan::Image,
     sampler: Sampler,
     face_size: u32,
-    /// Radiance of a texel of value 1: the intensity, and what keeps suns within half floats.
-    radiance_scale: f32,
+    /// Radiance of a texel of value 1: what keeps suns within half floats.
+    scale: f32,
 }
 
 impl DeviceLight {
-    /// Uploads `pyramid`, as half floats where they hold it, and applies `intensity` to it.
+    /// Makes and uploads what `method` looks up of `environment`.
     ///
     /// # Errors
-    /// No device memory left.
-    pub fn new(device: &Arc<Device>, pyramid: &Pyramid, intensity: f64) -> Result<Self> {
+    /// No device memory left, or a map wider or higher than the device's images can be.
+    pub fn new(device: &Arc<Device>, method: Method, environment: &Environment, intensity: f64) -> Result<Self> {
+        let shader = method.shader();
+        let pyramid = shader.declares("environment_pyramid")?;
+        let pyramid = pyramid.then(|| DevicePyramid::new(device, &Pyramid::box_filtered(environment))).transpose()?;
+        let mut light = Self { pyramid, map: None, aliases: None, intensity: intensity as f32 };
+        if shader.declares("environment_map")? {
+            check_map_size(device, environment, "scale it down, or use --method filtered")?;
+            let map = LightMap::new(environment);
+            let shape = ImageShape::plane(vk::Format::R32G32B32A32_SFLOAT, map.width as u32, map.height as u32);
+            let texels = bytemuck::cast_slice(&map.texels).to_vec();
+            light.map = Some(vulkan::Image::with_texels(device, "environment map", shape, &[texels])?);
+            if shader.declares("LightAliases")? {
+                let (aliases, storage) = (map.aliases(), vk::BufferUsageFlags::STORAGE_BUFFER);
+                let aliases = bytemuck::cast_slice(&aliases);
+                light.aliases = Some(Buffer::with_contents(device, "light aliases", storage, aliases)?);
+            }
+        }
+        Ok(light)
+    }
+}
+
+impl DevicePyramid {
+    /// Uploads `pyramid`, as half floats where they hold it.
+    fn new(device: &Arc<Device>, pyramid: &Pyramid) -> Result<Self> {
         let single = vk::Format::R32G32B32A32_SFLOAT;
         let use_single = !pyramid.fits_half() && device.filters_linearly(single);
         let scale = if use_single { 1.0 } else { pyramid.radiance_scale() };
@@ -165,12 +213,21 @@ impl DeviceLight {
             kind: ImageKind::Cube,
         };
         Ok(Self {
-            pyramid: vulkan::Image::with_texels(device, "environment pyramid", shape, &levels)?,
+            image: vulkan::Image::with_texels(device, "environment pyramid", shape, &levels)?,
             sampler: Sampler::new(device, "environment pyramid", SamplerKind::Trilinear)?,
             face_size,
-            radiance_scale: scale * intensity as f32,
+            scale,
         })
     }
+}
+
+/// How a method samples: nothing that would need another shader.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Sampling {
+    /// Threads of a pixel, or samples of methods that have none.
+    pub count: u32,
+    /// What the random numbers of those start from.
+    pub seed: u64,
 }
 
 /// What the pass is made of.
@@ -178,6 +235,8 @@ pub struct Shade {
     pipeline: ComputePipeline,
     materials: DeviceMaterials,
     light: DeviceLight,
+    /// How many threads or samples, and which random numbers.
+    pub sampling: Sampling,
 }
 
 #[repr(C)]
@@ -189,6 +248,8 @@ struct Push {
     face_size: f32,
     rotation: [f32; 2],
     radiance_scale: f32,
+    sample_count: u32,
+    seed: [u32; 2],
 }
 
 impl Shade {
@@ -200,13 +261,14 @@ impl Shade {
         device: &Arc<Device>,
         cache: &PipelineCache,
         method: Method,
+        sampling: Sampling,
         subpixels: u32,
         materials: DeviceMaterials,
         light: DeviceLight,
     ) -> Result<Self> {
         let constants = [("SUBPIXELS", subpixels), ("MODELS_USED", materials.models_used)];
         let pipeline = ComputePipeline::new(device, cache, method.shader(), &constants)?;
-        Ok(Self { pipeline, materials, light })
+        Ok(Self { pipeline, materials, light, sampling })
     }
 }
 
@@ -239,27 +301,41 @@ pub fn shade<'a>(
     let radiance = pass.modify(radiance, Access::StorageWriteCompute);
     let lookups = pass.modify(lookups, Access::StorageWriteCompute);
     pass.record(Box::new(move |commands, resources| {
-        let Shade { pipeline, materials, light } = shade;
+        let Shade { pipeline, materials, light, sampling } = shade;
         let counters = resources.buffer(counters);
-        let bindings = Bindings::new()
+        let mut bindings = Bindings::new()
             .image("geometry", resources.image(geometry))
             .buffer("counters", counters)
             .buffer("tile_list", resources.buffer(tiles))
             .buffer("pixel_list", resources.buffer(pixels))
             .image("radiance", resources.image(radiance))
-            .sampled("environment_pyramid", &light.pyramid, &light.sampler)
             .buffer("Materials", &materials.records)
             .sampled("brdf_tables", &materials.tables, &materials.table_sampler)
-            .buffer("Threads", &materials.threads)
             .buffer("all_lookups", resources.buffer(lookups));
+        // The rest as the method declares it.
+        if let Some(pyramid) = &light.pyramid {
+            bindings = bindings.sampled("environment_pyramid", &pyramid.image, &pyramid.sampler);
+        }
+        if let Some(map) = &light.map {
+            bindings = bindings.image("environment_map", map);
+        }
+        let buffers =
+            [("LightAliases", &light.aliases), ("Threads", &materials.threads), ("Slices", &materials.slices)];
+        for (name, buffer) in buffers {
+            if let Some(buffer) = buffer {
+                bindings = bindings.buffer(name, buffer);
+            }
+        }
         for kind in [0, 1] {
             let push = Push {
                 camera: view.camera_rays(),
                 size_px: [view.width, view.height],
                 kind,
-                face_size: light.face_size as f32,
+                face_size: light.pyramid.as_ref().map_or(0.0, |pyramid| pyramid.face_size as f32),
                 rotation: view.rotation(),
-                radiance_scale: light.radiance_scale,
+                radiance_scale: light.intensity * light.pyramid.as_ref().map_or(1.0, |pyramid| pyramid.scale),
+                sample_count: sampling.count,
+                seed: [sampling.seed as u32, (sampling.seed >> 32) as u32],
             };
             let groups = Groups::Indirect(counters, Counters::arguments_of(kind));
             commands.dispatch(pipeline, &bindings, bytemuck::bytes_of(&push), groups)?;

@@ -21,14 +21,16 @@ mod generate;
 pub mod peaks;
 mod plot;
 pub mod slice;
+pub mod slice_table;
 pub mod smoothing;
 #[cfg(test)]
-mod test_materials;
+pub(crate) mod test_materials;
 
 pub use cache::{CacheState, default_directory, load_or_generate};
 pub use file::{FORMAT_VERSION, read, write};
 pub use generate::generate;
 pub use plot::plot;
+pub use slice_table::SliceTable;
 
 /// Lowest n . s of a sample: 0.006 degrees above the horizon, a thousand times what rounding theta to single precision moves
 /// it by, and far below what any view angle of a table needs.

@@ -39,6 +39,9 @@ fn half_vector(x: f64, turn: f64) -> DVec3 {
 }
 
 impl<'a> Slice<'a> {
+    /// Steps of the CDF over x and over phi_h.
+    pub const STEPS: [usize; 2] = [THETA_STEPS, PHI_STEPS];
+
     /// Tabulates `brdf` seen from `theta_o` (radians, less than pi / 2). Where it reflects nothing the pdf is that of a
     /// diffuse surface, cos / pi: a thread then still has a direction, and its samples add up to the zero they should.
     pub fn new(brdf: &'a Brdf, theta_o: f64) -> Self {
@@ -133,6 +136,23 @@ impl<'a> Slice<'a> {
         let (i, u) = interpolate(&self.ring_cdf, x);
         let (_, v) = interpolate(self.azimuths(i), turn);
         DVec2::new(u, v)
+    }
+
+    /// The CDF in steps `merged` times as wide: over rings (x), and ring by ring over the azimuths (phi_h from -180 degrees).
+    /// Each goes from 0 to 1. `merged` divides both numbers of steps, [`Slice::STEPS`].
+    pub fn coarse_cdfs(&self, merged: usize) -> (Vec<f64>, Vec<Vec<f64>>) {
+        let rings = self.ring_cdf.iter().copied().step_by(merged).collect();
+        let azimuths = (0..THETA_STEPS).step_by(merged).map(|start| {
+            let mut sum = vec![0.0; PHI_STEPS / merged + 1];
+            for ring in start..start + merged {
+                let mass = self.ring_cdf[ring + 1] - self.ring_cdf[ring];
+                let steps = self.azimuths(ring).iter().step_by(merged);
+                sum.iter_mut().zip(steps).for_each(|(sum, cdf)| *sum += mass * cdf);
+            }
+            normalise(&mut sum);
+            sum
+        });
+        (rings, azimuths.collect())
     }
 
     /// `count` directions of equal mass: a Fibonacci lattice in the CDF's square.

@@ -63,6 +63,14 @@ impl Shader {
         VulkanError::Shader { shader: self.name.to_owned(), problem: problem.to_string() }
     }
 
+    /// Whether the shader declares a binding of that name: what no shader declares need not be made.
+    ///
+    /// # Errors
+    /// SPIR-V that cannot be read.
+    pub fn declares(&self, binding: &str) -> Result<bool> {
+        Ok(self.reflect()?.bindings.contains_key(binding))
+    }
+
     /// Reads the interface out of the SPIR-V.
     pub(super) fn reflect(&self) -> Result<Interface> {
         let entry_points = ReflectConfig::new()

@@ -1,5 +1,6 @@
 //! What the tests that render have in common.
 #![allow(dead_code)]
+use glam::UVec2;
 use std::path::PathBuf;
 use std::sync::Arc;
 use threadlight::pipeline::{Renderer, Rendering, Wanted};
@@ -31,6 +32,25 @@ impl Validated {
         drop(device);
         assert_eq!(messages.all(), Vec::<String>::new());
     }
+}
+
+/// Radiance and geometry.
+pub const EVERYTHING: Wanted = Wanted { radiance: true, display: false, geometry: true };
+
+/// The texels of the geometry cache that a pixel sees.
+pub fn texels_of(prepared: &Prepared, rendering: &Rendering, pixel: UVec2) -> Vec<UVec2> {
+    let (s, stride) = (prepared.view.subpixels, prepared.view.width * prepared.view.subpixels);
+    let texel = |j: u32| {
+        let at = pixel * s + UVec2::new(j % s, j / s);
+        UVec2::from(rendering.geometry[(at.y * stride + at.x) as usize])
+    };
+    (0..s * s).map(texel).collect()
+}
+
+/// All pixels, row by row.
+pub fn pixels(prepared: &Prepared) -> impl Iterator<Item = UVec2> + use<> {
+    let (width, height) = (prepared.view.width, prepared.view.height);
+    (0..height).flat_map(move |y| (0..width).map(move |x| UVec2::new(x, y)))
 }
 
 /// The built-in sphere of one material in a built-in environment.

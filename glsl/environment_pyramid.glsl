@@ -1,4 +1,4 @@
-// The environment as the GPU holds it. Twin: src/environment/pyramid.rs.
+// The environment's pyramid as the GPU holds it. Twin: src/environment/pyramid.rs.
 
 layout(set = 0, binding = 4) uniform samplerCube environment_pyramid;
 

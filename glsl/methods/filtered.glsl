@@ -1,0 +1,22 @@
+// Importance sampling with filtered lookups (Colbert and Krivanek 2007): the level of the pyramid whose texels are as large
+// as the solid angle 1 / (n p) that a sample stands for. Less noise, but biased. Twin: src/shading/filtered.rs.
+#include "random.glsl"
+#include "environment_pyramid.glsl"
+#include "importance_sampling.glsl"
+
+vec3 estimate(Surface surface, Material material, uint first, uint stride) {
+    vec3 w_o = view_direction(surface);
+    SliceRows rows = slice_rows(material, w_o);
+    vec3 sum = vec3(0.0);
+    for (uint k = first; k < push.sample_count; k += stride) {
+        DirectionSample drawn = sample_brdf(rows, w_o, random_bits(k));
+        if (drawn.p > 0.0) {
+            ++lookups;
+            vec3 direction = surface.frame * drawn.w_i;
+            float level = level_of(-log2(float(push.sample_count)) - log2(drawn.p), push.face_size, direction);
+            vec3 weight = brdf(material, drawn.w_i, w_o) * (drawn.w_i.z / drawn.p);
+            sum += weight * textureLod(environment_pyramid, direction, level).rgb;
+        }
+    }
+    return sum / float(push.sample_count);
+}

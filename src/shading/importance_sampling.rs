@@ -1,0 +1,169 @@
+//! Incident directions in proportion to f cos, from a table of 2D CDFs. Twin of glsl/importance_sampling.glsl.
+use std::f32::consts::{FRAC_1_PI, FRAC_PI_2, FRAC_PI_4, PI, TAU};
+
+use glam::{Vec2, Vec3};
+
+use super::random::to_unit;
+use crate::threads::SliceTable;
+use crate::threads::slice_table::{AZIMUTHS, RINGS, ROW_SIZE, ROWS};
+
+const DIFFUSE_SHARE: f32 = 0.05;
+
+/// The rows of the table between which a view angle lies. Twin of `SliceRows`.
+pub(super) struct SliceRows<'a> {
+    below: &'a [f32],
+    above: &'a [f32],
+    t: f32,
+}
+
+/// sin^2(theta_h / 2) at the inner edge of a ring. Twin of `ring_edge`.
+fn ring_edge(ring: usize) -> f32 {
+    let x = ring as f32 / RINGS as f32;
+    (FRAC_PI_4 * x * x).sin().powi(2)
+}
+
+/// The step of `cdf` in which `mass` lies, and how far into the step. Twin of `invert_cdf`.
+fn invert_cdf(cdf: &[f32], mass: f32) -> (usize, f32) {
+    let index = cdf.partition_point(|&value| value <= mass) - 1;
+    (index, (mass - cdf[index] + 0.5 / 16_777_216.0) / (cdf[index + 1] - cdf[index]))
+}
+
+/// The CDF of `row` over the azimuths of `ring`.
+fn azimuths(row: &[f32], ring: usize) -> &[f32] {
+    &row[RINGS + 1 + ring * (AZIMUTHS + 1)..][..AZIMUTHS + 1]
+}
+
+/// Twin of `sample_half_vector`.
+fn sample_half_vector(row: &[f32], u: Vec2) -> Vec3 {
+    let (ring, within_ring) = invert_cdf(&row[..RINGS + 1], u.x);
+    let (azimuth, within_azimuth) = invert_cdf(azimuths(row, ring), u.y);
+    let (inner, outer) = (ring_edge(ring), ring_edge(ring + 1));
+    let s = inner + (outer - inner) * within_ring;
+    let phi = TAU * (azimuth as f32 + within_azimuth) / AZIMUTHS as f32 - PI;
+    (2.0 * (s * (1.0 - s)).sqrt() * Vec2::from_angle(phi)).extend(1.0 - 2.0 * s)
+}
+
+/// Ring, azimuth and solid angle (sr) of the cell that holds `h`. Twin of `slice_cell`.
+fn slice_cell(h: Vec3) -> (usize, usize, f32) {
+    let sin_theta_h = h.x.hypot(h.y);
+    let x = (sin_theta_h.atan2(h.z) / FRAC_PI_2).sqrt();
+    let ring = ((x * RINGS as f32) as usize).min(RINGS - 1);
+    let azimuth = (((h.y.atan2(h.x) / TAU + 0.5) * AZIMUTHS as f32) as usize).min(AZIMUTHS - 1);
+    (ring, azimuth, 4.0 * PI * (ring_edge(ring + 1) - ring_edge(ring)) / AZIMUTHS as f32)
+}
+
+/// Twin of `cell_mass`.
+fn cell_mass(row: &[f32], ring: usize, azimuth: usize) -> f32 {
+    let cdf = azimuths(row, ring);
+    (row[ring + 1] - row[ring]) * (cdf[azimuth + 1] - cdf[azimuth])
+}
+
+impl<'a> SliceRows<'a> {
+    /// Twin of `slice_rows`.
+    pub(super) fn new(table: &'a SliceTable, w_o: Vec3) -> Self {
+        let position = (w_o.x.atan2(w_o.z) * (ROWS as f32 / FRAC_PI_2)).min((ROWS - 1) as f32);
+        let below = position as usize;
+        let row = |row: usize| &table.cdfs[row * ROW_SIZE..][..ROW_SIZE];
+        Self { below: row(below), above: row((below + 1).min(ROWS - 1)), t: position - below as f32 }
+    }
+
+    /// Density in 1/sr of [`Self::sample_brdf`] at `w_i` above the horizon, of which `h` is the half vector.
+    /// Twin of `brdf_pdf`.
+    pub(super) fn brdf_pdf(&self, w_i: Vec3, w_o: Vec3, h: Vec3) -> f32 {
+        let (ring, azimuth, solid_angle) = slice_cell(h);
+        let (below, above) = (cell_mass(self.below, ring, azimuth), cell_mass(self.above, ring, azimuth));
+        let of_table = (below + (above - below) * self.t) / (4.0 * solid_angle * w_o.dot(h));
+        of_table + (w_i.z * FRAC_1_PI - of_table) * DIFFUSE_SHARE
+    }
+
+    /// A direction and its density in 1/sr, unless it is below the horizon. Twin of `sample_brdf`.
+    pub(super) fn sample_brdf(&self, w_o: Vec3, bits: [u32; 4]) -> Option<(Vec3, f32)> {
+        let u = to_unit(bits);
+        let (w_i, h) = if u.x < DIFFUSE_SHARE {
+            let w_i = (u.y.sqrt() * Vec2::from_angle(TAU * u.z)).extend((1.0 - u.y).sqrt());
+            (w_i, (w_i + w_o).normalize())
+        } else {
+            let is_above = u.x - DIFFUSE_SHARE < self.t * (1.0 - DIFFUSE_SHARE);
+            let h = sample_half_vector(if is_above { self.above } else { self.below }, Vec2::new(u.y, u.z));
+            (2.0 * w_o.dot(h) * h - w_o, h)
+        };
+        (w_i.z > 0.0 && w_o.dot(h) > 0.0).then(|| (w_i, self.brdf_pdf(w_i, w_o, h)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shading::random::random_bits;
+    use crate::threads::test_materials;
+    use glam::{DVec3, UVec2, dvec3};
+
+    /// Directions drawn for `theta_o_deg`, with their densities, and how many draws were made.
+    fn drawn(rows: &SliceRows, w_o: Vec3, draws: u32) -> Vec<(DVec3, f64)> {
+        let sample = |i| rows.sample_brdf(w_o, random_bits(UVec2::new(1, 2), i, 3));
+        (0..draws).filter_map(sample).map(|(w_i, p)| (w_i.as_dvec3(), f64::from(p))).collect()
+    }
+
+    fn view(theta_o_deg: f32) -> Vec3 {
+        let theta_o = theta_o_deg.to_radians();
+        Vec3::new(theta_o.sin(), 0.0, theta_o.cos())
+    }
+
+    #[test]
+    fn the_density_is_that_of_the_drawn_directions() {
+        // The mean of g / p is the integral of g, for g of any shape: moments of the cosine lobe, wide against cells.
+        for (name, brdf) in test_materials::all() {
+            let table = SliceTable::new(&brdf);
+            for theta_o_deg in [0.0, 33.3, 70.6, 89.7] {
+                let w_o = view(theta_o_deg);
+                let rows = SliceRows::new(&table, w_o);
+                let draws = 200_000;
+                let directions = drawn(&rows, w_o, draws);
+                let mirror = dvec3(-f64::from(w_o.x), 0.0, f64::from(w_o.z));
+                // Integrals over the hemisphere of cos, cos x^2, and a part of the sphere around the mirror direction (which
+                // the horizon does not cut at all but the last angle).
+                let around_mirror = |w: DVec3| if w.dot(mirror) > 0.9 { 1.0 } else { 0.0 };
+                let cap = if theta_o_deg < 60.0 { 2.0 * std::f64::consts::PI * 0.1 } else { f64::NAN };
+                let tests: [(&dyn Fn(DVec3) -> f64, f64); 3] = [
+                    (&|w| w.z, std::f64::consts::PI),
+                    (&|w| w.z * w.x * w.x, std::f64::consts::PI / 4.0),
+                    (&around_mirror, cap),
+                ];
+                for (index, (g, expected)) in tests.into_iter().enumerate().filter(|(_, test)| !test.1.is_nan()) {
+                    let (mut mean, mut square) = (0.0, 0.0);
+                    for &(w, p) in &directions {
+                        mean += g(w) / p / f64::from(draws);
+                        square += (g(w) / p).powi(2) / f64::from(draws);
+                    }
+                    let error = ((square - mean * mean) / f64::from(draws)).sqrt();
+                    let deviation = (mean - expected) / error;
+                    assert!(
+                        deviation.abs() < 4.5,
+                        "{name}, {theta_o_deg}: integral {index} {mean} {expected} {deviation}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn f_cos_over_p_stays_near_the_albedo() {
+        // What importance sampling is for: the spread of f cos / p, in a white furnace all of the noise, is small.
+        for (name, brdf) in test_materials::all() {
+            let table = SliceTable::new(&brdf);
+            for theta_o_deg in [0.0, 33.3, 70.6] {
+                let w_o = view(theta_o_deg);
+                let rows = SliceRows::new(&table, w_o);
+                let draws = 20_000;
+                let weight =
+                    |(w, p): &(DVec3, f64)| crate::brdf::luminance(brdf.evaluate(*w, w_o.as_dvec3())) * w.z / p;
+                let weights: Vec<f64> = drawn(&rows, w_o, draws).iter().map(weight).collect();
+                let mean = weights.iter().sum::<f64>() / f64::from(draws);
+                let square = weights.iter().map(|weight| weight * weight).sum::<f64>() / f64::from(draws);
+                let spread = (square / (mean * mean) - 1.0).max(0.0).sqrt();
+                println!("{name} {theta_o_deg}: {spread:.3}");
+                assert!(spread < 0.5, "{name}, {theta_o_deg}: standard deviation {spread} of the mean");
+            }
+        }
+    }
+}

@@ -1,0 +1,249 @@
+//! Pass 2 of the paper on the CPU: the twin of glsl/shade.comp and its methods, in single precision as there.
+//!
+//! It starts from the texels of the geometry cache, so that the two can be compared pixel by pixel. BRDFs are evaluated
+//! in double precision; everything else follows the shader line by line.
+use crate::Result;
+use crate::environment::{Alias, LightMap, Pyramid};
+use crate::method::Method;
+use crate::passes::SMOOTH_DEG;
+use crate::prepare::{Prepared, PreparedMaterial};
+use crate::threads::SliceTable;
+use glam::{Mat3, UVec2, Vec2, Vec3, Vec4};
+use random::random_bits;
+
+mod cosine;
+mod environment;
+mod filtered;
+mod importance;
+mod importance_sampling;
+mod light_sampling;
+mod paper;
+mod random;
+mod resampled;
+mod uniform;
+
+/// A point to shade: its shading frame and view angle. Twin of `Surface` in glsl/surface.glsl.
+#[derive(Clone, Copy, Debug)]
+pub struct Surface {
+    /// Columns: x, the part of w_o orthogonal to n; y = z cross x; z = n.
+    pub frame: Mat3,
+    /// Towards the eye, unit.
+    pub w_o: Vec3,
+    /// Angle between the normal and w_o in radians; above 90 degrees where an interpolated normal faces away.
+    pub theta_o: f32,
+    /// Solid angle by which lookups grow where sub-pixels share one sum over the threads; else 0.
+    pub footprint_sr: f32,
+}
+
+impl Surface {
+    /// The frame at unit normal `n`, seen from unit `w_o`. Twin of `make_surface`.
+    pub fn new(n: Vec3, w_o: Vec3) -> Self {
+        let cos_theta_o = n.dot(w_o);
+        let across = w_o - cos_theta_o * n;
+        let sin_theta_o = across.length();
+        // The reason for 1e-6 stands in the shader.
+        let x = if sin_theta_o > 1e-6 { across / sin_theta_o } else { any_tangent(n) };
+        Self {
+            frame: Mat3::from_cols(x, n.cross(x), n),
+            w_o,
+            theta_o: sin_theta_o.atan2(cos_theta_o),
+            footprint_sr: 0.0,
+        }
+    }
+
+    /// Towards the eye in the shading frame, cos_theta_o at least 1e-4. Twin of `view_direction`.
+    pub fn view_direction(&self) -> Vec3 {
+        let cos_theta_o = self.frame.z_axis.dot(self.w_o).max(1e-4);
+        Vec3::new(self.frame.x_axis.dot(self.w_o), 0.0, cos_theta_o).normalize()
+    }
+}
+
+/// An axis orthogonal to n. Twin of `any_tangent` (Duff et al. 2017).
+fn any_tangent(n: Vec3) -> Vec3 {
+    let s = if n.z >= 0.0 { 1.0 } else { -1.0 };
+    let a = -1.0 / (s + n.z);
+    Vec3::new(1.0 + s * n.x * n.x * a, s * n.x * n.y * a, -s * n.x)
+}
+
+/// Octahedral map of a unit vector to [-1, 1]^2. Twin of `octahedral_encode` in glsl/packing.glsl.
+pub fn octahedral_encode(n: Vec3) -> Vec2 {
+    let n = n / (n.x.abs() + n.y.abs() + n.z.abs());
+    let sign = |x: f32| if x >= 0.0 { 1.0 } else { -1.0 };
+    if n.z >= 0.0 {
+        Vec2::new(n.x, n.y)
+    } else {
+        Vec2::new((1.0 - n.y.abs()) * sign(n.x), (1.0 - n.x.abs()) * sign(n.y))
+    }
+}
+
+/// The unit vector back. Twin of `octahedral_decode`.
+pub fn octahedral_decode(e: Vec2) -> Vec3 {
+    let z = 1.0 - e.x.abs() - e.y.abs();
+    let fold = (-z).max(0.0);
+    let unfold = |x: f32| if x >= 0.0 { x - fold } else { x + fold };
+    Vec3::new(unfold(e.x), unfold(e.y), z).normalize()
+}
+
+/// Normal and material index of a texel of the geometry cache; `None` for the background.
+/// Twin of `geometry_normal` and `geometry_material`.
+pub fn unpack_geometry(texel: UVec2) -> Option<(Vec3, usize)> {
+    let unpack = |bits: u32| (f32::from(bits as u16 as i16) / 32767.0).clamp(-1.0, 1.0);
+    let normal = octahedral_decode(Vec2::new(unpack(texel.x), unpack(texel.x >> 16)));
+    (texel.y != 0).then(|| (normal, texel.y as usize - 1))
+}
+
+/// Whether the sub-pixels of a pixel lie on one smooth surface. Twin of glsl/classify.comp.
+pub fn is_interior(texels: &[UVec2]) -> bool {
+    let Some((first_normal, first_material)) = texels.first().copied().and_then(unpack_geometry) else { return false };
+    texels.iter().all(|texel| {
+        unpack_geometry(*texel).is_some_and(|(normal, material)| {
+            material == first_material && normal.dot(first_normal) >= SMOOTH_DEG.to_radians().cos()
+        })
+    })
+}
+
+/// Solid angle in sr by which lookups grow in a pixel of these sub-pixels. Twin of `footprint` in glsl/shade.comp, which
+/// derives it.
+fn footprint(texels: &[UVec2]) -> f32 {
+    let sum: Vec3 = texels.iter().filter_map(|texel| unpack_geometry(*texel)).map(|(normal, _)| normal).sum();
+    let count = texels.len() as f32;
+    (64.0 * (count - 1.0) * (1.0 - sum.length() / count)).max(0.0)
+}
+
+/// The CPU twin of pass 2 for one scene.
+pub struct Twin<'a> {
+    prepared: &'a Prepared,
+    pyramid: Option<Pyramid>,
+    map: Option<LightMap>,
+    aliases: Vec<Alias>,
+    /// One for each material, for methods that draw by them.
+    slices: Vec<SliceTable>,
+}
+
+impl<'a> Twin<'a> {
+    /// Makes what the method of `prepared` looks up, as the device has it.
+    ///
+    /// # Errors
+    /// A shader that cannot be read.
+    pub fn new(prepared: &'a Prepared) -> Result<Self> {
+        let shader = prepared.method.shader();
+        let environment = &prepared.environment;
+        let pyramid = shader.declares("environment_pyramid")?.then(|| Pyramid::box_filtered(environment));
+        let map = shader.declares("environment_map")?.then(|| LightMap::new(environment));
+        let aliases = map.as_ref().filter(|_| shader.declares("LightAliases").unwrap_or(false));
+        let mut twin = Self {
+            prepared,
+            pyramid,
+            aliases: aliases.map(LightMap::aliases).unwrap_or_default(),
+            map,
+            slices: vec![],
+        };
+        if shader.declares("Slices")? {
+            twin.slices = prepared.materials.iter().map(|material| SliceTable::new(&material.brdf)).collect();
+        }
+        Ok(twin)
+    }
+
+    /// Linear radiance times coverage, and coverage, of the pixel that sees `texels`: its sub-pixels, row by row.
+    /// Twin of `main` in glsl/shade.comp.
+    pub fn shade(&self, pixel: UVec2, texels: &[UVec2]) -> Vec4 {
+        let view = &self.prepared.view;
+        let rays = view.camera_rays();
+        let size = UVec2::new(view.width, view.height) * view.subpixels;
+        let [cos, sin] = view.rotation();
+        let to_environment = |d: Vec3| Vec3::new(cos * d.x - sin * d.z, d.y, sin * d.x + cos * d.z);
+        let interior = is_interior(texels);
+        let footprint_sr = if interior { footprint(texels) } else { 0.0 };
+        let mut sum = Vec3::ZERO;
+        let mut covered = 0;
+        for (j, texel) in texels.iter().enumerate() {
+            let Some((normal, material)) = unpack_geometry(*texel) else { continue };
+            covered += 1;
+            let subpixel = pixel * view.subpixels + UVec2::new(j as u32 % view.subpixels, j as u32 / view.subpixels);
+            let w_o = -rays.ray((subpixel.as_vec2() + 0.5) / size.as_vec2()).normalize();
+            let surface = Surface { footprint_sr, ..Surface::new(to_environment(normal), to_environment(w_o)) };
+            let (first, stride) = if interior { (j as u32, texels.len()) } else { (0, 1) };
+            let axis = to_environment(rays.right());
+            sum += Point { twin: self, surface, axis, material, subpixel, first, stride }.estimate();
+        }
+        if !interior {
+            sum /= texels.len() as f32;
+        }
+        (sum * self.prepared.intensity as f32).extend(covered as f32 / texels.len() as f32)
+    }
+}
+
+/// A sub-pixel to shade, and its part of the samples: what `estimate` gets in the shader.
+struct Point<'a> {
+    twin: &'a Twin<'a>,
+    surface: Surface,
+    /// The camera's right, in the environment's coordinates.
+    axis: Vec3,
+    material: usize,
+    subpixel: UVec2,
+    /// Threads or samples `first`, `first + stride`, ...
+    first: u32,
+    stride: usize,
+}
+
+impl Point<'_> {
+    fn estimate(&self) -> Vec3 {
+        match self.twin.prepared.method {
+            Method::Paper => paper::estimate(self),
+            Method::Uniform => uniform::estimate(self),
+            Method::Cosine => cosine::estimate(self),
+            Method::Importance => importance::estimate(self),
+            Method::Filtered => filtered::estimate(self),
+            Method::Environment => environment::estimate(self),
+            Method::Resampled => resampled::estimate(self),
+        }
+    }
+
+    fn material(&self) -> &PreparedMaterial {
+        &self.twin.prepared.materials[self.material]
+    }
+
+    fn sample_count(&self) -> u32 {
+        self.twin.prepared.sampling.count
+    }
+
+    fn partition(&self) -> impl Iterator<Item = u32> + use<> {
+        (self.first..self.sample_count()).step_by(self.stride)
+    }
+
+    fn brdf(&self, w_i: Vec3, w_o: Vec3) -> Vec3 {
+        self.material().brdf.evaluate(w_i.as_dvec3(), w_o.as_dvec3()).as_vec3()
+    }
+
+    fn random_bits(&self, index: u32) -> [u32; 4] {
+        random_bits(self.subpixel, index, self.twin.prepared.sampling.seed)
+    }
+
+    /// The pyramid's mean radiance over `solid_angle` (sr) around `direction`.
+    fn filtered_radiance(&self, direction: Vec3, solid_angle: f32) -> Vec3 {
+        let pyramid = self.twin.pyramid.as_ref().expect("the method declares the pyramid");
+        pyramid.lookup(direction, pyramid.level_of(solid_angle, direction))
+    }
+
+    /// Radiance and density of the map. Twin of `environment_texel`.
+    fn environment_texel(&self, direction: Vec3) -> Vec4 {
+        self.map().texel(direction)
+    }
+
+    fn environment_radiance(&self, direction: Vec3) -> Vec3 {
+        self.environment_texel(direction).truncate()
+    }
+
+    fn map(&self) -> &LightMap {
+        self.twin.map.as_ref().expect("the method declares the map")
+    }
+
+    fn slices(&self) -> &SliceTable {
+        &self.twin.slices[self.material]
+    }
+}
+
+/// Display value in [0, 1] of linear radiance. Twin of glsl/tone_map.comp.
+pub fn display_value(radiance: f32, exposure: f32, gamma: f32) -> f32 {
+    (exposure * radiance).clamp(0.0, 1.0).powf(1.0 / gamma)
+}

@@ -1,0 +1,129 @@
+//! The paper's estimate, equation (2). Twin of glsl/methods/paper.glsl, by functions of the same names.
+use std::f32::consts::FRAC_PI_2;
+
+use glam::{Mat3, Vec3, Vec4};
+
+use super::{Point, Surface, any_tangent};
+use crate::threads::ThreadTable;
+
+/// A frame at `n` that does not turn with w_o. Twin of `fixed_frame` in glsl/surface.glsl.
+fn fixed_frame(n: Vec3, axis: Vec3) -> Mat3 {
+    let along = axis - axis.dot(n) * n;
+    // The reason for 1e-6 stands in the shader.
+    let x = if along.length_squared() > 1e-6 { along.normalize() } else { any_tangent(n) };
+    Mat3::from_cols(x, n.cross(x), n)
+}
+
+/// View angles between which the threads start to follow the view, as in the shader.
+const FACING_DEG: f32 = 3.0;
+const TURNING_DEG: f32 = 15.0;
+
+/// Sums of f cos / p and of f cos / p times radiance.
+#[derive(Default)]
+struct WeightedSum {
+    weight: Vec3,
+    radiance: Vec3,
+}
+
+impl WeightedSum {
+    fn weighted_mean(&self) -> Vec3 {
+        Vec3::select(self.weight.cmpgt(Vec3::ZERO), self.radiance / self.weight, Vec3::ZERO)
+    }
+}
+
+/// Where a view angle lies among the rows.
+struct Rows {
+    below: usize,
+    above: usize,
+    t: f32,
+    theta_o: f32,
+}
+
+/// The point with the threads of its material.
+struct Paper<'a> {
+    point: &'a Point<'a>,
+    threads: &'a ThreadTable,
+}
+
+/// Twin of `estimate`.
+///
+/// # Panics
+/// A scene prepared for another method has no threads.
+pub(super) fn estimate(point: &Point) -> Vec3 {
+    let threads = point.material().threads.as_ref().expect("the paper's method has threads");
+    Paper { point, threads }.estimate(&point.surface, point.axis)
+}
+
+impl Paper<'_> {
+    fn rows_at(&self, theta_o: f32) -> Rows {
+        let count = self.threads.rows;
+        let row = (theta_o * (count as f32 / FRAC_PI_2)).min((count - 1) as f32);
+        let below = row as usize;
+        let above = (below + 1).min(count - 1);
+        Rows { below, above, t: row - below as f32, theta_o: row * (FRAC_PI_2 / count as f32) }
+    }
+
+    fn thread(&self, row: usize, k: usize) -> Vec4 {
+        let sample = &self.threads.row(row)[k];
+        sample.direction().as_vec3().extend(sample.p.log2())
+    }
+
+    fn partition(&self) -> impl Iterator<Item = usize> + use<> {
+        self.point.partition().map(|k| k as usize)
+    }
+
+    fn lookup_solid_angle(&self, log2_p: f32) -> f32 {
+        let share_sr = (-log2_p).exp2() / self.threads.count as f32;
+        (share_sr + self.point.surface.footprint_sr).min(share_sr * self.point.stride as f32)
+    }
+
+    fn add_term(&self, sum: &mut WeightedSum, frame: Mat3, w_i: Vec3, w_o: Vec3, log2_p: f32) {
+        let radiance = self.point.filtered_radiance(frame * w_i, self.lookup_solid_angle(log2_p));
+        let weight = self.point.brdf(w_i, w_o) * (w_i.z * (-log2_p).exp2());
+        sum.weight += weight;
+        sum.radiance += weight * radiance;
+    }
+
+    fn threads_following_view(&self, surface: &Surface, rows: &Rows) -> Vec3 {
+        let w_o = Vec3::new(rows.theta_o.sin(), 0.0, rows.theta_o.cos());
+        let mut sum = WeightedSum::default();
+        for k in self.partition() {
+            let between = self.thread(rows.below, k).lerp(self.thread(rows.above, k), rows.t);
+            self.add_term(&mut sum, surface.frame, between.truncate().normalize(), w_o, between.w);
+        }
+        sum.weighted_mean()
+    }
+
+    fn threads_of_facing_view(&self, surface: &Surface, axis: Vec3) -> Vec3 {
+        let frame = fixed_frame(surface.frame.z_axis, axis);
+        let w_o = frame.transpose() * surface.w_o;
+        let mut sum = WeightedSum::default();
+        for k in self.partition() {
+            let thread = self.thread(0, k);
+            let h = (thread.truncate() + Vec3::Z).normalize();
+            let cos_theta_d = w_o.dot(h);
+            let w_i = 2.0 * cos_theta_d * h - w_o;
+            if w_i.z > 0.0 {
+                self.add_term(&mut sum, frame, w_i, w_o, thread.w + (h.z / cos_theta_d).log2());
+            }
+        }
+        sum.weighted_mean()
+    }
+
+    fn estimate(&self, surface: &Surface, axis: Vec3) -> Vec3 {
+        let rows = self.rows_at(surface.theta_o);
+        let (from, to) = (FACING_DEG.to_radians(), TURNING_DEG.to_radians());
+        let x = ((surface.theta_o - from) / (to - from)).clamp(0.0, 1.0);
+        let following = x * x * (3.0 - 2.0 * x);
+        let mut mean = Vec3::ZERO;
+        if following > 0.0 {
+            mean += following * self.threads_following_view(surface, &rows);
+        }
+        if following < 1.0 {
+            mean += (1.0 - following) * self.threads_of_facing_view(surface, axis);
+        }
+        let [below, above] = [rows.below, rows.above].map(|row| Vec3::from(self.threads.albedo[row]));
+        let share = self.partition().count() as f32 / self.threads.count as f32;
+        share * below.lerp(above, rows.t) * mean
+    }
+}
