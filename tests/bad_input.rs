@@ -369,3 +369,29 @@ fn pictures_that_cannot_be_compared_are_refused() {
         refuses(&folder, &format!("compare {arguments}"), names);
     }
 }
+
+#[test]
+fn sweeps_that_cannot_be_measured_are_refused() {
+    let folder = pictures();
+    for (arguments, names) in [
+        ("--counts 4,0", &["--counts", "1..=1024"][..]),
+        ("--counts 4,1025", &["--counts", "1..=1024"]),
+        ("--counts 4,many", &["--counts", "many"]),
+        ("--counts 4,4", &["--counts", "4 twice"]),
+        ("--methods paper,magic", &["magic", "paper"]),
+        ("--methods paper,paper", &["--methods", "twice"]),
+        ("--materials unobtainium", &["unobtainium", "gold"]),
+        ("--materials a/gold.toml,gold", &["--materials", "\"gold\" twice"]),
+        ("--materials missing.binary", &["missing.binary"]),
+        ("--environments mars", &["mars", "studio"]),
+        ("--scene missing.toml", &["missing.toml"]),
+        ("--scene missing.obj", &["missing.obj"]),
+        ("--size 640", &["--size", "640x480"]),
+        ("--reference-tolerance 0", &["--reference-tolerance", "above 0"]),
+        ("--json absent/errors.json", &["absent/errors.json"]),
+        ("--plot small.png", &["small.png"]),
+        ("--plot absent/plots", &["absent/plots"]),
+    ] {
+        refuses(&folder, &format!("bench error {arguments}"), names);
+    }
+}

@@ -1,5 +1,6 @@
 //! The command line: one file per subcommand.
 
+mod bench;
 mod compare;
 mod completions;
 mod devices;
@@ -41,6 +42,7 @@ pub struct Arguments {
 enum Command {
     Render(Box<render::Render>),
     Compare(compare::Compare),
+    Bench(bench::Bench),
     Threads(threads::Threads),
     Materials(materials::Materials),
     Devices(devices::Devices),
@@ -53,6 +55,7 @@ impl Arguments {
         match self.command {
             Command::Render(render) => render.run(),
             Command::Compare(compare) => compare.run(),
+            Command::Bench(bench) => bench.run(),
             Command::Threads(threads) => threads.run(),
             Command::Materials(materials) => materials.run(),
             Command::Devices(devices) => devices.run(),

@@ -256,7 +256,7 @@ mod tests {
             let a = formula(width, height, 0);
             let other = formula(width, height, shift);
             let b: Vec<_> = a.iter().zip(&other).map(|(a, o)| [0, 1, 2].map(|c| 0.75 * a[c] + 0.25 * o[c])).collect();
-            let covered = |i: usize| (i % width + i / width) % 3 == 0;
+            let covered = |i: usize| (i % width + i / width).is_multiple_of(3);
             let metrics = compare(&picture(width, &a, covered), &picture(width, &b, covered), masked).unwrap();
             assert_eq!((metrics.pixels, metrics.nan), (pixels, 0));
             for (name, found, expected) in [

@@ -10,7 +10,13 @@
 
 pub mod difference;
 pub mod metrics;
+pub mod plots;
+mod reference_picture;
 pub mod ssim;
+pub mod sweep;
+pub mod tables;
 
 pub use difference::difference_picture;
 pub use metrics::{Comparable, Display, Metrics, compare};
+pub use reference_picture::{ReferencePicture, reference_picture};
+pub use sweep::{Row, Sweep};
