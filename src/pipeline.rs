@@ -1,5 +1,4 @@
 //! The method on one screen: the frame as a graph of passes, and the renderer that runs it.
-use crate::environment::Pyramid;
 use crate::graph::{Access, Buffer, BufferDesc, Executable, Image};
 use crate::passes::*;
 use crate::prepare::Prepared;
@@ -95,7 +94,7 @@ impl Renderer {
         let meshes = prepared.meshes.iter().map(|(name, mesh)| DeviceMesh::new(device, name, mesh));
         let meshes = meshes.collect::<Result<_>>()?;
         let materials = DeviceMaterials::new(device, prepared.materials.iter().map(|m| (&m.brdf, &m.threads)))?;
-        let light = DeviceLight::new(device, &Pyramid::box_filtered(environment), *intensity)?;
+        let light = DeviceLight::new(device, environment.box_filtered(), *intensity)?;
         let background = prepared.show_environment.then(|| Background::new(device, &cache, environment, *intensity));
         Ok(Self {
             view: view.clone(),

@@ -1,29 +1,38 @@
 //! Sweeps on the device, against reference pictures that are made up, so that what must come out is known.
 mod common;
 
-use common::{Validated, model};
+use common::{Validated, model, ready, sphere};
 use std::sync::atomic::{AtomicUsize, Ordering};
+use tempfile::TempDir;
 use threadlight::evaluate::sweep::{self, Measured};
 use threadlight::evaluate::{ReferencePicture, Sweep};
 use threadlight::method::Method;
+use threadlight::output::{ExrHeader, write_exr};
 use threadlight::pipeline::Wanted;
 use threadlight::prepare::Prepared;
-use threadlight::scene::{Scene, Source};
+use threadlight::scene::{MaterialSource, Scene, Source};
 use threadlight::threads::{Observer, Settings, load_or_generate};
 use threadlight::{Error, Result};
 
-/// Two materials and two environments on a small sphere with `paper` at 4 and 16 threads.
-fn sweep() -> Sweep {
+fn grey() -> MaterialSource {
+    model("model = 'lambert'\nreflectance = 0.5")
+}
+
+/// Two materials and two environments, one of them small and uneven, which it puts in `folder`, on a small sphere with `paper` at
+/// 4 and 16 threads.
+fn sweep(folder: &TempDir) -> Sweep {
+    let map = folder.path().join("map.exr");
+    let texel = |i: usize| [(i % 7) as f32 / 3.0, (i % 5) as f32 / 2.0, (i / 16) as f32 / 8.0, 1.0];
+    write_exr(&map, 16, 8, &(0..128).map(texel).collect::<Vec<_>>(), false, &ExrHeader::default()).unwrap();
     let mut scene = Scene::default();
     (scene.image.width, scene.image.height) = (40, 30);
-    let grey = model("model = 'lambert'\nreflectance = 0.5");
     let metal =
         model("model = 'conductor'\ndistribution = 'ggx'\nalpha = 0.3\neta = [0.2, 0.9, 1.1]\nk = [3.9, 2.4, 2.1]");
     Sweep {
         methods: vec![Method::Paper],
         counts: vec![4, 16],
-        materials: vec![("grey".into(), grey), ("metal".into(), metal)],
-        environments: ["white", "sky"].map(|name| (name.into(), Source::Builtin(name.into()))).to_vec(),
+        materials: vec![("grey".into(), grey()), ("metal".into(), metal)],
+        environments: vec![("white".into(), Source::Builtin("white".into())), ("map".into(), Source::File(map))],
         scenes: vec![("sphere".into(), scene)],
         seed: 0,
         repeat: 1,
@@ -38,7 +47,7 @@ fn sixteen_threads(gpu: &Validated, prepared: &Prepared) -> Result<ReferencePict
     let settings = Settings { count: 16, ..Settings::default() };
     let material = &prepared.materials[0];
     let (threads, ..) = load_or_generate(&material.brdf, &settings, None, &())?;
-    let mut own = common::ready(&Scene::default());
+    let mut own = ready(&sphere(grey(), "white", 1, (1, 1)));
     (own.view, own.environment, own.show_environment) = (prepared.view.clone(), prepared.environment.clone(), false);
     own.materials[0].brdf = material.brdf.clone();
     own.materials[0].threads = threads;
@@ -49,13 +58,14 @@ fn sixteen_threads(gpu: &Validated, prepared: &Prepared) -> Result<ReferencePict
 #[test]
 fn every_combination_is_measured_once_against_the_reference_of_its_place() {
     let gpu = Validated::new();
+    let folder = tempfile::tempdir().unwrap();
     let asked = AtomicUsize::new(0);
     let reference = |prepared: &Prepared| {
         asked.fetch_add(1, Ordering::Relaxed);
         sixteen_threads(&gpu, prepared)
     };
     let mut measured = Measured::default();
-    sweep::run(&sweep(), &gpu.device, &reference, &(), &mut measured).unwrap();
+    sweep::run(&sweep(&folder), &gpu.device, &reference, &(), &mut measured).unwrap();
     assert_eq!(asked.into_inner(), 4);
     assert_eq!(measured.reference_error, 1e-4);
 
@@ -63,7 +73,7 @@ fn every_combination_is_measured_once_against_the_reference_of_its_place() {
     let expected: Vec<_> = ["grey", "metal"]
         .iter()
         .flat_map(|material| {
-            ["white", "sky"].iter().flat_map(|light| [(*material, *light, 4), (*material, *light, 16)])
+            ["white", "map"].iter().flat_map(|light| [(*material, *light, 4), (*material, *light, 16)])
         })
         .collect();
     assert_eq!(places, expected);
@@ -84,8 +94,9 @@ fn every_combination_is_measured_once_against_the_reference_of_its_place() {
 #[test]
 fn background_pixels_thin_the_error_out() {
     let gpu = Validated::new();
+    let folder = tempfile::tempdir().unwrap();
     let rms = |whole_picture| {
-        let mut sweep = Sweep { counts: vec![4], whole_picture, ..sweep() };
+        let mut sweep = Sweep { counts: vec![4], whole_picture, ..sweep(&folder) };
         sweep.environments.remove(0);
         let mut measured = Measured::default();
         let reference = |prepared: &Prepared| sixteen_threads(&gpu, prepared);
@@ -110,9 +121,11 @@ fn measurements_made_before_an_error_or_an_interruption_are_kept() {
         }
     }
     let gpu = Validated::new();
+    let folder = tempfile::tempdir().unwrap();
     let mut measured = Measured::default();
     let reference = |prepared: &Prepared| sixteen_threads(&gpu, prepared);
-    let error = sweep::run(&sweep(), &gpu.device, &reference, &After(AtomicUsize::new(0)), &mut measured).unwrap_err();
+    let error =
+        sweep::run(&sweep(&folder), &gpu.device, &reference, &After(AtomicUsize::new(0)), &mut measured).unwrap_err();
     assert!(matches!(error, Error::Cancelled), "{error}");
     assert_eq!(measured.rows.len(), 3);
     gpu.finish();
