@@ -13,8 +13,8 @@ use crate::output::write_whole;
 const SIZE_PX: (u32, u32) = (900, 620);
 const TEXT: RGBColor = RGBColor(40, 42, 48);
 const GRID: RGBColor = RGBColor(222, 223, 226);
-/// Distinguishable with any kind of colour vision (Okabe and Ito 2008), without their yellow, which is too pale for lines.
-const COLOURS: [RGBColor; 7] = [
+/// Distinguishable with any kind of colour vision (Okabe and Ito 2008), with grey for their yellow, which is too pale for lines.
+const COLOURS: [RGBColor; 8] = [
     RGBColor(213, 94, 0),
     RGBColor(0, 114, 178),
     RGBColor(0, 158, 115),
@@ -22,12 +22,21 @@ const COLOURS: [RGBColor; 7] = [
     RGBColor(86, 180, 233),
     RGBColor(230, 159, 0),
     RGBColor(0, 0, 0),
+    RGBColor(128, 130, 136),
 ];
 
 /// One method's curve.
 struct Curve {
     method: String,
     points: Vec<(f64, f64)>,
+}
+
+/// The axis from left to right.
+struct Axis {
+    label: &'static str,
+    /// Values to label; empty for round ones.
+    ticks: Vec<f64>,
+    value: fn(&Row) -> f64,
 }
 
 /// Draws into `folder`, which is made if it is not there, as SVG: `rms_over_threads.svg` and `rms_over_gpu_ms.svg` for the
@@ -48,14 +57,18 @@ pub fn draw(rows: &[Row], folder: &Path) -> Result<Vec<PathBuf>> {
             subjects.push((format!("{material}_"), material.clone(), rows));
         }
     }
+    let mut counts = in_order(rows.iter().map(|row| f64::from(row.threads)));
+    counts.sort_by(f64::total_cmp);
+    let axes = [
+        ("rms_over_threads", Axis { label: "threads or samples", ticks: counts, value: |row| f64::from(row.threads) }),
+        ("rms_over_gpu_ms", Axis { label: "time on the GPU, ms", ticks: Vec::new(), value: |row| row.gpu_ms }),
+    ];
     let mut written = Vec::new();
     for (prefix, subject, rows) in subjects {
-        for (name, x_label, x) in [
-            ("rms_over_threads", "threads or samples", (|row| f64::from(row.threads)) as fn(&Row) -> f64),
-            ("rms_over_gpu_ms", "time on the GPU, ms", |row| row.gpu_ms),
-        ] {
+        for (name, axis) in &axes {
             let path = folder.join(format!("{prefix}{name}.svg"));
-            let svg = chart(&subject, x_label, &curves(&rows, x)).map_err(|cause| Error::unwritable(&path, cause))?;
+            let svg =
+                chart(&subject, axis, &curves(&rows, axis.value)).map_err(|cause| Error::unwritable(&path, cause))?;
             write_whole(&path, svg.as_bytes())?;
             written.push(path);
         }
@@ -81,22 +94,23 @@ fn curves(rows: &[&Row], x: fn(&Row) -> f64) -> Vec<Curve> {
 }
 
 /// The chart as SVG; the error is the reason why not.
-fn chart(subject: &str, x_label: &str, curves: &[Curve]) -> Result<String, String> {
+fn chart(subject: &str, axis: &Axis, curves: &[Curve]) -> Result<String, String> {
     let mut svg = String::new();
     {
         let area = SVGBackend::with_string(&mut svg, SIZE_PX).into_drawing_area();
-        draw_chart(&area, subject, x_label, curves).map_err(|cause| cause.to_string())?;
+        draw_chart(&area, subject, axis, curves).map_err(|cause| cause.to_string())?;
     }
     Ok(svg)
 }
 
 type Area<'a> = DrawingArea<SVGBackend<'a>, plotters::coord::Shift>;
 
-fn draw_chart(area: &Area, subject: &str, x_label: &str, curves: &[Curve]) -> Result<(), Box<dyn std::error::Error>> {
+fn draw_chart(area: &Area, subject: &str, axis: &Axis, curves: &[Curve]) -> Result<(), Box<dyn std::error::Error>> {
     let font = |size: u32| ("sans-serif", size).into_font().color(&TEXT);
     let points = || curves.iter().flat_map(|curve| &curve.points);
     let (x, y) = (around(points().map(|point| point.0)), around(points().map(|point| point.1)));
-    let (x_ticks, y_ticks) = (ticks(&x), ticks(&y));
+    let x_ticks = if axis.ticks.is_empty() { ticks(&x) } else { axis.ticks.clone() };
+    let y_ticks = ticks(&y);
     area.fill(&WHITE)?;
     let mut chart = ChartBuilder::on(area)
         .caption(format!("RMS of display values, {subject}"), font(22))
@@ -111,7 +125,7 @@ fn draw_chart(area: &Area, subject: &str, x_label: &str, curves: &[Curve]) -> Re
         .axis_style(TEXT)
         .label_style(font(16))
         .axis_desc_style(font(17))
-        .x_desc(x_label)
+        .x_desc(axis.label)
         .y_desc("RMS")
         .x_label_formatter(&|value| short(*value))
         .y_label_formatter(&|value| short(*value))

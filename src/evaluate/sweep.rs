@@ -98,6 +98,7 @@ pub fn run(
     measured: &mut Measured,
 ) -> Result<()> {
     let total = sweep.row_count();
+    observer.progress(0, total);
     let mut environments = Vec::new();
     for (name, source) in &sweep.environments {
         let settings = EnvironmentSettings { source: source.clone(), ..EnvironmentSettings::default() };

@@ -4,33 +4,33 @@ use std::fmt::Write;
 
 use super::Row;
 
-/// A table for each material (the paper's tables 2 and 3), and one over all materials (table 4).
+/// A table for each material where there are several (the paper's tables 2 and 3), and one over all of them (table 4).
 ///
 /// Each has the mean RMS and SSIM over its environments and scenes; the last also FLIP, the largest RMS of any material,
 /// environment and scene, and the mean time on the GPU.
 pub fn tables(rows: &[Row]) -> String {
-    let mut text = String::new();
     let materials = in_order(rows.iter().map(|row| &row.material));
     let places = in_order(rows.iter().map(|row| (&row.environment, &row.scene))).len();
-    let over =
-        |places: usize| if places == 1 { String::new() } else { format!(", mean over {places} lights and scenes") };
-    for material in &materials {
-        let rows: Vec<_> = rows.iter().filter(|row| row.material == **material).collect();
-        let _ = writeln!(text, "{material}{}", over(places));
-        text += &table("RMS", &rows, mean, |row| row.rms, 5);
-        text += &table("SSIM", &rows, mean, |row| row.ssim, 5);
-        text.push('\n');
-    }
+    let over_places = if places == 1 { String::new() } else { format!(", mean over {places} lights and scenes") };
+    let rms_and_ssim =
+        |rows: &[&Row]| table("RMS", rows, mean, |row| row.rms, 5) + &table("SSIM", rows, mean, |row| row.ssim, 5);
+    let mut text = String::new();
+    let title = match materials.as_slice() {
+        [] => return text,
+        [only] => (*only).clone(),
+        several => {
+            for material in several {
+                let rows: Vec<_> = rows.iter().filter(|row| row.material == **material).collect();
+                text += &format!("{material}{over_places}\n{}\n", rms_and_ssim(&rows));
+            }
+            format!("mean of {} materials", several.len())
+        }
+    };
     let rows: Vec<_> = rows.iter().collect();
-    if !rows.is_empty() {
-        let _ =
-            writeln!(text, "Mean over {} materials{}", materials.len(), over(places).replace(", mean over", " and"));
-        text += &table("RMS", &rows, mean, |row| row.rms, 5);
-        text += &table("SSIM", &rows, mean, |row| row.ssim, 5);
-        text += &table("FLIP", &rows, mean, |row| row.flip, 5);
-        text += &table("RMS, worst", &rows, largest, |row| row.rms, 5);
-        text += &table("GPU ms", &rows, mean, |row| row.gpu_ms, 3);
-    }
+    text += &format!("{title}{over_places}\n{}", rms_and_ssim(&rows));
+    text += &table("FLIP", &rows, mean, |row| row.flip, 5);
+    text += &table("RMS, worst", &rows, largest, |row| row.rms, 5);
+    text += &table("GPU ms", &rows, mean, |row| row.gpu_ms, 3);
     text
 }
 
@@ -133,7 +133,7 @@ matt, mean over 2 lights and scenes
 shiny";
         assert!(text.starts_with(expected), "{text}");
         let expected = "
-Mean over 2 materials and 2 lights and scenes
+mean of 2 materials, mean over 2 lights and scenes
   RMS                    1        16       100
   paper            0.30000   0.04308   0.01194
   uniform          0.30000   0.07500   0.03000
@@ -155,6 +155,14 @@ Mean over 2 materials and 2 lights and scenes
         let rows: Vec<_> = rows().into_iter().filter(|row| row.method != "paper" || row.threads != 16).collect();
         assert!(tables(&rows).contains("  paper            0.15000         -   0.00597\n"));
         assert_eq!(tables(&[]), "");
+    }
+
+    #[test]
+    fn a_single_material_has_one_table() {
+        let rows: Vec<_> =
+            rows().into_iter().filter(|row| row.material == "shiny" && row.environment == "sun").collect();
+        let text = tables(&rows);
+        assert!(text.starts_with("shiny\n  RMS  ") && text.matches("  RMS  ").count() == 1, "{text}");
     }
 
     #[test]
