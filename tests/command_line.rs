@@ -433,3 +433,29 @@ fn pictures_replace_older_ones_whole_and_leave_nothing_beside_them() {
     files.sort();
     assert_eq!(files, ["image.png", "map.hdr", "stats.json"]);
 }
+
+#[test]
+fn pictures_are_compared_as_a_table_as_json_and_as_a_heat_map() {
+    let folder = workplace();
+    for (name, value) in [("a.png", 51), ("b.png", 102)] {
+        let rgba = vec![value; 24 * 16 * 4];
+        threadlight::output::write_png(&folder.path().join(name), 24, 16, &rgba, false).unwrap();
+    }
+    let table = printed(&mut threadlight(&folder, "compare a.png b.png --difference where.png"));
+    let lines: Vec<Vec<_>> = table.lines().map(|line| line.split_whitespace().take(2).collect()).collect();
+    let names: Vec<_> = lines.iter().map(|line| line[0]).collect();
+    assert_eq!(names, ["rms", "rms_linear", "max", "ssim", "flip", "nan", "pixels"]);
+    assert_eq!((lines[0][1], lines[2][1], lines[6][1]), ("0.200000", "0.200000", "384"));
+
+    let json: Value = serde_json::from_str(&printed(&mut threadlight(&folder, "compare a.png b.png --json"))).unwrap();
+    let keys: Vec<_> = json.as_object().unwrap().keys().map(String::as_str).collect();
+    assert_eq!(keys, ["flip", "max", "nan", "pixels", "rms", "rms_linear", "ssim"]);
+    // Linear values of 0.2 and 0.4 for gamma 2.2.
+    let expected = 0.4_f64.powf(2.2) - 0.2_f64.powf(2.2);
+    assert!((json["rms_linear"].as_f64().unwrap() - expected).abs() < 1e-6);
+
+    // Below the picture there is the scale.
+    let map = picture(&folder, "where.png");
+    assert_eq!((map.width, map.height), (24, 32));
+    assert!((0..16).all(|row| at(&map, 3, row) == at(&map, 0, 0)) && at(&map, 23, 31) != at(&map, 0, 31));
+}

@@ -1,5 +1,7 @@
 //! The command line: one file per subcommand.
 
+mod bench;
+mod compare;
 mod completions;
 mod devices;
 mod materials;
@@ -19,6 +21,7 @@ Examples:
   threadlight render -o image.png
   threadlight render --mesh dragon.obj --material gold.toml --environment studio.hdr -o dragon.png
   threadlight render scene.toml --size 1920x1080 --subpixels 3 -o scene.exr
+  threadlight compare dragon.exr reference.exr --mask-background
   threadlight threads alumina-oxide.binary --count 100 -o alumina.threads --plot alumina.png
   threadlight materials
 
@@ -38,6 +41,8 @@ pub struct Arguments {
 #[derive(Subcommand)]
 enum Command {
     Render(Box<render::Render>),
+    Compare(compare::Compare),
+    Bench(bench::Bench),
     Threads(threads::Threads),
     Materials(materials::Materials),
     Devices(devices::Devices),
@@ -49,6 +54,8 @@ impl Arguments {
     pub fn run(self) -> anyhow::Result<()> {
         match self.command {
             Command::Render(render) => render.run(),
+            Command::Compare(compare) => compare.run(),
+            Command::Bench(bench) => bench.run(),
             Command::Threads(threads) => threads.run(),
             Command::Materials(materials) => materials.run(),
             Command::Devices(devices) => devices.run(),

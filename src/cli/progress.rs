@@ -11,8 +11,13 @@ pub struct Progress {
 }
 
 impl Progress {
-    /// A bar called `name`, hidden until something happens.
+    /// A bar called `name` that counts rows, hidden until something happens.
     pub fn new(name: &'static str) -> anyhow::Result<Self> {
+        Self::of(name, "rows")
+    }
+
+    /// A bar called `name` that counts `units`, hidden until something happens. Only one bar can be made.
+    pub fn of(name: &'static str, units: &str) -> anyhow::Result<Self> {
         let cancelled = Arc::new(AtomicBool::new(false));
         let flag = cancelled.clone();
         ctrlc::set_handler(move || {
@@ -21,7 +26,8 @@ impl Progress {
                 std::process::exit(130);
             }
         })?;
-        let style = ProgressStyle::with_template("{prefix} {wide_bar} {pos}/{len} rows, {eta} left")?;
+        let style =
+            ProgressStyle::with_template(&format!("{{prefix}} {{wide_bar}} {{pos}}/{{len}} {units}, {{eta}} left"))?;
         let bar = ProgressBar::no_length().with_style(style).with_prefix(name);
         Ok(Self { bar, cancelled })
     }

@@ -54,7 +54,7 @@ impl Environment {
             let RepairCounts { nan, infinite, negative } = repaired;
             tracing::warn!("{name}: repaired pixels: {nan} NaN, {infinite} infinite, {negative} negative");
         }
-        Self { name, width, height, texels, repaired }
+        Self::new(name, width, height, texels, repaired)
     }
 }
 

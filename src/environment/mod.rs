@@ -1,5 +1,6 @@
 //! Distant light from all directions: the lat-long environment, and the function of direction that is its ground truth.
 use std::f64::consts::{PI, TAU};
+use std::sync::OnceLock;
 
 use glam::DVec3;
 
@@ -31,9 +32,27 @@ pub struct Environment {
     pub texels: Vec<[f32; 3]>,
     /// What had to be repaired when the file was read.
     pub repaired: RepairCounts,
+    /// Made when first asked for.
+    box_filtered: OnceLock<Pyramid>,
 }
 
 impl Environment {
+    /// A picture whose pixels are finite and not negative.
+    pub(crate) fn new(
+        name: String,
+        width: usize,
+        height: usize,
+        texels: Vec<[f32; 3]>,
+        repaired: RepairCounts,
+    ) -> Self {
+        Self { name, width, height, texels, repaired, box_filtered: OnceLock::new() }
+    }
+
+    /// The box-filtered pyramid of this environment, made once for all renderers.
+    pub fn box_filtered(&self) -> &Pyramid {
+        self.box_filtered.get_or_init(|| Pyramid::box_filtered(self))
+    }
+
     /// The radiance that arrives from `direction` (any length but 0): bilinear between pixel centres, wrapped in u,
     /// clamped at the poles. This function is the environment; everything else approximates it.
     pub fn radiance(&self, direction: DVec3) -> DVec3 {
@@ -137,7 +156,7 @@ pub(crate) mod tests {
     /// An environment of the given pixels, for tests.
     pub(crate) fn environment(width: usize, height: usize, texel: impl Fn(usize, usize) -> [f32; 3]) -> Environment {
         let texels = (0..width * height).map(|i| texel(i % width, i / width)).collect();
-        Environment { name: "test".into(), width, height, texels, repaired: RepairCounts::default() }
+        Environment::new("test".into(), width, height, texels, RepairCounts::default())
     }
 
     /// A file of the reference images' folder, or nothing where it is absent.

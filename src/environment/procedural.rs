@@ -40,8 +40,7 @@ impl Environment {
 
 /// The picture of a function of direction, sampled at the pixel centres: functions here are smooth over a pixel.
 fn procedural(name: &str, (width, height): (usize, usize), radiance: impl Fn(DVec3) -> DVec3 + Sync) -> Environment {
-    let mut environment =
-        Environment { name: name.into(), width, height, texels: Vec::new(), repaired: RepairCounts::default() };
+    let mut environment = Environment::new(name.into(), width, height, Vec::new(), RepairCounts::default());
     environment.texels = (0..width * height)
         .into_par_iter()
         .map(|i| radiance(environment.direction((i % width) as f64, (i / width) as f64)).as_vec3().to_array())

@@ -173,7 +173,7 @@ impl DeviceLight {
     pub fn new(device: &Arc<Device>, method: Method, environment: &Environment, intensity: f64) -> Result<Self> {
         let shader = method.shader();
         let pyramid = shader.declares("environment_pyramid")?;
-        let pyramid = pyramid.then(|| DevicePyramid::new(device, &Pyramid::box_filtered(environment))).transpose()?;
+        let pyramid = pyramid.then(|| DevicePyramid::new(device, environment.box_filtered())).transpose()?;
         let mut light = Self { pyramid, map: None, aliases: None, intensity: intensity as f32 };
         if shader.declares("environment_map")? {
             check_map_size(device, environment, "scale it down, or use --method filtered")?;

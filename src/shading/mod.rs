@@ -113,7 +113,7 @@ fn footprint(texels: &[UVec2]) -> f32 {
 /// The CPU twin of pass 2 for one scene.
 pub struct Twin<'a> {
     prepared: &'a Prepared,
-    pyramid: Option<Pyramid>,
+    pyramid: Option<&'a Pyramid>,
     map: Option<LightMap>,
     aliases: Vec<Alias>,
     /// One for each material, for methods that draw by them.
@@ -128,7 +128,7 @@ impl<'a> Twin<'a> {
     pub fn new(prepared: &'a Prepared) -> Result<Self> {
         let shader = prepared.method.shader();
         let environment = &prepared.environment;
-        let pyramid = shader.declares("environment_pyramid")?.then(|| Pyramid::box_filtered(environment));
+        let pyramid = shader.declares("environment_pyramid")?.then(|| environment.box_filtered());
         let map = shader.declares("environment_map")?.then(|| LightMap::new(environment));
         let aliases = map.as_ref().filter(|_| shader.declares("LightAliases").unwrap_or(false));
         let mut twin = Self {
@@ -221,7 +221,7 @@ impl Point<'_> {
 
     /// The pyramid's mean radiance over `solid_angle` (sr) around `direction`.
     fn filtered_radiance(&self, direction: Vec3, solid_angle: f32) -> Vec3 {
-        let pyramid = self.twin.pyramid.as_ref().expect("the method declares the pyramid");
+        let pyramid = self.twin.pyramid.expect("the method declares the pyramid");
         pyramid.lookup(direction, pyramid.level_of(solid_angle, direction))
     }
 

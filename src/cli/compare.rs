@@ -1,0 +1,85 @@
+//! `threadlight compare`: how much, and where, two pictures differ.
+use super::number;
+use anyhow::Context;
+use std::io::Write;
+use std::path::PathBuf;
+use threadlight::evaluate::{Comparable, Display, Metrics, compare, difference_picture};
+use threadlight::output::{self, Format};
+use threadlight::scene::{EXPOSURE, GAMMA};
+use threadlight::{Error, Result};
+
+const EXAMPLES: &str = "\
+Examples:
+  threadlight compare paper.exr reference.exr
+  threadlight compare paper.exr reference.exr --mask-background --difference where.png
+  threadlight compare a.png b.png --json
+
+Display values are clamp(exposure L, 0, 1)^(1/gamma) of radiance L over black, compared in all three channels. A PNG
+holds display values: --exposure and --gamma then say how it was made, for rms_linear.
+
+The difference picture shows the largest difference among the channels' display values in colours from black (1e-4 or less)
+over violet and orange to pale yellow (1), by the logarithm; grey is what was left out. Below it is the scale, with ticks at
+1e-3, 1e-2 and 1e-1.";
+
+/// Compares two pictures of one size: RMS, SSIM, FLIP. B is the reference.
+#[derive(clap::Args)]
+#[command(after_help = EXAMPLES, allow_negative_numbers = true)]
+pub struct Compare {
+    /// A .png or .exr.
+    a: PathBuf,
+    /// Another.
+    b: PathBuf,
+    /// Compare only pixels that see a surface in A or B: alpha above 0, as far as they have alpha.
+    #[arg(long)]
+    mask_background: bool,
+    /// Print JSON instead of a table.
+    #[arg(long)]
+    json: bool,
+    /// Factor on radiance before display.
+    #[arg(long, value_name = "X", default_value_t = 1.0, value_parser = number(f64::MIN_POSITIVE..=*EXPOSURE.end(), "a finite number above 0"))]
+    exposure: f64,
+    /// Display values are radiance to the power of 1/X.
+    #[arg(long, value_name = "X", default_value_t = 2.2, value_parser = number(GAMMA, "a finite number above 0"))]
+    gamma: f64,
+    /// Picture to write of where they differ.
+    #[arg(long, value_name = "FILE.png")]
+    difference: Option<PathBuf>,
+}
+
+impl Compare {
+    pub fn run(self) -> anyhow::Result<()> {
+        if let Some(path) = &self.difference {
+            if Format::of(path)? != Format::Png {
+                return Err(Error::in_file(path, "is no PNG", "end its name in .png").into());
+            }
+            output::check_writable(path)?;
+        }
+        let display = Display { exposure: self.exposure, gamma: self.gamma };
+        let read = |path| -> Result<_> { Ok(Comparable::from_picture(&output::read_image(path)?, display)) };
+        let (a, b) = (read(&self.a)?, read(&self.b)?);
+        let names = format!("{} and {}", self.a.display(), self.b.display());
+        let metrics = compare(&a, &b, self.mask_background).map_err(|error| error.within(names))?;
+        if let Some(path) = &self.difference {
+            let (width, height, rgba) = difference_picture(&a, &b, self.mask_background);
+            output::write_png(path, width, height, &rgba, false)?;
+        }
+        let text =
+            if self.json { serde_json::to_string_pretty(&metrics).context("--json")? + "\n" } else { table(&metrics) };
+        Ok(std::io::stdout().write_all(text.as_bytes())?)
+    }
+}
+
+fn table(metrics: &Metrics) -> String {
+    let Metrics { rms, rms_linear, max, ssim, flip, nan, pixels } = metrics;
+    format!(
+        "\
+rms         {rms:<11.6} display values, 0 to 1
+rms_linear  {rms_linear:<11.6} radiance
+max         {max:<11.6} display values, 0 to 1
+ssim        {ssim:<11.6} 1 is equal
+flip        {flip:<11.6} 0 is equal
+nan         {nan:<11} values that are NaN or infinite
+pixels      {pixels:<11} compared
+"
+    )
+}
