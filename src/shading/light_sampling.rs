@@ -13,7 +13,7 @@ fn tent(u: f32) -> f32 {
 
 /// A direction; its density is [`light_pdf`] of what the map holds there. Twin of `sample_light`.
 fn sample_light(map: &LightMap, aliases: &[Alias], bits: [u32; 4]) -> Vec3 {
-    let pixel = (u64::from(bits[0]) * aliases.len() as u64 >> 32) as usize;
+    let pixel = ((u64::from(bits[0]) * aliases.len() as u64) >> 32) as usize;
     let alias = aliases[pixel];
     let pixel = if bits[1] < alias.threshold { pixel } else { alias.other as usize };
     let u = to_unit(bits);
