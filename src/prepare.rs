@@ -71,6 +71,7 @@ pub fn load_material(source: &MaterialSource) -> Result<Brdf> {
 /// The first file or setting that cannot be used, or a cancelled generation.
 pub fn prepare(scene: &Scene, cache: Option<&Path>, observer: &dyn Observer) -> Result<Prepared> {
     let method = Method::from_name(&scene.shading.method)?;
+    check_count(method, scene.shading.threads, scene.image.subpixels)?;
     let mut meshes: Vec<(String, Mesh)> = Vec::new();
     let mut objects = Vec::new();
     let mut used_materials: Vec<&str> = Vec::new();
@@ -159,6 +160,25 @@ pub fn prepare(scene: &Scene, cache: Option<&Path>, observer: &dyn Observer) -> 
         thread_time,
         thread_cache,
     })
+}
+
+/// An error for more threads than a table holds, or more samples than shaders may loop over.
+fn check_count(method: Method, count: u32, subpixels: u32) -> Result<()> {
+    // A pixel at an edge takes all samples in each sub-pixel. lavapipe silently leaves loops after 65535 iterations in all.
+    const MOST_ITERATIONS: u32 = 65_000;
+    let most = match method.uses_threads() {
+        true => threads::MAX_COUNT as u32,
+        false => MOST_ITERATIONS / (subpixels * subpixels),
+    };
+    if count <= most {
+        return Ok(());
+    }
+    let problem = format!("are {count}, more than the {most} of method \"{}\"", method.name());
+    let remedy = match method.uses_threads() {
+        true => format!("use at most {most}"),
+        false => format!("use at most {most}, or fewer sub-pixels than {subpixels} x {subpixels}"),
+    };
+    Err(Error::input("threads", problem, remedy))
 }
 
 /// Centre and radius of a sphere in world space that holds `object`.

@@ -59,9 +59,9 @@ fn render(flags: &str) -> String {
 fn numbers_out_of_range_name_the_flag_and_the_range() {
     let folder = workplace();
     for (flag, value, range) in [
-        ("--threads", "0", "1..=1024"),
-        ("--threads", "1025", "1..=1024"),
-        ("--threads", "-1", "1..=1024"),
+        ("--threads", "0", "1..=10000"),
+        ("--threads", "10001", "1..=10000"),
+        ("--threads", "-1", "1..=10000"),
         ("--threads", "99999999999999999999", "--threads"),
         ("--threads", "many", "--threads"),
         ("--size", "0x0", "1 to 16384"),
@@ -83,6 +83,10 @@ fn numbers_out_of_range_name_the_flag_and_the_range() {
     }
     refuses(&folder, "threads gold --count 0 -o out/gold.threads", &["--count", "1..=1024"]);
     refuses(&folder, "threads gold --count 1025 -o out/gold.threads", &["--count", "1..=1024"]);
+    // More than a method can have.
+    refuses(&folder, "render --threads 1025 -o out/image.png", &["threads", "1025", "1024", "paper"]);
+    let many = "render --method uniform --threads 9000 --subpixels 4 -o out/image.png";
+    refuses(&folder, many, &["threads", "9000", "4062", "sub-pixels"]);
     // More sub-pixels than an image of the device holds, though each flag is within its range.
     refuses(&folder, "render --threads 2 --size 16384x1 --subpixels 4 -o out/image.png", &["65536 x 4", "--size"]);
 }

@@ -6,13 +6,15 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::value_parser;
 use std::io::Write;
 use std::path::PathBuf;
+use threadlight::method::Method;
 use threadlight::output::{self, ExrHeader, Format};
 use threadlight::pipeline::{Renderer, Rendering, Wanted};
 use threadlight::prepare::{Prepared, prepare};
 use threadlight::scene::{
-    Background, EXPOSURE, GAMMA, MAX_SIZE_PX, MAX_SUBPIXELS, MaterialSettings, ObjectSettings, Scene, Source, mesh,
+    Background, EXPOSURE, GAMMA, MAX_SAMPLES, MAX_SIZE_PX, MAX_SUBPIXELS, MaterialSettings, ObjectSettings, Scene,
+    Source, mesh,
 };
-use threadlight::threads::{CacheState, MAX_COUNT};
+use threadlight::threads::CacheState;
 use threadlight::vulkan::{Device, Instance};
 use threadlight::{Error, environment};
 
@@ -40,10 +42,10 @@ pub struct Render {
     #[arg(long, value_name = "NAME|FILE")]
     environment: Option<String>,
     /// Shading method.
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", value_parser = methods())]
     method: Option<String>,
-    /// Sample threads per pixel, 1 to 1024.
-    #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=MAX_COUNT as i64))]
+    /// Sample threads per pixel, 1 to 1024; or samples per pixel of methods that have none, 1 to 10000.
+    #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=i64::from(MAX_SAMPLES)))]
     threads: Option<u32>,
     /// Sub-pixels per axis, 1 to 4.
     #[arg(long, value_name = "S", value_parser = value_parser!(u32).range(1..=i64::from(MAX_SUBPIXELS)))]
@@ -262,6 +264,11 @@ pub fn parse_size(text: &str) -> Result<(u32, u32), String> {
     let side = |text: &str| text.parse().ok().filter(|side| (1..=MAX_SIZE_PX).contains(side));
     let sides = text.split_once(['x', 'X']).and_then(|(width, height)| Some((side(width)?, side(height)?)));
     sides.ok_or_else(|| format!("use width x height in pixels, each 1 to {MAX_SIZE_PX}, such as 640x480"))
+}
+
+/// The name of a method.
+fn methods() -> PossibleValuesParser {
+    PossibleValuesParser::new(Method::ALL.iter().map(|method| method.name()))
 }
 
 /// `environment` or `none`.

@@ -7,11 +7,10 @@ use serde::{Deserialize, Serialize};
 use toml::Spanned;
 
 use super::{
-    Camera, DEFAULT_MATERIAL, EXPOSURE, EnvironmentSettings, GAMMA, ImageSettings, MAX_SIZE_PX, MAX_SUBPIXELS,
-    MaterialSettings, MaterialSource, ObjectSettings, Scene, ShadingSettings, Source,
+    Camera, DEFAULT_MATERIAL, EXPOSURE, EnvironmentSettings, GAMMA, ImageSettings, MAX_SAMPLES, MAX_SIZE_PX,
+    MAX_SUBPIXELS, MaterialSettings, MaterialSource, ObjectSettings, Scene, ShadingSettings, Source,
 };
 use crate::error::{Error, Result};
-use crate::threads::MAX_COUNT;
 
 /// A whole scene file.
 #[derive(Deserialize)]
@@ -240,9 +239,9 @@ pub(super) fn subpixels<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u3
     integer(deserializer, 1..=MAX_SUBPIXELS)
 }
 
-/// Number of threads.
+/// Number of threads or samples.
 pub(super) fn threads<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u32, D::Error> {
-    integer(deserializer, 1..=MAX_COUNT as u32)
+    integer(deserializer, 1..=MAX_SAMPLES)
 }
 
 /// Factor of radiance before display.
@@ -492,7 +491,7 @@ mod tests {
             ("[environment]\nrotation_deg = inf", "rotation_deg", "line 2"),
             ("[environment]\nfile = 'x'\nbuiltin = 'y'", "builtin", "line 1"),
             ("[shading]\nthreads = 0", "threads", "line 2"),
-            ("[shading]\nthreads = 1025", "threads", "line 2"),
+            ("[shading]\nthreads = 10001", "threads", "line 2"),
             ("[shading]\nseed = -1", "seed", "line 2"),
             ("[[material]]\nname = 'm'", "model", "line 1"),
             ("[[material]]\nname = 'm'\nfile = 'x'\nmodel = 'y'", "model", "line 1"),

@@ -26,6 +26,8 @@ pub const DEFAULT_METHOD: &str = "paper";
 pub const MAX_SIZE_PX: u32 = 16384;
 /// Most sub-pixels along an axis of a pixel.
 pub const MAX_SUBPIXELS: u32 = 4;
+/// Most samples of a pixel; methods that use threads have at most [`crate::threads::MAX_COUNT`].
+pub const MAX_SAMPLES: u32 = 10_000;
 /// What the exposure may be: shaders have it in single precision.
 pub const EXPOSURE: RangeInclusive<f64> = 0.0..=f32::MAX as f64;
 /// What the gamma may be: shaders have it in single precision.
@@ -124,7 +126,7 @@ pub struct EnvironmentSettings {
 pub struct ShadingSettings {
     /// Name of the estimator.
     pub method: String,
-    /// Threads, or samples of the other estimators, 1 to 1024.
+    /// Threads, 1 to 1024, or samples of methods that have none, 1 to [`MAX_SAMPLES`].
     #[serde(deserialize_with = "file::threads")]
     pub threads: u32,
     /// Seed of whatever is random.

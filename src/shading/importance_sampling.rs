@@ -98,6 +98,12 @@ mod tests {
     use crate::threads::test_materials;
     use glam::{DVec3, UVec2, dvec3};
 
+    /// The hard ones: a lobe of 0.3 degrees, a lobe on a diffuse base, a measured table.
+    fn materials() -> impl Iterator<Item = (&'static str, crate::brdf::Brdf)> {
+        let hard = ["conductor 0.005", "plastic", "alumina-oxide"];
+        test_materials::all().into_iter().filter(move |(name, _)| hard.contains(name))
+    }
+
     /// Directions drawn for `theta_o_deg`, with their densities, and how many draws were made.
     fn drawn(rows: &SliceRows, w_o: Vec3, draws: u32) -> Vec<(DVec3, f64)> {
         let sample = |i| rows.sample_brdf(w_o, random_bits(UVec2::new(1, 2), i, 3));
@@ -112,12 +118,12 @@ mod tests {
     #[test]
     fn the_density_is_that_of_the_drawn_directions() {
         // The mean of g / p is the integral of g, for g of any shape: moments of the cosine lobe, wide against cells.
-        for (name, brdf) in test_materials::all() {
+        for (name, brdf) in materials() {
             let table = SliceTable::new(&brdf);
             for theta_o_deg in [0.0, 33.3, 70.6, 89.7] {
                 let w_o = view(theta_o_deg);
                 let rows = SliceRows::new(&table, w_o);
-                let draws = 200_000;
+                let draws = 100_000;
                 let directions = drawn(&rows, w_o, draws);
                 let mirror = dvec3(-f64::from(w_o.x), 0.0, f64::from(w_o.z));
                 // Integrals over the hemisphere of cos, cos x^2, and a part of the sphere around the mirror direction (which
@@ -149,7 +155,7 @@ mod tests {
     #[test]
     fn f_cos_over_p_stays_near_the_albedo() {
         // What importance sampling is for: the spread of f cos / p, in a white furnace all of the noise, is small.
-        for (name, brdf) in test_materials::all() {
+        for (name, brdf) in materials() {
             let table = SliceTable::new(&brdf);
             for theta_o_deg in [0.0, 33.3, 70.6] {
                 let w_o = view(theta_o_deg);
@@ -161,8 +167,7 @@ mod tests {
                 let mean = weights.iter().sum::<f64>() / f64::from(draws);
                 let square = weights.iter().map(|weight| weight * weight).sum::<f64>() / f64::from(draws);
                 let spread = (square / (mean * mean) - 1.0).max(0.0).sqrt();
-                println!("{name} {theta_o_deg}: {spread:.3}");
-                assert!(spread < 0.5, "{name}, {theta_o_deg}: standard deviation {spread} of the mean");
+                assert!(spread < 0.35, "{name}, {theta_o_deg}: standard deviation {spread} of the mean");
             }
         }
     }
