@@ -4,6 +4,7 @@
 pub mod brdf;
 pub mod environment;
 pub mod error;
+pub mod evaluate;
 pub mod graph;
 pub mod method;
 pub mod output;

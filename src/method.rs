@@ -9,16 +9,19 @@ use crate::{Error, Result};
 pub enum Method {
     /// The paper's threads: equations (2) to (10), box-filtered lookups.
     Paper,
+    /// Quadrature on the CPU: the truth.
+    Reference,
 }
 
 impl Method {
     /// All of them.
-    pub const ALL: &[Self] = &[Self::Paper];
+    pub const ALL: &[Self] = &[Self::Paper, Self::Reference];
 
     /// What the command line and scene files call it.
     pub fn name(self) -> &'static str {
         match self {
             Self::Paper => "paper",
+            Self::Reference => "reference",
         }
     }
 
@@ -33,10 +36,16 @@ impl Method {
         })
     }
 
-    /// The variant of shade.comp that runs it.
-    pub fn shader(self) -> &'static Shader {
+    /// Whether it needs the threads of a material.
+    pub fn uses_threads(self) -> bool {
+        matches!(self, Self::Paper)
+    }
+
+    /// The variant of shade.comp that runs it; none for what runs on the CPU.
+    pub fn shader(self) -> Option<&'static Shader> {
         match self {
-            Self::Paper => &compiled::SHADE_PAPER,
+            Self::Paper => Some(&compiled::SHADE_PAPER),
+            Self::Reference => None,
         }
     }
 }

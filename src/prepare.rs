@@ -40,7 +40,7 @@ pub struct PreparedMaterial {
     pub name: String,
     /// Its BRDF.
     pub brdf: Brdf,
-    /// Its threads.
+    /// Its threads; empty where the method uses none.
     pub threads: ThreadTable,
 }
 
@@ -131,6 +131,10 @@ pub fn prepare(scene: &Scene, cache: Option<&Path>, observer: &dyn Observer) -> 
             MaterialSource::Model { .. } => error.within(format!("material \"{name}\"")),
             _ => error,
         })?;
+        if !method.uses_threads() {
+            materials.push(PreparedMaterial { name: name.to_owned(), brdf, threads: ThreadTable::empty() });
+            continue;
+        }
         let settings =
             threads::Settings { count: scene.shading.threads as usize, seed: scene.shading.seed, ..Default::default() };
         let (mut threads, state, time) = threads::load_or_generate(&brdf, &settings, cache, observer)?;

@@ -195,7 +195,7 @@ impl Shade {
     /// Compiles the variant of the shader for `method`, with the models that `materials` use.
     ///
     /// # Errors
-    /// A driver that cannot compile it.
+    /// A driver that cannot compile it, or a method that has no shader.
     pub fn new(
         device: &Arc<Device>,
         cache: &PipelineCache,
@@ -205,7 +205,10 @@ impl Shade {
         light: DeviceLight,
     ) -> Result<Self> {
         let constants = [("SUBPIXELS", subpixels), ("MODELS_USED", materials.models_used)];
-        let pipeline = ComputePipeline::new(device, cache, method.shader(), &constants)?;
+        let shader = method.shader().ok_or_else(|| {
+            Error::input(format!("method \"{}\"", method.name()), "does not run on the GPU", "use another")
+        })?;
+        let pipeline = ComputePipeline::new(device, cache, shader, &constants)?;
         Ok(Self { pipeline, materials, light })
     }
 }

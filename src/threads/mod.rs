@@ -115,6 +115,11 @@ pub struct ThreadTable {
 }
 
 impl ThreadTable {
+    /// No threads, for methods that need none.
+    pub fn empty() -> Self {
+        Self { rows: 0, count: 0, seed: 0, material: String::new(), albedo: Vec::new(), samples: Vec::new() }
+    }
+
     /// View angle of `row` in radians.
     pub fn theta_o(&self, row: usize) -> f64 {
         theta_o(row, self.rows)

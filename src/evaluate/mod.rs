@@ -1,0 +1,2 @@
+//! How wrong a picture is, and what the truth is.
+pub mod reference;

@@ -1,0 +1,340 @@
+//! The truth: equation (1) of every sub-pixel, on the CPU in double precision, with an estimate of its own error.
+//!
+//! The integrand is [`Environment::radiance`] times [`Brdf::evaluate`] times the cosine; nothing of threads or pyramids is in it.
+//! Directions are drawn in two ways, each in proportion to one of the two factors ([`lobe`], [`light`]), and weighted by the balance
+//! heuristic (Veach and Guibas 1995), so that neither a narrow lobe nor a small sun makes a large weight. The points behind
+//! them are Sobol's in several independent scrambles ([`points`]). Each scramble gives a picture by itself; how far
+//! these lie apart tells the error of their mean. Points are doubled, pixel by pixel, until it is below the tolerance. All is
+//! deterministic: points depend on the sub-pixel's place in its pixel and on nothing else.
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+use std::time::Instant;
+
+use glam::{DMat3, DVec3, UVec2, dvec3};
+use rayon::prelude::*;
+
+use crate::brdf::Brdf;
+use crate::environment::Environment;
+use crate::passes::View;
+use crate::pipeline::render_geometry;
+use crate::prepare::Prepared;
+use crate::shading::unpack_geometry;
+use crate::threads::Observer;
+use crate::vulkan::Device;
+use crate::{Error, Result};
+
+mod cache;
+mod inversion;
+mod light;
+mod lobe;
+mod points;
+
+use light::{Light, LightSample};
+use lobe::Lobe;
+pub use lobe::MAX_THETA_O_DEG;
+use points::point;
+
+/// Tolerance where none is given: a twentieth of a step of an 8-bit display value.
+pub const TOLERANCE: f64 = 2e-4;
+/// Independent scrambles. With 8 the spread is known to a quarter, and an error beyond 3 times its estimate is one in fifty.
+const SCRAMBLES: usize = 8;
+/// Points of each scramble and way of drawing that a sub-pixel starts with, and at which it gives up.
+const FIRST_POINTS: u32 = 32;
+const MOST_POINTS: u32 = 1 << 17;
+/// So many points of the light are kept; they are the same for all pixels.
+const KEPT_POINTS: u32 = 512;
+/// Above display white, where display values no longer tell, linear radiance is held to 1/0.05 = 20 times the tolerance, relatively.
+const ABOVE_WHITE: f64 = 0.05;
+
+/// How exact the reference is to be.
+#[derive(Clone, Debug)]
+pub struct ReferenceSettings {
+    /// Largest estimated error of a pixel's display values (standard error; the display's range is 1).
+    pub tolerance: f64,
+    /// Folder to keep results in, and to take them from.
+    pub cache: Option<PathBuf>,
+}
+
+impl Default for ReferenceSettings {
+    fn default() -> Self {
+        Self { tolerance: TOLERANCE, cache: None }
+    }
+}
+
+/// The reference picture.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ReferenceImage {
+    /// Linear radiance times coverage, and coverage, row by row from the top left: means over sub-pixels.
+    pub radiance: Vec<[f32; 4]>,
+    /// RMS over channels and covered pixels of the estimated error of display values.
+    pub error_estimate: f64,
+    /// The largest of these estimates; above the tolerance only where a pixel ran into the bound on its points.
+    pub max_error_estimate: f64,
+    /// How often the integrand was evaluated.
+    pub evaluations: u64,
+    /// Sub-pixels that see a surface.
+    pub covered_subpixels: u64,
+    /// Time it took, or takes to read from the cache.
+    pub seconds: f64,
+    /// Whether it came from the cache.
+    pub cached: bool,
+}
+
+/// The reference of `prepared`, for the geometry that `device` rasterises. `observer` hears of rows of pixels.
+///
+/// # Errors
+/// Whatever Vulkan refuses; a tolerance that is not positive; cancelled.
+pub fn reference(
+    prepared: &Prepared,
+    device: &Arc<Device>,
+    settings: &ReferenceSettings,
+    observer: &dyn Observer,
+) -> Result<ReferenceImage> {
+    if !(settings.tolerance > 0.0 && settings.tolerance.is_finite()) {
+        let problem = format!("is {}", settings.tolerance);
+        return Err(Error::input("tolerance", problem, format!("use a positive number, such as {TOLERANCE}")));
+    }
+    let start = Instant::now();
+    let geometry = render_geometry(device, settings.cache.as_deref(), prepared)?;
+    let key = cache::key(prepared, &geometry, settings.tolerance);
+    if let Some(image) = settings.cache.as_deref().and_then(|folder| cache::read(folder, &key, &prepared.view)) {
+        return Ok(ReferenceImage { seconds: start.elapsed().as_secs_f64(), cached: true, ..image });
+    }
+    let brdfs = prepared.materials.iter().map(|material| &material.brdf);
+    let integrator = Integrator::new(&prepared.environment, prepared.intensity, brdfs, prepared.view.subpixels);
+    let image = integrator.image(&prepared.view, &geometry, settings.tolerance, observer)?;
+    let image = ReferenceImage { seconds: start.elapsed().as_secs_f64(), ..image };
+    if let Some(folder) = &settings.cache {
+        cache::write(folder, &key, &prepared.view, &image);
+    }
+    Ok(image)
+}
+
+/// A point to shade: its frame in the environment's axes, and its view.
+#[derive(Clone, Copy, Debug)]
+pub struct Point {
+    /// Columns: x, the part of w_o orthogonal to n; y = z cross x; z = n.
+    frame: DMat3,
+    /// Towards the eye, in that frame; at most [`MAX_THETA_O_DEG`] from z.
+    w_o: DVec3,
+    /// Index of the material.
+    material: usize,
+}
+
+impl Point {
+    /// The point of unit normal `n` seen from unit `w_o`, both in the axes of the environment.
+    pub fn new(n: DVec3, w_o: DVec3, material: usize) -> Self {
+        let cos_theta_o = n.dot(w_o);
+        let across = w_o - cos_theta_o * n;
+        let sin_theta_o = across.length();
+        // Seen along the normal any axis will do; 1e-12 is ten thousand roundings, so the axis is still good to 1e-4 there.
+        let x = if sin_theta_o > 1e-12 { across / sin_theta_o } else { n.any_orthonormal_vector() };
+        let theta_o = sin_theta_o.atan2(cos_theta_o).min(MAX_THETA_O_DEG.to_radians());
+        Self {
+            frame: DMat3::from_cols(x, n.cross(x), n),
+            w_o: dvec3(theta_o.sin(), 0.0, theta_o.cos()),
+            material,
+        }
+    }
+
+    fn theta_o(&self) -> f64 {
+        self.w_o.x.atan2(self.w_o.z)
+    }
+}
+
+/// The radiance of a pixel and what is known of its error.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PixelEstimate {
+    /// Linear radiance times coverage.
+    pub radiance: DVec3,
+    /// Standard error of it.
+    pub radiance_error: DVec3,
+    /// Standard error of the display values.
+    pub display_error: DVec3,
+    /// How often the integrand was evaluated.
+    pub evaluations: u64,
+}
+
+/// How a radiance is shown, for errors to be measured in what is seen.
+#[derive(Clone, Copy, Debug)]
+pub struct Display {
+    /// Factor on radiance.
+    pub exposure: f64,
+    /// Display values are radiance to the power of 1/gamma.
+    pub gamma: f64,
+}
+
+impl Display {
+    fn value(&self, radiance: f64) -> f64 {
+        (self.exposure * radiance).clamp(0.0, 1.0).powf(1.0 / self.gamma)
+    }
+
+    /// The error of a display value, from `radiance` and its standard error.
+    fn error(&self, radiance: f64, error: f64) -> f64 {
+        let shown = 0.5 * (self.value(radiance + error) - self.value(radiance - error));
+        if self.exposure * radiance > 1.0 { shown.max(ABOVE_WHITE * error / radiance) } else { shown }
+    }
+}
+
+/// Evaluates equation (1) for one environment and some materials.
+pub struct Integrator<'a> {
+    light: Light,
+    intensity: f64,
+    lobes: Vec<Lobe<'a>>,
+    /// For each scramble and sub-pixel the first of the light's points.
+    kept: Vec<Vec<LightSample>>,
+    subpixels: usize,
+}
+
+impl<'a> Integrator<'a> {
+    /// For `environment` times `intensity`, materials `brdfs`, and pixels of up to `subpixels` squared points.
+    pub fn new(
+        environment: &Environment,
+        intensity: f64,
+        brdfs: impl IntoIterator<Item = &'a Brdf>,
+        subpixels: u32,
+    ) -> Self {
+        let light = Light::new(environment);
+        let subpixels = (subpixels * subpixels) as usize;
+        let sets = (0..SCRAMBLES * subpixels).into_par_iter();
+        let kept = sets.map(|set| (0..KEPT_POINTS).map(|i| light.sample(light_uv(set, i))).collect()).collect();
+        Self { light, intensity, lobes: brdfs.into_iter().map(Lobe::new).collect(), kept, subpixels }
+    }
+
+    /// The picture of `geometry`, texels as [`crate::pipeline::Rendering::geometry`] has them.
+    ///
+    /// # Errors
+    /// Only [`Error::Cancelled`].
+    pub fn image(
+        &self,
+        view: &View,
+        geometry: &[[u32; 2]],
+        tolerance: f64,
+        observer: &dyn Observer,
+    ) -> Result<ReferenceImage> {
+        let start = Instant::now();
+        let (width, height) = (view.width as usize, view.height as usize);
+        let display = Display { exposure: f64::from(view.exposure), gamma: f64::from(view.gamma) };
+        let (evaluations, covered, rows_done) = (AtomicU64::new(0), AtomicU64::new(0), AtomicUsize::new(0));
+        let row = |y: usize| -> Result<(Vec<[f32; 4]>, Vec<DVec3>)> {
+            let (mut texels, mut errors) = (Vec::with_capacity(width), Vec::new());
+            for x in 0..width {
+                if observer.cancelled() {
+                    return Err(Error::Cancelled);
+                }
+                let points = self.points(view, geometry, x, y);
+                if points.is_empty() {
+                    texels.push([0.0; 4]);
+                    continue;
+                }
+                let estimate = self.pixel(&points, tolerance, display);
+                evaluations.fetch_add(estimate.evaluations, Ordering::Relaxed);
+                covered.fetch_add(points.len() as u64, Ordering::Relaxed);
+                errors.push(estimate.display_error);
+                // Beyond single precision there is no picture: the brightest number stands for it.
+                let [r, g, b] = estimate.radiance.to_array().map(|value| value.min(f64::from(f32::MAX)) as f32);
+                texels.push([r, g, b, points.len() as f32 / self.subpixels as f32]);
+            }
+            observer.progress(rows_done.fetch_add(1, Ordering::Relaxed) + 1, height);
+            Ok((texels, errors))
+        };
+        let rows = (0..height).into_par_iter().map(row).collect::<Result<Vec<_>>>()?;
+        let errors = || rows.iter().flat_map(|(_, errors)| errors);
+        let (count, squares) = errors().fold((0, 0.0), |(n, sum), error| (n + 3, sum + error.length_squared()));
+        Ok(ReferenceImage {
+            error_estimate: (squares / f64::from(count.max(1))).sqrt(),
+            max_error_estimate: errors().fold(0.0, |most, error| error.max_element().max(most)),
+            radiance: rows.iter().flat_map(|(texels, _)| texels).copied().collect(),
+            evaluations: evaluations.into_inner(),
+            covered_subpixels: covered.into_inner(),
+            seconds: start.elapsed().as_secs_f64(),
+            cached: false,
+        })
+    }
+
+    /// The covered sub-pixels of pixel (`x`, `y`), row by row.
+    fn points(&self, view: &View, geometry: &[[u32; 2]], x: usize, y: usize) -> Vec<Point> {
+        let side = view.subpixels as usize;
+        let [width, height] = view.cache_size();
+        let to_environment = DMat3::from_rotation_y(-view.rotation_deg.to_radians());
+        let subpixels = (0..side).flat_map(|v| (0..side).map(move |u| (x * side + u, y * side + v)));
+        subpixels
+            .filter_map(|(u, v)| {
+                let texel = geometry[v * width as usize + u];
+                let (normal, material) = unpack_geometry(UVec2::from_array(texel))?;
+                let w_o = -view.camera.ray(u as f64, v as f64, width, height);
+                Some(Point::new(to_environment * normal.as_dvec3().normalize(), to_environment * w_o, material))
+            })
+            .collect()
+    }
+
+    /// The sum over `points` divided by the number of sub-pixels, to within `tolerance` as `display` shows it.
+    ///
+    /// # Panics
+    /// With more points than sub-pixels, or of materials that are not there.
+    pub fn pixel(&self, points: &[Point], tolerance: f64, display: Display) -> PixelEstimate {
+        assert!(points.len() <= self.subpixels, "at most one point a sub-pixel");
+        let mut sums = [DVec3::ZERO; SCRAMBLES];
+        let (mut done, mut next) = (0, FIRST_POINTS);
+        loop {
+            for (j, point) in points.iter().enumerate() {
+                for (k, sum) in sums.iter_mut().enumerate() {
+                    *sum += self.sum(point, k * self.subpixels + j, done, next);
+                }
+            }
+            (done, next) = (next, 2 * next);
+            let scale = self.intensity / (f64::from(done) * self.subpixels as f64);
+            let radiance = scale * sums.iter().sum::<DVec3>() / SCRAMBLES as f64;
+            let squares = sums.iter().map(|sum| (scale * sum - radiance).powf(2.0)).sum::<DVec3>();
+            let radiance_error = (squares / (SCRAMBLES * (SCRAMBLES - 1)) as f64).powf(0.5);
+            let channel = |i: usize| display.error(radiance[i], radiance_error[i]);
+            let display_error = DVec3::from_array([0, 1, 2].map(channel));
+            if display_error.max_element() <= tolerance || done >= MOST_POINTS {
+                let evaluations = 2 * u64::from(done) * (SCRAMBLES * points.len()) as u64;
+                return PixelEstimate { radiance, radiance_error, display_error, evaluations };
+            }
+        }
+    }
+
+    /// The sum over points `from` to `to` of scramble `set` of the integrand divided by the density of samples.
+    fn sum(&self, point: &Point, set: usize, from: u32, to: u32) -> DVec3 {
+        let Point { frame, w_o, material } = *point;
+        let lobe = &self.lobes[material];
+        let table = lobe.table(point.theta_o());
+        let mut sum = DVec3::ZERO;
+        if self.light.is_black() {
+            return sum;
+        }
+        for i in from..to {
+            // A direction from the lobe.
+            let h = table.sample(lobe_uv(set, i));
+            let cos_theta_d = w_o.dot(h);
+            let w_i = 2.0 * cos_theta_d * h - w_o;
+            if cos_theta_d > 0.0 && w_i.z > 0.0 {
+                let (radiance, light_pdf) = self.light.evaluate(frame * w_i);
+                sum += lobe.f_cos(w_i, w_o) * radiance / (table.pdf(h, cos_theta_d) + light_pdf);
+            }
+            // A direction from the light.
+            let sample = match self.kept[set].get(i as usize) {
+                Some(sample) => *sample,
+                None => self.light.sample(light_uv(set, i)),
+            };
+            let w_i = frame.transpose() * sample.direction;
+            if w_i.z > 0.0 {
+                let h = (w_i + w_o).normalize();
+                sum += lobe.f_cos(w_i, w_o) * sample.radiance / (table.pdf(h, w_o.dot(h)) + sample.pdf);
+            }
+        }
+        sum
+    }
+}
+
+/// Points of the light and of the lobe are scrambled apart.
+fn light_uv(set: usize, i: u32) -> glam::DVec2 {
+    point(2 * set as u32, i)
+}
+
+fn lobe_uv(set: usize, i: u32) -> glam::DVec2 {
+    point(2 * set as u32 + 1, i)
+}
