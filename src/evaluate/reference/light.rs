@@ -86,7 +86,7 @@ impl Light {
     /// Radiance from unit `direction` and the pdf with which [`Self::sample`] draws it.
     #[inline]
     pub fn evaluate(&self, direction: DVec3) -> (DVec3, f64) {
-        let sin_theta = direction.x.hypot(direction.z);
+        let sin_theta = (direction.x * direction.x + direction.z * direction.z).sqrt();
         let phi = direction.x.atan2(-direction.z);
         let u = if phi < 0.0 { phi / TAU + 1.0 } else { phi / TAU };
         let v = sin_theta.atan2(direction.y) / PI;
@@ -146,7 +146,7 @@ impl Light {
     fn rows(&self, strip: usize, v: f64) -> (usize, usize, f64) {
         // Two half-rows of pixels lie between two centres; the first and the last half have only one centre beside them.
         let half_row = strip * 2 * self.height / self.strip_density.len();
-        let (above, below) = ((half_row + 1) / 2, (half_row + 1) / 2 + 1);
+        let (above, below) = (half_row.div_ceil(2), half_row.div_ceil(2) + 1);
         let t = v * self.height as f64 + 0.5 - above as f64;
         (above.saturating_sub(1), (below - 1).min(self.height - 1), t.clamp(0.0, 1.0))
     }

@@ -137,7 +137,7 @@ fn half_vector(x: f64, turn: f64) -> DVec3 {
 
 /// x of a half vector.
 fn x_of(h: DVec3) -> f64 {
-    (h.x.hypot(h.y) / (1.0 + h.z)).sqrt().sqrt()
+    ((h.x * h.x + h.y * h.y).sqrt() / (1.0 + h.z)).sqrt().sqrt()
 }
 
 /// Where the ray at (x, y) meets the square |x| + |y| = 1, as a part of its circumference, counted from -x towards -y.
@@ -158,7 +158,7 @@ fn direction_at(turn: f64) -> DVec2 {
 /// dw_i / (dx dturn): dw_i = 4 cos_theta_d dw_h (Walter 2007, eq 14); dw_h = 4 s ds dphi / (1 + s^2)^2 with s = tan(theta_h / 2) =
 /// x^4; dphi = 4 (|cos phi| + |sin phi|)^2 dturn.
 fn solid_angle_density(h: DVec3, cos_theta_d: f64) -> f64 {
-    let sin_theta_h = h.x.hypot(h.y);
+    let sin_theta_h = (h.x * h.x + h.y * h.y).sqrt();
     let s = sin_theta_h / (1.0 + h.z);
     // s ds = 4 x^7 dx = 4 s^(7/4) dx.
     let s_ds = 4.0 * s * s.sqrt() * s.sqrt().sqrt();

@@ -11,7 +11,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::time::Instant;
 
-use glam::{DMat3, DVec3, UVec2, dvec3};
+use glam::{DMat3, DVec2, DVec3, UVec2, dvec3};
 use rayon::prelude::*;
 
 use crate::brdf::Brdf;
@@ -19,7 +19,7 @@ use crate::environment::Environment;
 use crate::passes::View;
 use crate::pipeline::render_geometry;
 use crate::prepare::Prepared;
-use crate::shading::unpack_geometry;
+use crate::shading::{display_value, unpack_geometry};
 use crate::threads::Observer;
 use crate::vulkan::Device;
 use crate::{Error, Result};
@@ -37,20 +37,21 @@ use points::point;
 
 /// Tolerance where none is given: a twentieth of a step of an 8-bit display value.
 pub const TOLERANCE: f64 = 2e-4;
-/// Independent scrambles. With 8 the spread is known to a quarter, and an error beyond 3 times its estimate is one in fifty.
-const SCRAMBLES: usize = 8;
+/// Scrambles of a pixel, shared out among its sub-pixels: about 5 degrees of freedom, so one estimate of an error is good to a
+/// third. More would tell the error better and make it larger: it falls nearly as 1 / points, and more scrambles have fewer.
+const SCRAMBLES: usize = 6;
 /// Points of each scramble and way of drawing that a sub-pixel starts with, and at which it gives up.
 const FIRST_POINTS: u32 = 32;
 const MOST_POINTS: u32 = 1 << 17;
-/// So many points of the light are kept; they are the same for all pixels.
-const KEPT_POINTS: u32 = 512;
+/// So many points of each scramble are kept; they are the same for all pixels.
+const KEPT_POINTS: u32 = 2048;
 /// Above display white, where display values no longer tell, linear radiance is held to 1/0.05 = 20 times the tolerance, relatively.
 const ABOVE_WHITE: f64 = 0.05;
 
 /// How exact the reference is to be.
 #[derive(Clone, Debug)]
 pub struct ReferenceSettings {
-    /// Largest estimated error of a pixel's display values (standard error; the display's range is 1).
+    /// Largest estimated error of a pixel: RMS over channels of the standard error of display values, whose range is 1.
     pub tolerance: f64,
     /// Folder to keep results in, and to take them from.
     pub cache: Option<PathBuf>,
@@ -69,7 +70,7 @@ pub struct ReferenceImage {
     pub radiance: Vec<[f32; 4]>,
     /// RMS over channels and covered pixels of the estimated error of display values.
     pub error_estimate: f64,
-    /// The largest of these estimates; above the tolerance only where a pixel ran into the bound on its points.
+    /// The largest estimate of a pixel (RMS over channels); above the tolerance only where a pixel ran into the bound on its points.
     pub max_error_estimate: f64,
     /// How often the integrand was evaluated.
     pub evaluations: u64,
@@ -79,6 +80,45 @@ pub struct ReferenceImage {
     pub seconds: f64,
     /// Whether it came from the cache.
     pub cached: bool,
+}
+
+impl ReferenceImage {
+    /// The picture with the environment behind it where `prepared` shows it; linear, RGBA.
+    pub fn over_background(&self, prepared: &Prepared) -> Vec<[f32; 4]> {
+        if !prepared.show_environment {
+            return self.radiance.clone();
+        }
+        let View { camera, width, height, .. } = prepared.view;
+        let to_environment = to_environment(&prepared.view);
+        let pixels = self.radiance.iter().enumerate().map(|(pixel, &[r, g, b, coverage])| {
+            if coverage >= 1.0 {
+                return [r, g, b, coverage];
+            }
+            let (x, y) = (pixel as u32 % width, pixel as u32 / width);
+            let ray = camera.ray(f64::from(x), f64::from(y), width, height);
+            let behind = prepared.environment.radiance(to_environment * ray) * prepared.intensity;
+            let sum = dvec3(r.into(), g.into(), b.into()) + (1.0 - f64::from(coverage)) * behind;
+            sum.min(DVec3::splat(f32::MAX.into())).as_vec3().extend(1.0).to_array()
+        });
+        pixels.collect()
+    }
+}
+
+/// `radiance` (RGBA) as a display shows it, 8 bits a channel. Twin of glsl/tone_map.comp.
+pub fn tone_map(radiance: &[[f32; 4]], view: &View) -> Vec<u8> {
+    let byte = |value: f32| (255.0 * value).round() as u8;
+    let pixel = |&[r, g, b, alpha]: &[f32; 4]| {
+        let shown = |value: f32| {
+            byte(if alpha > 0.0 { display_value(value / alpha, view.exposure, view.gamma) } else { 0.0 })
+        };
+        [shown(r), shown(g), shown(b), byte(alpha)]
+    };
+    radiance.iter().flat_map(pixel).collect()
+}
+
+/// Takes directions in the world to directions in the environment's own picture.
+fn to_environment(view: &View) -> DMat3 {
+    DMat3::from_rotation_y(-view.rotation_deg.to_radians())
 }
 
 /// The reference of `prepared`, for the geometry that `device` rasterises. `observer` hears of rows of pixels.
@@ -177,13 +217,28 @@ impl Display {
     }
 }
 
+/// A point of each way to draw directions.
+#[derive(Clone, Copy)]
+struct Kept {
+    lobe_uv: DVec2,
+    light: LightSample,
+}
+
+impl Kept {
+    /// Point `index` of scramble `set`.
+    fn new(light: &Light, set: usize, index: u32) -> Self {
+        let set = 2 * set as u32;
+        Self { lobe_uv: point(set, index), light: light.sample(point(set + 1, index)) }
+    }
+}
+
 /// Evaluates equation (1) for one environment and some materials.
 pub struct Integrator<'a> {
     light: Light,
     intensity: f64,
     lobes: Vec<Lobe<'a>>,
-    /// For each scramble and sub-pixel the first of the light's points.
-    kept: Vec<Vec<LightSample>>,
+    /// The first points of each scramble.
+    kept: Vec<Vec<Kept>>,
     subpixels: usize,
 }
 
@@ -197,8 +252,9 @@ impl<'a> Integrator<'a> {
     ) -> Self {
         let light = Light::new(environment);
         let subpixels = (subpixels * subpixels) as usize;
-        let sets = (0..SCRAMBLES * subpixels).into_par_iter();
-        let kept = sets.map(|set| (0..KEPT_POINTS).map(|i| light.sample(light_uv(set, i))).collect()).collect();
+        let sets = (1..=subpixels).map(|points| points * scrambles(points)).max().unwrap_or(0);
+        let kept_points = |set| (0..KEPT_POINTS).map(|index| Kept::new(&light, set, index)).collect();
+        let kept = (0..sets).into_par_iter().map(kept_points).collect();
         Self { light, intensity, lobes: brdfs.into_iter().map(Lobe::new).collect(), kept, subpixels }
     }
 
@@ -244,7 +300,7 @@ impl<'a> Integrator<'a> {
         let (count, squares) = errors().fold((0, 0.0), |(n, sum), error| (n + 3, sum + error.length_squared()));
         Ok(ReferenceImage {
             error_estimate: (squares / f64::from(count.max(1))).sqrt(),
-            max_error_estimate: errors().fold(0.0, |most, error| error.max_element().max(most)),
+            max_error_estimate: errors().fold(0.0, |most, error| rms(*error).max(most)),
             radiance: rows.iter().flat_map(|(texels, _)| texels).copied().collect(),
             evaluations: evaluations.into_inner(),
             covered_subpixels: covered.into_inner(),
@@ -257,7 +313,7 @@ impl<'a> Integrator<'a> {
     fn points(&self, view: &View, geometry: &[[u32; 2]], x: usize, y: usize) -> Vec<Point> {
         let side = view.subpixels as usize;
         let [width, height] = view.cache_size();
-        let to_environment = DMat3::from_rotation_y(-view.rotation_deg.to_radians());
+        let to_environment = to_environment(view);
         let subpixels = (0..side).flat_map(|v| (0..side).map(move |u| (x * side + u, y * side + v)));
         subpixels
             .filter_map(|(u, v)| {
@@ -275,23 +331,28 @@ impl<'a> Integrator<'a> {
     /// With more points than sub-pixels, or of materials that are not there.
     pub fn pixel(&self, points: &[Point], tolerance: f64, display: Display) -> PixelEstimate {
         assert!(points.len() <= self.subpixels, "at most one point a sub-pixel");
-        let mut sums = [DVec3::ZERO; SCRAMBLES];
+        let scrambles = scrambles(points.len());
+        // Point by point, the sums of its scrambles.
+        let mut sums = vec![DVec3::ZERO; points.len() * scrambles];
         let (mut done, mut next) = (0, FIRST_POINTS);
         loop {
-            for (j, point) in points.iter().enumerate() {
-                for (k, sum) in sums.iter_mut().enumerate() {
-                    *sum += self.sum(point, k * self.subpixels + j, done, next);
-                }
+            for (set, sum) in sums.iter_mut().enumerate() {
+                *sum += self.sum(&points[set / scrambles], set, done, next);
             }
             (done, next) = (next, 2 * next);
-            let scale = self.intensity / (f64::from(done) * self.subpixels as f64);
-            let radiance = scale * sums.iter().sum::<DVec3>() / SCRAMBLES as f64;
-            let squares = sums.iter().map(|sum| (scale * sum - radiance).powf(2.0)).sum::<DVec3>();
-            let radiance_error = (squares / (SCRAMBLES * (SCRAMBLES - 1)) as f64).powf(0.5);
+            let scale = self.intensity / (f64::from(done) * (scrambles * self.subpixels) as f64);
+            let radiance = scale * sums.iter().sum::<DVec3>();
+            // Each point's variance from the spread of its scrambles; different points are independent.
+            let variance = sums.chunks_exact(scrambles).map(|sums| {
+                let mean = sums.iter().sum::<DVec3>() / scrambles as f64;
+                let squares = sums.iter().map(|sum| (scale * (sum - mean)).powf(2.0)).sum::<DVec3>();
+                squares * (scrambles as f64 / (scrambles - 1) as f64)
+            });
+            let radiance_error = variance.sum::<DVec3>().powf(0.5);
             let channel = |i: usize| display.error(radiance[i], radiance_error[i]);
             let display_error = DVec3::from_array([0, 1, 2].map(channel));
-            if display_error.max_element() <= tolerance || done >= MOST_POINTS {
-                let evaluations = 2 * u64::from(done) * (SCRAMBLES * points.len()) as u64;
+            if rms(display_error) <= tolerance || done >= MOST_POINTS {
+                let evaluations = 2 * u64::from(done) * sums.len() as u64;
                 return PixelEstimate { radiance, radiance_error, display_error, evaluations };
             }
         }
@@ -307,34 +368,34 @@ impl<'a> Integrator<'a> {
             return sum;
         }
         for i in from..to {
+            let Kept { lobe_uv, light } = match self.kept[set].get(i as usize) {
+                Some(kept) => *kept,
+                None => Kept::new(&self.light, set, i),
+            };
             // A direction from the lobe.
-            let h = table.sample(lobe_uv(set, i));
+            let h = table.sample(lobe_uv);
             let cos_theta_d = w_o.dot(h);
             let w_i = 2.0 * cos_theta_d * h - w_o;
             if cos_theta_d > 0.0 && w_i.z > 0.0 {
                 let (radiance, light_pdf) = self.light.evaluate(frame * w_i);
                 sum += lobe.f_cos(w_i, w_o) * radiance / (table.pdf(h, cos_theta_d) + light_pdf);
             }
-            // A direction from the light.
-            let sample = match self.kept[set].get(i as usize) {
-                Some(sample) => *sample,
-                None => self.light.sample(light_uv(set, i)),
-            };
-            let w_i = frame.transpose() * sample.direction;
-            if w_i.z > 0.0 {
+            // A direction from the light; one without radiance may have no pdf either.
+            let w_i = frame.transpose() * light.direction;
+            if w_i.z > 0.0 && light.pdf > 0.0 {
                 let h = (w_i + w_o).normalize();
-                sum += lobe.f_cos(w_i, w_o) * sample.radiance / (table.pdf(h, w_o.dot(h)) + sample.pdf);
+                sum += lobe.f_cos(w_i, w_o) * light.radiance / (table.pdf(h, w_o.dot(h)) + light.pdf);
             }
         }
         sum
     }
 }
 
-/// Points of the light and of the lobe are scrambled apart.
-fn light_uv(set: usize, i: u32) -> glam::DVec2 {
-    point(2 * set as u32, i)
+/// Scrambles of each of `points` sub-pixels.
+fn scrambles(points: usize) -> usize {
+    SCRAMBLES.div_ceil(points.max(1)).max(2)
 }
 
-fn lobe_uv(set: usize, i: u32) -> glam::DVec2 {
-    point(2 * set as u32 + 1, i)
+fn rms(channels: DVec3) -> f64 {
+    (channels.length_squared() / 3.0).sqrt()
 }
