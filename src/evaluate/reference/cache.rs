@@ -49,7 +49,8 @@ pub fn read(folder: &Path, key: &str, view: &View) -> Option<ReferenceImage> {
 fn parse(path: &Path, view: &View) -> Result<ReferenceImage> {
     let picture = read_image(path)?;
     let damaged = || Error::in_file(path, "is damaged", "it is made again");
-    let number = |name: &str| picture.attributes.get(name).and_then(|text| text.parse::<f64>().ok()).ok_or_else(damaged);
+    let number =
+        |name: &str| picture.attributes.get(name).and_then(|text| text.parse::<f64>().ok()).ok_or_else(damaged);
     let image = ReferenceImage {
         error_estimate: number("error_estimate")?,
         max_error_estimate: number("max_error_estimate")?,

@@ -162,3 +162,45 @@ impl Light {
 fn channel_sum<T: Into<f64> + Copy>(texel: [T; 3]) -> f64 {
     texel[0].into() + texel[1].into() + texel[2].into()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::points::point;
+    use super::*;
+    use crate::environment::tests::environment;
+
+    #[test]
+    fn radiance_is_the_environments_and_samples_know_their_own() {
+        for (width, height) in [(1, 1), (2, 1), (1, 7), (9, 5), (40, 300)] {
+            let map = environment(width, height, |column, row| {
+                [(column * 7 % 5) as f32, (row * 3 % 7) as f32, if column == row { 1e4 } else { 0.0 }]
+            });
+            let light = Light::new(&map);
+            for i in 0..500 {
+                let p = point(1, i);
+                let (cos_theta, phi) = (2.0 * p.x - 1.0, TAU * p.y);
+                let sin_theta = (1.0 - cos_theta * cos_theta).sqrt();
+                let direction = DVec3::new(sin_theta * phi.cos(), cos_theta, sin_theta * phi.sin());
+                let error = light.evaluate(direction).0 - map.radiance(direction);
+                assert!(error.abs().max_element() < 1e-8, "{width} x {height} {direction}: {error}");
+
+                let sample = light.sample(p);
+                let (radiance, pdf) = light.evaluate(sample.direction);
+                assert!(((radiance - sample.radiance) / sample.radiance.element_sum()).abs().max_element() < 1e-6);
+                assert!((pdf / sample.pdf - 1.0).abs() < 1e-6, "{width} x {height}: {pdf} {}", sample.pdf);
+            }
+        }
+    }
+
+    #[test]
+    fn the_mean_of_radiance_by_pdf_is_the_light_as_a_whole() {
+        let map = environment(11, 6, |column, row| [(column + row) as f32, 1.0, if column == 3 { 50.0 } else { 0.1 }]);
+        let light = Light::new(&map);
+        let count = 1 << 14;
+        let mean =
+            (0..count).map(|i| light.sample(point(5, i))).map(|sample| sample.radiance / sample.pdf).sum::<DVec3>()
+                / f64::from(count);
+        let exact = map.mean_radiance() * 4.0 * PI;
+        assert!(((mean - exact) / exact).abs().max_element() < 1e-3, "{mean} {exact}");
+    }
+}

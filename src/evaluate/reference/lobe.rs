@@ -166,3 +166,41 @@ fn solid_angle_density(h: DVec3, cos_theta_d: f64) -> f64 {
     let one_plus = 1.0 + s * s;
     4.0 * cos_theta_d * 4.0 * s_ds / (one_plus * one_plus) * 4.0 * spread * spread
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::points::point;
+    use super::*;
+
+    #[test]
+    fn pdf_is_the_density_of_samples() {
+        let brdf = Brdf::builtin("gold").unwrap();
+        for theta_o_deg in [0.0f64, 30.0, 80.0, 89.99] {
+            let theta_o = theta_o_deg.to_radians();
+            let w_o = dvec3(theta_o.sin(), 0.0, theta_o.cos());
+            let lobe = Lobe::new(&brdf);
+            let table = lobe.table(theta_o);
+            // Samples divided by the pdf sum to the solid angle of what they stand for: all half vectors that see w_o.
+            let (mut sum, count) = (0.0, 1 << 14);
+            for i in 0..count {
+                let h = table.sample(point(3, i));
+                assert!((h.length() - 1.0).abs() < 1e-12);
+                let cos_theta_d = w_o.dot(h);
+                if cos_theta_d > 0.0 && 2.0 * cos_theta_d * h.z > w_o.z {
+                    sum += 1.0 / table.pdf(h, cos_theta_d) / f64::from(count);
+                }
+            }
+            let hemisphere = 2.0 * std::f64::consts::PI;
+            assert!((sum / hemisphere - 1.0).abs() < 0.02, "{theta_o_deg}: {sum}");
+        }
+    }
+
+    #[test]
+    fn half_vectors_and_their_coordinates_are_inverse() {
+        for i in 0..1000 {
+            let p = point(0, i);
+            let h = half_vector(p.x, p.y);
+            assert!((x_of(h) - p.x).abs() < 1e-9 && (turn_of(h) - p.y).abs() < 1e-9, "{p}");
+        }
+    }
+}

@@ -29,6 +29,8 @@ mod inversion;
 mod light;
 mod lobe;
 mod points;
+#[cfg(test)]
+mod tests;
 
 use light::{Light, LightSample};
 use lobe::Lobe;
@@ -108,9 +110,8 @@ impl ReferenceImage {
 pub fn tone_map(radiance: &[[f32; 4]], view: &View) -> Vec<u8> {
     let byte = |value: f32| (255.0 * value).round() as u8;
     let pixel = |&[r, g, b, alpha]: &[f32; 4]| {
-        let shown = |value: f32| {
-            byte(if alpha > 0.0 { display_value(value / alpha, view.exposure, view.gamma) } else { 0.0 })
-        };
+        let shown =
+            |value: f32| byte(if alpha > 0.0 { display_value(value / alpha, view.exposure, view.gamma) } else { 0.0 });
         [shown(r), shown(g), shown(b), byte(alpha)]
     };
     radiance.iter().flat_map(pixel).collect()
@@ -171,11 +172,7 @@ impl Point {
         // Seen along the normal any axis will do; 1e-12 is ten thousand roundings, so the axis is still good to 1e-4 there.
         let x = if sin_theta_o > 1e-12 { across / sin_theta_o } else { n.any_orthonormal_vector() };
         let theta_o = sin_theta_o.atan2(cos_theta_o).min(MAX_THETA_O_DEG.to_radians());
-        Self {
-            frame: DMat3::from_cols(x, n.cross(x), n),
-            w_o: dvec3(theta_o.sin(), 0.0, theta_o.cos()),
-            material,
-        }
+        Self { frame: DMat3::from_cols(x, n.cross(x), n), w_o: dvec3(theta_o.sin(), 0.0, theta_o.cos()), material }
     }
 
     fn theta_o(&self) -> f64 {
@@ -334,7 +331,7 @@ impl<'a> Integrator<'a> {
         let scrambles = scrambles(points.len());
         // Point by point, the sums of its scrambles.
         let mut sums = vec![DVec3::ZERO; points.len() * scrambles];
-        let (mut done, mut next) = (0, FIRST_POINTS);
+        let (mut done, mut next, mut radiance_error) = (0, FIRST_POINTS, DVec3::ZERO);
         loop {
             for (set, sum) in sums.iter_mut().enumerate() {
                 *sum += self.sum(&points[set / scrambles], set, done, next);
@@ -348,7 +345,9 @@ impl<'a> Integrator<'a> {
                 let squares = sums.iter().map(|sum| (scale * (sum - mean)).powf(2.0)).sum::<DVec3>();
                 squares * (scrambles as f64 / (scrambles - 1) as f64)
             });
-            let radiance_error = variance.sum::<DVec3>().powf(0.5);
+            // Few scrambles may lie together by luck, and the first such luck would end the work. Errors halve at best when points
+            // are doubled, so half of the estimate before stands if it is larger.
+            radiance_error = variance.sum::<DVec3>().powf(0.5).max(0.5 * radiance_error);
             let channel = |i: usize| display.error(radiance[i], radiance_error[i]);
             let display_error = DVec3::from_array([0, 1, 2].map(channel));
             if rms(display_error) <= tolerance || done >= MOST_POINTS {
