@@ -22,6 +22,8 @@ pub enum Method {
     Environment,
     /// Resampled importance sampling of the whole product (Talbot et al. 2005).
     Resampled,
+    /// Quadrature on the CPU: the truth.
+    Reference,
 }
 
 impl Method {
@@ -34,6 +36,7 @@ impl Method {
         Self::Filtered,
         Self::Environment,
         Self::Resampled,
+        Self::Reference,
     ];
 
     /// What the command line and scene files call it.
@@ -46,6 +49,7 @@ impl Method {
             Self::Filtered => "filtered",
             Self::Environment => "environment",
             Self::Resampled => "resampled",
+            Self::Reference => "reference",
         }
     }
 
@@ -61,15 +65,19 @@ impl Method {
     }
 
     /// The variant of shade.comp that runs it.
-    pub fn shader(self) -> &'static Shader {
+    ///
+    /// # Errors
+    /// The reference runs on the CPU.
+    pub fn shader(self) -> Result<&'static Shader> {
         match self {
-            Self::Paper => &compiled::SHADE_PAPER,
-            Self::Uniform => &compiled::SHADE_UNIFORM,
-            Self::Cosine => &compiled::SHADE_COSINE,
-            Self::Importance => &compiled::SHADE_IMPORTANCE,
-            Self::Filtered => &compiled::SHADE_FILTERED,
-            Self::Environment => &compiled::SHADE_ENVIRONMENT,
-            Self::Resampled => &compiled::SHADE_RESAMPLED,
+            Self::Paper => Ok(&compiled::SHADE_PAPER),
+            Self::Uniform => Ok(&compiled::SHADE_UNIFORM),
+            Self::Cosine => Ok(&compiled::SHADE_COSINE),
+            Self::Importance => Ok(&compiled::SHADE_IMPORTANCE),
+            Self::Filtered => Ok(&compiled::SHADE_FILTERED),
+            Self::Environment => Ok(&compiled::SHADE_ENVIRONMENT),
+            Self::Resampled => Ok(&compiled::SHADE_RESAMPLED),
+            Self::Reference => Err(Error::input("method \"reference\"", "does not run on the GPU", "use another here")),
         }
     }
 
@@ -78,8 +86,13 @@ impl Method {
         matches!(self, Self::Paper)
     }
 
+    /// Whether a shader runs it: all but the reference.
+    pub fn runs_on_gpu(self) -> bool {
+        self != Self::Reference
+    }
+
     /// Whether the mean over seeds is equation (1), whatever the number of samples.
     pub fn is_unbiased(self) -> bool {
-        !matches!(self, Self::Paper | Self::Filtered)
+        !matches!(self, Self::Paper | Self::Filtered | Self::Reference)
     }
 }

@@ -83,23 +83,15 @@ impl Renderer {
     /// No device memory left, or a limit of the device exceeded.
     pub fn new(device: &Arc<Device>, cache_folder: Option<&Path>, prepared: &Prepared) -> Result<Self> {
         let Prepared { view, method, intensity, environment, sampling, .. } = prepared;
-        let largest = device.limits().max_image_dimension2_d;
-        let [width, height] = view.cache_size();
-        if width.max(height) > largest {
-            let problem =
-                format!("needs {width} x {height} sub-pixels, this device's images have at most {largest} a side");
-            return Err(Error::input("image size", problem, "use a smaller --size or fewer --subpixels"));
-        }
         let cache = PipelineCache::new(device, cache_folder)?;
-        let meshes = prepared.meshes.iter().map(|(name, mesh)| DeviceMesh::new(device, name, mesh));
-        let meshes = meshes.collect::<Result<_>>()?;
+        let geometry_cache = upload_geometry(device, &cache, prepared)?;
         let brdfs = prepared.materials.iter().map(|material| (&material.brdf, material.threads.as_ref()));
         let materials = DeviceMaterials::new(device, *method, brdfs)?;
         let light = DeviceLight::new(device, *method, environment, *intensity)?;
         let background = prepared.show_environment.then(|| Background::new(device, &cache, environment, *intensity));
         Ok(Self {
             view: view.clone(),
-            geometry_cache: GeometryCache::new(device, &cache, meshes, prepared.objects.clone())?,
+            geometry_cache,
             classify: Classify::new(device, &cache, view.subpixels)?,
             shade: Shade::new(device, &cache, *method, *sampling, view.subpixels, materials, light)?,
             background: background.transpose()?,
@@ -159,6 +151,42 @@ impl Renderer {
             plan: executable.plan.to_string(),
         })
     }
+}
+
+/// Uploads the meshes of `prepared`, where the geometry cache of its view is within what `device` can do.
+fn upload_geometry(device: &Arc<Device>, cache: &PipelineCache, prepared: &Prepared) -> Result<GeometryCache> {
+    let largest = device.limits().max_image_dimension2_d;
+    let [width, height] = prepared.view.cache_size();
+    if width.max(height) > largest {
+        let problem =
+            format!("needs {width} x {height} sub-pixels, this device's images have at most {largest} a side");
+        return Err(Error::input("image size", problem, "use a smaller --size or fewer --subpixels"));
+    }
+    let meshes = prepared.meshes.iter().map(|(name, mesh)| DeviceMesh::new(device, name, mesh));
+    GeometryCache::new(device, cache, meshes.collect::<Result<_>>()?, prepared.objects.clone())
+}
+
+/// Only pass 1 of the paper: the texels of the geometry cache, as [`Rendering::geometry`] has them. Needs no threads.
+///
+/// # Errors
+/// No device memory left, or a limit of the device exceeded.
+pub fn render_geometry(
+    device: &Arc<Device>,
+    cache_folder: Option<&Path>,
+    prepared: &Prepared,
+) -> Result<Vec<[u32; 2]>> {
+    let cache = PipelineCache::new(device, cache_folder)?;
+    let pass = upload_geometry(device, &cache, prepared)?;
+    let mut graph = FrameGraph::new();
+    let geometry = geometry_cache(&mut graph, &pass, &prepared.view);
+    let mut readbacks = Readbacks { graph, device, imports: Vec::new() };
+    let target = readbacks.image("read_geometry", geometry, prepared.view.cache_size(), 8, true)?;
+    let Readbacks { graph, imports, .. } = readbacks;
+    let executable = Executable::new(device, graph, &imports)?;
+    let mut frames = Frames::new(device, "geometry", 1)?;
+    executable.execute(&mut frames)?;
+    frames.wait()?;
+    Ok(texels(target.as_deref()))
 }
 
 /// Adds copies into host memory to a graph.

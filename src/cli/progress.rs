@@ -32,6 +32,13 @@ impl Progress {
         Ok(Self { bar, cancelled })
     }
 
+    /// The same bar for something else, from its start.
+    pub fn restart(&self, name: &'static str) {
+        self.bar.reset();
+        self.bar.unset_length();
+        self.bar.set_prefix(name);
+    }
+
     /// Takes the bar off the terminal.
     pub fn finish(&self) {
         self.bar.finish_and_clear();

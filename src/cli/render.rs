@@ -6,6 +6,7 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::value_parser;
 use std::io::Write;
 use std::path::PathBuf;
+use threadlight::evaluate::reference::{self, ReferenceImage, ReferenceSettings};
 use threadlight::method::Method;
 use threadlight::output::{self, ExrHeader, Format};
 use threadlight::pipeline::{Renderer, Rendering, Wanted};
@@ -24,6 +25,7 @@ Examples:
   threadlight render --material silver --environment sun --size 1280x960 -o silver.png
   threadlight render --mesh dragon.obj --material alumina-oxide.binary --environment lebombo.hdr -o dragon.exr
   threadlight render scene.toml --repeat 20 --stats times.json
+  threadlight render --method reference --tolerance 1e-3 -o truth.exr
   threadlight render --print-plan                       what a frame does, in which order, in which memory";
 
 /// Renders a scene to a PNG or EXR file. Flags override the scene file.
@@ -47,6 +49,9 @@ pub struct Render {
     /// Sample threads per pixel, 1 to 1024; or samples per pixel of methods that have none, 1 to 10000.
     #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=i64::from(MAX_SAMPLES)))]
     threads: Option<u32>,
+    /// Method `reference` goes on until its estimated error of a pixel's display values is below this (default 2e-4).
+    #[arg(long, value_name = "X", value_parser = number(f64::MIN_POSITIVE..=1.0, "a positive number up to 1"))]
+    tolerance: Option<f64>,
     /// Sub-pixels per axis, 1 to 4.
     #[arg(long, value_name = "S", value_parser = value_parser!(u32).range(1..=i64::from(MAX_SUBPIXELS)))]
     subpixels: Option<u32>,
@@ -115,6 +120,20 @@ struct Stats<'a> {
     thread_cache: &'a str,
     device_memory_bytes: u64,
     validation_messages: usize,
+    /// Only for method `reference`.
+    #[serde(flatten)]
+    reference: Option<ReferenceStats>,
+}
+
+/// What is known of the error of a reference.
+#[derive(serde::Serialize)]
+struct ReferenceStats {
+    tolerance: f64,
+    /// RMS over covered pixels of the estimated error of display values.
+    error_estimate: f64,
+    /// The largest of a pixel.
+    max_error_estimate: f64,
+    reference_cache: &'static str,
 }
 
 #[derive(serde::Serialize)]
@@ -136,6 +155,11 @@ impl Render {
         }
         let scene = self.scene()?;
         let cache = cache_folder(self.no_cache);
+        let is_reference = scene.shading.method == Method::Reference.name();
+        if self.tolerance.is_some() && !is_reference {
+            let problem = format!("is of no use to method \"{}\"", scene.shading.method);
+            return Err(Error::input("--tolerance", problem, "leave it out, or use --method reference").into());
+        }
         let progress = Progress::new("threads")?;
         let prepared = prepare(&scene, cache.as_deref(), &progress)?;
         progress.finish();
@@ -145,12 +169,26 @@ impl Render {
         let device = Device::new(&instance, self.device.as_deref()).map_err(Error::from)?;
         drop(instance);
         let device_name = device.description().name.clone();
-        let renderer = Renderer::new(&device, cache.as_deref(), &prepared)?;
-        let wanted =
-            Wanted { radiance: format == Some(Format::Exr), display: format != Some(Format::Exr), ..Wanted::default() };
-        let rendering = renderer.render(wanted, self.repeat)?;
-        // Closing the device is part of what validation checks.
-        drop(renderer);
+        let (rendering, reference) = if prepared.method == Method::Reference {
+            progress.restart("reference");
+            let tolerance = self.tolerance.unwrap_or(reference::TOLERANCE);
+            let settings = ReferenceSettings { tolerance, cache: cache.clone() };
+            let image = reference::reference(&prepared, &device, &settings, &progress)?;
+            progress.finish();
+            let reference = ReferenceStats {
+                tolerance,
+                error_estimate: image.error_estimate,
+                max_error_estimate: image.max_error_estimate,
+                reference_cache: if image.cached { "hit" } else { "miss" },
+            };
+            (rendering_of(&image, &prepared, device.allocated_bytes()), Some(reference))
+        } else {
+            let renderer = Renderer::new(&device, cache.as_deref(), &prepared)?;
+            let radiance = format == Some(Format::Exr);
+            let wanted = Wanted { radiance, display: !radiance, ..Wanted::default() };
+            // Closing the renderer and the device is part of what validation checks.
+            (renderer.render(wanted, self.repeat)?, None)
+        };
         drop(device);
 
         if self.print_plan {
@@ -161,7 +199,12 @@ impl Render {
             let transparent = scene.image.background == Background::None;
             match format {
                 Some(Format::Exr) => {
-                    let header = self.exr_header(&scene, &prepared, &rendering, &device_name);
+                    let mut header = self.exr_header(&scene, &prepared, &rendering, &device_name);
+                    if let Some(reference) = &reference {
+                        let number = |name: &str, value: f64| (name.to_owned(), value.to_string());
+                        header.more.push(number("tolerance", reference.tolerance));
+                        header.more.push(number("error_estimate", reference.error_estimate));
+                    }
                     output::write_exr(path, view.width, view.height, &rendering.radiance, transparent, &header)?;
                 }
                 _ => output::write_png(path, view.width, view.height, &rendering.display, transparent)?,
@@ -169,7 +212,7 @@ impl Render {
         }
         let messages = messages.all();
         if let Some(path) = &self.stats {
-            let stats = stats(&scene, &prepared, &rendering, &device_name, messages.len());
+            let stats = Stats { reference, ..stats(&scene, &prepared, &rendering, &device_name, messages.len()) };
             let text = serde_json::to_string_pretty(&stats).context("--stats")? + "\n";
             output::write_whole(path, text.as_bytes())?;
         }
@@ -256,7 +299,23 @@ fn stats<'a>(
         thread_cache: if prepared.thread_cache == CacheState::Hit { "hit" } else { "miss" },
         device_memory_bytes: rendering.device_memory_bytes,
         validation_messages,
+        reference: None,
     }
+}
+
+/// A reference as the other methods' results are.
+fn rendering_of(image: &ReferenceImage, prepared: &Prepared, device_memory_bytes: u64) -> Rendering {
+    let radiance = image.over_background(prepared);
+    let mut rendering = Rendering {
+        display: reference::tone_map(&radiance, &prepared.view),
+        radiance,
+        lookups: image.evaluations,
+        frame_ms: image.seconds * 1e3,
+        device_memory_bytes,
+        ..Rendering::default()
+    };
+    rendering.counters.covered_subpixels = image.covered_subpixels as u32;
+    rendering
 }
 
 /// `640x480`.

@@ -17,7 +17,8 @@ pub struct RepairCounts {
     pub nan: usize,
     /// Pixels with an infinite channel: set to the largest finite value in the file.
     pub infinite: usize,
-    /// Pixels with a negative channel (colours outside Rec. 709, or ringing): set to 0.
+    /// Pixels with a negative channel (colours outside Rec. 709, or ringing): set to 0, and what they lacked taken from
+    /// their surroundings, so that the light stays the same as a whole.
     pub negative: usize,
 }
 
@@ -79,6 +80,7 @@ fn repair(width: usize, height: usize, texels: &mut [[f32; 3]]) -> RepairCounts 
     let mut counts = RepairCounts::default();
     let largest = texels.iter().flatten().copied().filter(|value| value.is_finite()).fold(0.0, f32::max);
     let mut holes = Vec::new();
+    let mut deficits = Vec::new();
     for (index, texel) in texels.iter_mut().enumerate() {
         if texel.iter().any(|value| value.is_nan()) {
             counts.nan += 1;
@@ -87,15 +89,57 @@ fn repair(width: usize, height: usize, texels: &mut [[f32; 3]]) -> RepairCounts 
         }
         // Minus infinity counts as infinite, and is then as black as any negative value.
         counts.infinite += usize::from(texel.iter().any(|value| value.is_infinite()));
-        counts.negative +=
-            usize::from(texel.iter().all(|value| value.is_finite()) && texel.iter().any(|&value| value < 0.0));
+        if texel.iter().all(|value| value.is_finite()) && texel.iter().any(|&value| value < 0.0) {
+            counts.negative += 1;
+            deficits.extend((0..3).filter(|&channel| texel[channel] < 0.0).map(|c| (index, c, -f64::from(texel[c]))));
+        }
         *texel = texel.map(|value| value.clamp(0.0, largest));
     }
     let filled: Vec<[f32; 3]> = holes.iter().map(|&hole| neighbours_mean(width, height, texels, hole)).collect();
     for (hole, value) in holes.into_iter().zip(filled) {
         texels[hole] = value;
     }
+    for (index, channel, deficit) in deficits {
+        take_from_surroundings(width, height, texels, index, channel, deficit);
+    }
     counts
+}
+
+/// Takes `deficit`, the amount that a channel of pixel `index` was below 0, from the pixels around it, in proportion to what they
+/// have. Negative pixels mostly ring about a small sun and belong to its energy: cutting them off would make it brighter, by
+/// a tenth or more. What nothing within three pixels can give is left out.
+fn take_from_surroundings(
+    width: usize,
+    height: usize,
+    texels: &mut [[f32; 3]],
+    index: usize,
+    channel: usize,
+    deficit: f64,
+) {
+    let (column, row) = (index % width, index / width);
+    let solid_angle = |row: usize| (std::f64::consts::PI * (row as f64 + 0.5) / height as f64).sin();
+    let mut missing = deficit * solid_angle(row);
+    for radius in 1..=3 {
+        let rows = row.saturating_sub(radius)..(row + radius + 1).min(height);
+        // All columns once where the picture is narrower than the square.
+        let columns = 0..(2 * radius + 1).min(width);
+        let around = |row: usize| {
+            let left = column + width * radius - radius;
+            columns.clone().map(move |offset| row * width + (left + offset) % width)
+        };
+        let energy = |texels: &[[f32; 3]], row: usize| {
+            around(row).map(|pixel| f64::from(texels[pixel][channel])).sum::<f64>() * solid_angle(row)
+        };
+        let available: f64 = rows.clone().map(|row| energy(texels, row)).sum();
+        let share = if available > missing { missing / available } else { 1.0 };
+        for pixel in rows.flat_map(around) {
+            texels[pixel][channel] *= 1.0 - share as f32;
+        }
+        missing -= share * available;
+        if share < 1.0 {
+            return;
+        }
+    }
 }
 
 /// The mean of the neighbours (wrapped in u, cut off at the poles) without a NaN; black where there are none.
@@ -146,7 +190,7 @@ mod tests {
         let mut pixels = vec![[2.0, 4.0, 6.0, 1.0]; 7 * 5];
         pixels[0] = [f32::NAN, 1.0, f32::INFINITY, 1.0];
         pixels[8] = [f32::INFINITY, 1.0, -1.0, 1.0];
-        pixels[16] = [-3.0, 1.0, 1.0, 1.0];
+        pixels[30] = [-3.0, 1.0, 1.0, 1.0];
         pixels[17] = [f32::NEG_INFINITY, 50.0, 1.0, 1.0];
         write_exr(&path, 7, 5, &pixels, false, &ExrHeader::default()).unwrap();
         let environment = Environment::load(&path).unwrap();
@@ -154,8 +198,34 @@ mod tests {
         // Neighbours of (0, 0): three with [2, 4, 6] twice over the wrap, and the repaired infinite one.
         assert_eq!(environment.texels[0], [(4.0 * 2.0 + 50.0) / 5.0, (4.0 * 4.0 + 1.0) / 5.0, 4.0 * 6.0 / 5.0]);
         assert_eq!(environment.texels[8], [50.0, 1.0, 0.0]);
-        assert_eq!(environment.texels[16], [0.0, 1.0, 1.0]);
+        assert_eq!(environment.texels[30], [0.0, 1.0, 1.0]);
         assert_eq!(environment.texels[17], [0.0, 50.0, 1.0]);
+    }
+
+    #[test]
+    fn ringing_around_a_sun_is_cut_off_without_changing_the_light_as_a_whole() {
+        // At the top left corner, over the wrap, and with more to take than the nearest neighbours have.
+        for (width, height, sun, index, deficit) in [(9, 6, 31, 32, 80.0), (9, 6, 8, 0, 99.0), (9, 6, 31, 13, 12.0)] {
+            let mut texels = vec![[1.0, 2.0, 3.0]; width * height];
+            texels[sun][0] = 100.0;
+            texels[index][0] = -deficit;
+            let map = |texels| Environment::new(String::new(), width, height, texels, Default::default());
+            let sum = |map: &Environment| {
+                let rows = (0..height).map(|row| (std::f64::consts::PI * (row as f64 + 0.5) / height as f64).sin());
+                let row_sums =
+                    map.texels.chunks(width).map(|row| row.iter().map(|texel| f64::from(texel[0])).sum::<f64>());
+                rows.zip(row_sums).map(|(solid_angle, sum)| solid_angle * sum).sum::<f64>()
+            };
+            let before = sum(&map(texels.clone()));
+            let repaired = Environment::repaired(String::new(), width, height, texels);
+            assert_eq!(repaired.repaired.negative, 1);
+            assert!((sum(&repaired) - before).abs() < 1e-4, "{index}: {before} became {}", sum(&repaired));
+            assert!(repaired.texels.iter().all(|texel| texel[0] >= 0.0 && texel[1..] == [2.0, 3.0]));
+        }
+        // Where nothing is to be had the pixel is merely black.
+        let mut alone = vec![[-1.0, 0.0, 0.0]];
+        assert_eq!(repair(1, 1, &mut alone).negative, 1);
+        assert_eq!(alone, [[0.0; 3]]);
     }
 
     #[test]

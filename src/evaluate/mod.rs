@@ -2,6 +2,7 @@
 //!
 //! | question | module |
 //! |---|---|
+//! | what the truth is | [`reference`](mod@reference) |
 //! | how much two pictures differ | [`metrics`], [`ssim`] |
 //! | where they differ | [`difference`] |
 //! | error and time of every method, count, material and environment | [`sweep`] |
@@ -11,6 +12,7 @@
 pub mod difference;
 pub mod metrics;
 pub mod plots;
+pub mod reference;
 mod reference_picture;
 pub mod ssim;
 pub mod sweep;

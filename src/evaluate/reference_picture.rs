@@ -1,7 +1,8 @@
 //! The true picture that all others are measured against.
 use std::sync::Arc;
 
-use crate::error::{Error, Result};
+use super::reference::{ReferenceSettings, reference};
+use crate::error::Result;
 use crate::prepare::Prepared;
 use crate::threads::Observer;
 use crate::vulkan::Device;
@@ -19,14 +20,13 @@ pub struct ReferencePicture {
 /// The true picture of `prepared`, whatever its method and threads, within `tolerance` of display values.
 ///
 /// # Errors
-/// The reference is not built in.
+/// Whatever Vulkan refuses, or cancelled.
 pub fn reference_picture(
-    _prepared: &Prepared,
-    _device: &Arc<Device>,
-    _tolerance: f64,
-    _observer: &dyn Observer,
+    prepared: &Prepared,
+    device: &Arc<Device>,
+    settings: &ReferenceSettings,
+    observer: &dyn Observer,
 ) -> Result<ReferencePicture> {
-    // To connect: crate::evaluate::reference::reference(prepared, device, tolerance, observer), and the struct above is its
-    // result.
-    Err(Error::input("bench error", "the reference is not built in yet", "use a version that has --method reference"))
+    let image = reference(prepared, device, settings, observer)?;
+    Ok(ReferencePicture { radiance: image.radiance, error_estimate: image.error_estimate })
 }

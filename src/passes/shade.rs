@@ -48,7 +48,7 @@ impl DeviceMaterials {
         method: Method,
         materials: impl IntoIterator<Item = (&'m Brdf, Option<&'m ThreadTable>)>,
     ) -> Result<Self> {
-        let use_slices = method.shader().declares("Slices")?;
+        let use_slices = method.shader()?.declares("Slices")?;
         let mut records = Vec::new();
         let mut threads: Vec<[f32; 4]> = Vec::new();
         let mut slices: Vec<f32> = Vec::new();
@@ -171,7 +171,7 @@ impl DeviceLight {
     /// # Errors
     /// No device memory left, or a map wider or higher than the device's images can be.
     pub fn new(device: &Arc<Device>, method: Method, environment: &Environment, intensity: f64) -> Result<Self> {
-        let shader = method.shader();
+        let shader = method.shader()?;
         let pyramid = shader.declares("environment_pyramid")?;
         let pyramid = pyramid.then(|| DevicePyramid::new(device, environment.box_filtered())).transpose()?;
         let mut light = Self { pyramid, map: None, aliases: None, intensity: intensity as f32 };
@@ -256,7 +256,7 @@ impl Shade {
     /// Compiles the variant of the shader for `method`, with the models that `materials` use.
     ///
     /// # Errors
-    /// A driver that cannot compile it.
+    /// A driver that cannot compile it, or a method that has no shader.
     pub fn new(
         device: &Arc<Device>,
         cache: &PipelineCache,
@@ -267,7 +267,7 @@ impl Shade {
         light: DeviceLight,
     ) -> Result<Self> {
         let constants = [("SUBPIXELS", subpixels), ("MODELS_USED", materials.models_used)];
-        let pipeline = ComputePipeline::new(device, cache, method.shader(), &constants)?;
+        let pipeline = ComputePipeline::new(device, cache, method.shader()?, &constants)?;
         Ok(Self { pipeline, materials, light, sampling })
     }
 }

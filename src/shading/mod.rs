@@ -126,7 +126,7 @@ impl<'a> Twin<'a> {
     /// # Errors
     /// A shader that cannot be read.
     pub fn new(prepared: &'a Prepared) -> Result<Self> {
-        let shader = prepared.method.shader();
+        let shader = prepared.method.shader()?;
         let environment = &prepared.environment;
         let pyramid = shader.declares("environment_pyramid")?.then(|| environment.box_filtered());
         let map = shader.declares("environment_map")?.then(|| LightMap::new(environment));
@@ -196,6 +196,7 @@ impl Point<'_> {
             Method::Filtered => filtered::estimate(self),
             Method::Environment => environment::estimate(self),
             Method::Resampled => resampled::estimate(self),
+            Method::Reference => unreachable!("a twin is made for methods that have a shader"),
         }
     }
 

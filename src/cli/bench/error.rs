@@ -6,6 +6,7 @@ use anyhow::Context;
 use clap::value_parser;
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use threadlight::evaluate::reference::ReferenceSettings;
 use threadlight::evaluate::sweep::{self, Measured, OnlyCancels, Sweep};
 use threadlight::evaluate::{plots, reference_picture, tables};
 use threadlight::method::Method;
@@ -103,7 +104,8 @@ impl BenchError {
         let device = Device::new(&instance, self.device.as_deref()).map_err(Error::from)?;
         let progress = Progress::of("bench error", "pictures")?;
         let inner = OnlyCancels(&progress);
-        let reference = |prepared: &_| reference_picture(prepared, &device, self.reference_tolerance, &inner);
+        let settings = ReferenceSettings { tolerance: self.reference_tolerance, cache: sweep.cache.clone() };
+        let reference = |prepared: &_| reference_picture(prepared, &device, &settings, &inner);
         let mut measured = Measured::default();
         let result = sweep::run(&sweep, &device, &reference, &progress, &mut measured);
         progress.finish();
@@ -130,9 +132,13 @@ impl BenchError {
 
     fn sweep(&self) -> Result<Sweep> {
         let methods = match self.methods.as_slice() {
-            [] => Method::ALL.to_vec(),
-            names => names.iter().map(|name| Method::from_name(name)).collect::<Result<_>>()?,
+            [] => Method::ALL.iter().copied().filter(|method| method.runs_on_gpu()).collect(),
+            names => names.iter().map(|name| Method::from_name(name)).collect::<Result<Vec<_>>>()?,
         };
+        if methods.contains(&Method::Reference) {
+            let remedy = "name others; each is measured against it anyway";
+            return Err(Error::input("--methods reference", "is the truth, not a method to measure", remedy));
+        }
         let environments = named("--environments", &self.environments)?;
         let scenes = named("--scene", &self.scene)?;
         Ok(Sweep {

@@ -1,0 +1,400 @@
+//! The truth: equation (1) of every sub-pixel, on the CPU in double precision, with an estimate of its own error.
+//!
+//! The integrand is [`Environment::radiance`] times [`Brdf::evaluate`] times the cosine; nothing of threads or pyramids is in it.
+//! Directions are drawn in two ways, each in proportion to one of the two factors ([`lobe`], [`light`]), and weighted by the balance
+//! heuristic (Veach and Guibas 1995), so that neither a narrow lobe nor a small sun makes a large weight. The points behind
+//! them are Sobol's in several independent scrambles ([`points`]). Each scramble gives a picture by itself; how far
+//! these lie apart tells the error of their mean. Points are doubled, pixel by pixel, until it is below the tolerance. All is
+//! deterministic: points depend on the sub-pixel's place in its pixel and on nothing else.
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+use std::time::Instant;
+
+use glam::{DMat3, DVec2, DVec3, UVec2, dvec3};
+use rayon::prelude::*;
+
+use crate::brdf::Brdf;
+use crate::environment::Environment;
+use crate::passes::View;
+use crate::pipeline::render_geometry;
+use crate::prepare::Prepared;
+use crate::shading::{display_value, unpack_geometry};
+use crate::threads::Observer;
+use crate::vulkan::Device;
+use crate::{Error, Result};
+
+mod cache;
+mod inversion;
+mod light;
+mod lobe;
+mod points;
+#[cfg(test)]
+mod tests;
+
+use light::{Light, LightSample};
+use lobe::Lobe;
+pub use lobe::MAX_THETA_O_DEG;
+use points::point;
+
+/// Tolerance where none is given: a twentieth of a step of an 8-bit display value.
+pub const TOLERANCE: f64 = 2e-4;
+/// Scrambles of a pixel, shared out among its sub-pixels: about 5 degrees of freedom, so one estimate of an error is good to a
+/// third. More would tell the error better and make it larger: it falls nearly as 1 / points, and more scrambles have fewer.
+const SCRAMBLES: usize = 6;
+/// Points of each scramble and way of drawing that a sub-pixel starts with, and at which it gives up.
+const FIRST_POINTS: u32 = 32;
+const MOST_POINTS: u32 = 1 << 17;
+/// So many points of each scramble are kept; they are the same for all pixels.
+const KEPT_POINTS: u32 = 2048;
+/// Above display white, where display values no longer tell, linear radiance is held to 1/0.05 = 20 times the tolerance, relatively.
+const ABOVE_WHITE: f64 = 0.05;
+
+/// How exact the reference is to be.
+#[derive(Clone, Debug)]
+pub struct ReferenceSettings {
+    /// Largest estimated error of a pixel: RMS over channels of the standard error of display values, whose range is 1.
+    pub tolerance: f64,
+    /// Folder to keep results in, and to take them from.
+    pub cache: Option<PathBuf>,
+}
+
+impl Default for ReferenceSettings {
+    fn default() -> Self {
+        Self { tolerance: TOLERANCE, cache: None }
+    }
+}
+
+/// The reference picture.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ReferenceImage {
+    /// Linear radiance times coverage, and coverage, row by row from the top left: means over sub-pixels.
+    pub radiance: Vec<[f32; 4]>,
+    /// RMS over channels and covered pixels of the estimated error of display values.
+    pub error_estimate: f64,
+    /// The largest estimate of a pixel (RMS over channels); above the tolerance only where a pixel ran into the bound on its points.
+    pub max_error_estimate: f64,
+    /// How often the integrand was evaluated.
+    pub evaluations: u64,
+    /// Sub-pixels that see a surface.
+    pub covered_subpixels: u64,
+    /// Time it took, or takes to read from the cache.
+    pub seconds: f64,
+    /// Whether it came from the cache.
+    pub cached: bool,
+}
+
+impl ReferenceImage {
+    /// The picture with the environment behind it where `prepared` shows it; linear, RGBA.
+    pub fn over_background(&self, prepared: &Prepared) -> Vec<[f32; 4]> {
+        if !prepared.show_environment {
+            return self.radiance.clone();
+        }
+        let View { camera, width, height, .. } = prepared.view;
+        let to_environment = to_environment(&prepared.view);
+        let pixels = self.radiance.iter().enumerate().map(|(pixel, &[r, g, b, coverage])| {
+            if coverage >= 1.0 {
+                return [r, g, b, coverage];
+            }
+            let (x, y) = (pixel as u32 % width, pixel as u32 / width);
+            let ray = camera.ray(f64::from(x), f64::from(y), width, height);
+            let behind = prepared.environment.radiance(to_environment * ray) * prepared.intensity;
+            let sum = dvec3(r.into(), g.into(), b.into()) + (1.0 - f64::from(coverage)) * behind;
+            sum.min(DVec3::splat(f32::MAX.into())).as_vec3().extend(1.0).to_array()
+        });
+        pixels.collect()
+    }
+}
+
+/// `radiance` (RGBA) as a display shows it, 8 bits a channel. Twin of glsl/tone_map.comp.
+pub fn tone_map(radiance: &[[f32; 4]], view: &View) -> Vec<u8> {
+    let byte = |value: f32| (255.0 * value).round() as u8;
+    let pixel = |&[r, g, b, alpha]: &[f32; 4]| {
+        let shown =
+            |value: f32| byte(if alpha > 0.0 { display_value(value / alpha, view.exposure, view.gamma) } else { 0.0 });
+        [shown(r), shown(g), shown(b), byte(alpha)]
+    };
+    radiance.iter().flat_map(pixel).collect()
+}
+
+/// Takes directions in the world to directions in the environment's own picture.
+fn to_environment(view: &View) -> DMat3 {
+    DMat3::from_rotation_y(-view.rotation_deg.to_radians())
+}
+
+/// The reference of `prepared`, for the geometry that `device` rasterises. `observer` hears of rows of pixels.
+///
+/// # Errors
+/// Whatever Vulkan refuses; a tolerance that is not positive; cancelled.
+pub fn reference(
+    prepared: &Prepared,
+    device: &Arc<Device>,
+    settings: &ReferenceSettings,
+    observer: &dyn Observer,
+) -> Result<ReferenceImage> {
+    if !(settings.tolerance > 0.0 && settings.tolerance.is_finite()) {
+        let problem = format!("is {}", settings.tolerance);
+        return Err(Error::input("tolerance", problem, format!("use a positive number, such as {TOLERANCE}")));
+    }
+    let start = Instant::now();
+    let geometry = render_geometry(device, settings.cache.as_deref(), prepared)?;
+    let key = cache::key(prepared, &geometry, settings.tolerance);
+    if let Some(image) = settings.cache.as_deref().and_then(|folder| cache::read(folder, &key, &prepared.view)) {
+        return Ok(ReferenceImage { seconds: start.elapsed().as_secs_f64(), cached: true, ..image });
+    }
+    let brdfs = prepared.materials.iter().map(|material| &material.brdf);
+    let integrator = Integrator::new(&prepared.environment, prepared.intensity, brdfs, prepared.view.subpixels);
+    let image = integrator.image(&prepared.view, &geometry, settings.tolerance, observer)?;
+    let image = ReferenceImage { seconds: start.elapsed().as_secs_f64(), ..image };
+    if let Some(folder) = &settings.cache {
+        cache::write(folder, &key, &prepared.view, &image);
+    }
+    Ok(image)
+}
+
+/// A point to shade: its frame in the environment's axes, and its view.
+#[derive(Clone, Copy, Debug)]
+pub struct Point {
+    /// Columns: x, the part of w_o orthogonal to n; y = z cross x; z = n.
+    frame: DMat3,
+    /// Towards the eye, in that frame; at most [`MAX_THETA_O_DEG`] from z.
+    w_o: DVec3,
+    /// Index of the material.
+    material: usize,
+}
+
+impl Point {
+    /// The point of unit normal `n` seen from unit `w_o`, both in the axes of the environment.
+    pub fn new(n: DVec3, w_o: DVec3, material: usize) -> Self {
+        let cos_theta_o = n.dot(w_o);
+        let across = w_o - cos_theta_o * n;
+        let sin_theta_o = across.length();
+        // Seen along the normal any axis will do; 1e-12 is ten thousand roundings, so the axis is still good to 1e-4 there.
+        let x = if sin_theta_o > 1e-12 { across / sin_theta_o } else { n.any_orthonormal_vector() };
+        let theta_o = sin_theta_o.atan2(cos_theta_o).min(MAX_THETA_O_DEG.to_radians());
+        Self { frame: DMat3::from_cols(x, n.cross(x), n), w_o: dvec3(theta_o.sin(), 0.0, theta_o.cos()), material }
+    }
+
+    fn theta_o(&self) -> f64 {
+        self.w_o.x.atan2(self.w_o.z)
+    }
+}
+
+/// The radiance of a pixel and what is known of its error.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PixelEstimate {
+    /// Linear radiance times coverage.
+    pub radiance: DVec3,
+    /// Standard error of it.
+    pub radiance_error: DVec3,
+    /// Standard error of the display values.
+    pub display_error: DVec3,
+    /// How often the integrand was evaluated.
+    pub evaluations: u64,
+}
+
+/// How a radiance is shown, for errors to be measured in what is seen.
+#[derive(Clone, Copy, Debug)]
+pub struct Display {
+    /// Factor on radiance.
+    pub exposure: f64,
+    /// Display values are radiance to the power of 1/gamma.
+    pub gamma: f64,
+}
+
+impl Display {
+    fn value(&self, radiance: f64) -> f64 {
+        (self.exposure * radiance).clamp(0.0, 1.0).powf(1.0 / self.gamma)
+    }
+
+    /// The error of a display value, from `radiance` and its standard error.
+    fn error(&self, radiance: f64, error: f64) -> f64 {
+        let shown = 0.5 * (self.value(radiance + error) - self.value(radiance - error));
+        if self.exposure * radiance > 1.0 { shown.max(ABOVE_WHITE * error / radiance) } else { shown }
+    }
+}
+
+/// A point of each way to draw directions.
+#[derive(Clone, Copy)]
+struct Kept {
+    lobe_uv: DVec2,
+    light: LightSample,
+}
+
+impl Kept {
+    /// Point `index` of scramble `set`.
+    fn new(light: &Light, set: usize, index: u32) -> Self {
+        let set = 2 * set as u32;
+        Self { lobe_uv: point(set, index), light: light.sample(point(set + 1, index)) }
+    }
+}
+
+/// Evaluates equation (1) for one environment and some materials.
+pub struct Integrator<'a> {
+    light: Light,
+    intensity: f64,
+    lobes: Vec<Lobe<'a>>,
+    /// The first points of each scramble.
+    kept: Vec<Vec<Kept>>,
+    subpixels: usize,
+}
+
+impl<'a> Integrator<'a> {
+    /// For `environment` times `intensity`, materials `brdfs`, and pixels of up to `subpixels` squared points.
+    pub fn new(
+        environment: &Environment,
+        intensity: f64,
+        brdfs: impl IntoIterator<Item = &'a Brdf>,
+        subpixels: u32,
+    ) -> Self {
+        let light = Light::new(environment);
+        let subpixels = (subpixels * subpixels) as usize;
+        let sets = (1..=subpixels).map(|points| points * scrambles(points)).max().unwrap_or(0);
+        let kept_points = |set| (0..KEPT_POINTS).map(|index| Kept::new(&light, set, index)).collect();
+        let kept = (0..sets).into_par_iter().map(kept_points).collect();
+        Self { light, intensity, lobes: brdfs.into_iter().map(Lobe::new).collect(), kept, subpixels }
+    }
+
+    /// The picture of `geometry`, texels as [`crate::pipeline::Rendering::geometry`] has them.
+    ///
+    /// # Errors
+    /// Only [`Error::Cancelled`].
+    pub fn image(
+        &self,
+        view: &View,
+        geometry: &[[u32; 2]],
+        tolerance: f64,
+        observer: &dyn Observer,
+    ) -> Result<ReferenceImage> {
+        let start = Instant::now();
+        let (width, height) = (view.width as usize, view.height as usize);
+        let display = Display { exposure: f64::from(view.exposure), gamma: f64::from(view.gamma) };
+        let (evaluations, covered, rows_done) = (AtomicU64::new(0), AtomicU64::new(0), AtomicUsize::new(0));
+        let row = |y: usize| -> Result<(Vec<[f32; 4]>, Vec<DVec3>)> {
+            let (mut texels, mut errors) = (Vec::with_capacity(width), Vec::new());
+            for x in 0..width {
+                if observer.cancelled() {
+                    return Err(Error::Cancelled);
+                }
+                let points = self.points(view, geometry, x, y);
+                if points.is_empty() {
+                    texels.push([0.0; 4]);
+                    continue;
+                }
+                let estimate = self.pixel(&points, tolerance, display);
+                evaluations.fetch_add(estimate.evaluations, Ordering::Relaxed);
+                covered.fetch_add(points.len() as u64, Ordering::Relaxed);
+                errors.push(estimate.display_error);
+                // Beyond single precision there is no picture: the brightest number stands for it.
+                let [r, g, b] = estimate.radiance.to_array().map(|value| value.min(f64::from(f32::MAX)) as f32);
+                texels.push([r, g, b, points.len() as f32 / self.subpixels as f32]);
+            }
+            observer.progress(rows_done.fetch_add(1, Ordering::Relaxed) + 1, height);
+            Ok((texels, errors))
+        };
+        let rows = (0..height).into_par_iter().map(row).collect::<Result<Vec<_>>>()?;
+        let errors = || rows.iter().flat_map(|(_, errors)| errors);
+        let (count, squares) = errors().fold((0, 0.0), |(n, sum), error| (n + 3, sum + error.length_squared()));
+        Ok(ReferenceImage {
+            error_estimate: (squares / f64::from(count.max(1))).sqrt(),
+            max_error_estimate: errors().fold(0.0, |most, error| rms(*error).max(most)),
+            radiance: rows.iter().flat_map(|(texels, _)| texels).copied().collect(),
+            evaluations: evaluations.into_inner(),
+            covered_subpixels: covered.into_inner(),
+            seconds: start.elapsed().as_secs_f64(),
+            cached: false,
+        })
+    }
+
+    /// The covered sub-pixels of pixel (`x`, `y`), row by row.
+    fn points(&self, view: &View, geometry: &[[u32; 2]], x: usize, y: usize) -> Vec<Point> {
+        let side = view.subpixels as usize;
+        let [width, height] = view.cache_size();
+        let to_environment = to_environment(view);
+        let subpixels = (0..side).flat_map(|v| (0..side).map(move |u| (x * side + u, y * side + v)));
+        subpixels
+            .filter_map(|(u, v)| {
+                let texel = geometry[v * width as usize + u];
+                let (normal, material) = unpack_geometry(UVec2::from_array(texel))?;
+                let w_o = -view.camera.ray(u as f64, v as f64, width, height);
+                Some(Point::new(to_environment * normal.as_dvec3().normalize(), to_environment * w_o, material))
+            })
+            .collect()
+    }
+
+    /// The sum over `points` divided by the number of sub-pixels, to within `tolerance` as `display` shows it.
+    ///
+    /// # Panics
+    /// With more points than sub-pixels, or of materials that are not there.
+    pub fn pixel(&self, points: &[Point], tolerance: f64, display: Display) -> PixelEstimate {
+        assert!(points.len() <= self.subpixels, "at most one point a sub-pixel");
+        let scrambles = scrambles(points.len());
+        // Point by point, the sums of its scrambles.
+        let mut sums = vec![DVec3::ZERO; points.len() * scrambles];
+        let (mut done, mut next, mut radiance_error) = (0, FIRST_POINTS, DVec3::ZERO);
+        loop {
+            for (set, sum) in sums.iter_mut().enumerate() {
+                *sum += self.sum(&points[set / scrambles], set, done, next);
+            }
+            (done, next) = (next, 2 * next);
+            let scale = self.intensity / (f64::from(done) * (scrambles * self.subpixels) as f64);
+            let radiance = scale * sums.iter().sum::<DVec3>();
+            // Each point's variance from the spread of its scrambles; different points are independent.
+            let variance = sums.chunks_exact(scrambles).map(|sums| {
+                let mean = sums.iter().sum::<DVec3>() / scrambles as f64;
+                let squares = sums.iter().map(|sum| (scale * (sum - mean)).powf(2.0)).sum::<DVec3>();
+                squares * (scrambles as f64 / (scrambles - 1) as f64)
+            });
+            // Few scrambles may lie together by luck, and the first such luck would end the work. Errors halve at best when points
+            // are doubled, so half of the estimate before stands if it is larger.
+            radiance_error = variance.sum::<DVec3>().powf(0.5).max(0.5 * radiance_error);
+            let channel = |i: usize| display.error(radiance[i], radiance_error[i]);
+            let display_error = DVec3::from_array([0, 1, 2].map(channel));
+            if rms(display_error) <= tolerance || done >= MOST_POINTS {
+                let evaluations = 2 * u64::from(done) * sums.len() as u64;
+                return PixelEstimate { radiance, radiance_error, display_error, evaluations };
+            }
+        }
+    }
+
+    /// The sum over points `from` to `to` of scramble `set` of the integrand divided by the density of samples.
+    fn sum(&self, point: &Point, set: usize, from: u32, to: u32) -> DVec3 {
+        let Point { frame, w_o, material } = *point;
+        let lobe = &self.lobes[material];
+        let table = lobe.table(point.theta_o());
+        let mut sum = DVec3::ZERO;
+        if self.light.is_black() {
+            return sum;
+        }
+        for i in from..to {
+            let Kept { lobe_uv, light } = match self.kept[set].get(i as usize) {
+                Some(kept) => *kept,
+                None => Kept::new(&self.light, set, i),
+            };
+            // A direction from the lobe.
+            let h = table.sample(lobe_uv);
+            let cos_theta_d = w_o.dot(h);
+            let w_i = 2.0 * cos_theta_d * h - w_o;
+            if cos_theta_d > 0.0 && w_i.z > 0.0 {
+                let (radiance, light_pdf) = self.light.evaluate(frame * w_i);
+                sum += lobe.f_cos(w_i, w_o) * radiance / (table.pdf(h, cos_theta_d) + light_pdf);
+            }
+            // A direction from the light; one without radiance may have no pdf either.
+            let w_i = frame.transpose() * light.direction;
+            if w_i.z > 0.0 && light.pdf > 0.0 {
+                let h = (w_i + w_o).normalize();
+                sum += lobe.f_cos(w_i, w_o) * light.radiance / (table.pdf(h, w_o.dot(h)) + light.pdf);
+            }
+        }
+        sum
+    }
+}
+
+/// Scrambles of each of `points` sub-pixels.
+fn scrambles(points: usize) -> usize {
+    SCRAMBLES.div_ceil(points.max(1)).max(2)
+}
+
+fn rms(channels: DVec3) -> f64 {
+    (channels.length_squared() / 3.0).sqrt()
+}

@@ -1,0 +1,222 @@
+//! The reference against closed forms, the albedo, and itself at more points.
+use std::f64::consts::{FRAC_1_PI, PI, TAU};
+
+use super::*;
+use crate::environment::tests::environment;
+
+const DISPLAY: Display = Display { exposure: 1.0, gamma: 2.2 };
+
+fn brdf(model: &str, parameters: &str) -> Brdf {
+    Brdf::from_parameters(model, parameters.parse().unwrap()).unwrap()
+}
+
+fn conductor(alpha: f64) -> Brdf {
+    let parameters =
+        format!("distribution = 'ggx'\nalpha = {alpha}\neta = [0.2, 0.924, 1.102]\nk = [3.912, 2.448, 2.142]");
+    brdf("conductor", &parameters)
+}
+
+fn lambert() -> Brdf {
+    brdf("lambert", "reflectance = [0.8, 0.5, 0.2]")
+}
+
+/// A sky with structure at all scales and a small sun of `sun` in it.
+fn sky(sun: f32) -> Environment {
+    environment(64, 32, |column, row| {
+        let wave = |scale: usize| ((column * scale) as f32 * 0.7).sin() * ((row * scale) as f32 * 0.9).cos();
+        let value = 0.4 + 0.15 * wave(1) + 0.1 * wave(5) + 0.1 * wave(11);
+        if (column, row) == (30, 9) { [sun, 0.9 * sun, 0.8 * sun] } else { [value, 0.8 * value, 0.3 + 0.5 * value] }
+    })
+}
+
+/// The point that looks at the middle of the sun of `sky` in a mirror, tilted by `theta_o_deg` from the view.
+fn facing_the_sun(map: &Environment, theta_o_deg: f64) -> Point {
+    let light = map.direction(30.0, 9.0);
+    let normal = glam::DQuat::from_axis_angle(light.any_orthonormal_vector(), theta_o_deg.to_radians()) * light;
+    Point::new(normal, 2.0 * normal.dot(light) * normal - light, 0)
+}
+
+/// A point seen from `theta_o_deg`, its normal towards +Y.
+fn seen_from(theta_o_deg: f64) -> Point {
+    let (sin_theta_o, cos_theta_o) = theta_o_deg.to_radians().sin_cos();
+    Point::new(DVec3::Y, dvec3(0.6 * sin_theta_o, cos_theta_o, 0.8 * sin_theta_o), 0)
+}
+
+#[test]
+fn a_white_furnace_gives_the_albedo_of_every_model_at_every_angle() {
+    let white = environment(16, 8, |_, _| [1.0; 3]);
+    let plastic = brdf("plastic", "distribution = 'beckmann'\nalpha = 0.2\nior = 1.5\ndiffuse = [0.3, 0.08, 0.04]");
+    let phong = brdf("blinn_phong", "diffuse = 0.2\nspecular = 0.5\nexponent = 40");
+    for brdf in [lambert(), plastic, phong, conductor(0.001), conductor(0.1), conductor(0.5)] {
+        let integrator = Integrator::new(&white, 1.0, [&brdf], 1);
+        for theta_o_deg in [0.0, 30.0, 70.0, 85.0] {
+            let found = integrator.pixel(&[seen_from(theta_o_deg)], 1e-4, DISPLAY).radiance;
+            let exact = brdf.albedo(theta_o_deg.to_radians());
+            // The quadrature of the albedo is within 1e-3 itself.
+            assert!(
+                ((found - exact) / exact).abs().max_element() < 2e-3,
+                "{} {theta_o_deg}: {found} {exact}",
+                brdf.model()
+            );
+        }
+    }
+}
+
+#[test]
+fn lambert_under_one_bright_texel_is_the_integral_of_its_tent() {
+    // The tent is wholly above the surface.
+    let map = environment(64, 32, |column, row| if (column, row) == (20, 6) { [3e2, 2e2, 1e2] } else { [0.0; 3] });
+    let brdf = lambert();
+    let normal = dvec3(0.1, 1.0, 0.2).normalize();
+    let found = Integrator::new(&map, 1.0, [&brdf], 1).pixel(&[Point::new(normal, normal, 0)], 1e-5, DISPLAY).radiance;
+    // Midpoint rule over column and row from centre to centre.
+    let (mut sum, steps) = (0.0, 400);
+    for (i, j) in (0..steps).flat_map(|i| (0..steps).map(move |j| (i, j))) {
+        let [x, y] = [i, j].map(|step| 2.0 * (f64::from(step) + 0.5) / f64::from(steps) - 1.0);
+        let sin_theta = (PI * (6.5 + y) / 32.0).sin();
+        let weight = (1.0 - x.abs()) * (1.0 - y.abs()) * sin_theta;
+        sum += weight * normal.dot(map.direction(20.0 + x, 6.0 + y)) * (2.0 / f64::from(steps)).powi(2);
+    }
+    let exact = sum * TAU / 64.0 * PI / 32.0 * FRAC_1_PI * dvec3(0.8 * 3e2, 0.5 * 2e2, 0.2 * 1e2);
+    assert!(((found - exact) / exact).abs().max_element() < 1e-4, "{found} {exact}");
+}
+
+#[test]
+fn a_mirror_like_lobe_shows_the_environment_times_its_reflectance() {
+    // Radiance 0.4 (1 + y): its curvature over a lobe of 0.06 degrees is nothing, but for the tails of GGX.
+    let map = environment(256, 128, |_, row| [0.4 + 0.4 * (PI * (row as f64 + 0.5) / 128.0).cos() as f32; 3]);
+    let brdf = brdf(
+        "conductor",
+        "distribution = 'beckmann'\nalpha = 0.001\neta = [0.2, 0.924, 1.102]\nk = [3.912, 2.448, 2.142]",
+    );
+    let integrator = Integrator::new(&map, 1.0, [&brdf], 1);
+    for theta_o_deg in [5.0f64, 40.0, 75.0] {
+        let normal = dvec3(0.3, 0.5, -0.2).normalize();
+        let w_o = glam::DQuat::from_axis_angle(normal.any_orthonormal_vector(), theta_o_deg.to_radians()) * normal;
+        let found = integrator.pixel(&[Point::new(normal, w_o, 0)], 1e-4, DISPLAY).radiance;
+        let seen = map.radiance(2.0 * normal.dot(w_o) * normal - w_o);
+        let fresnel = crate::brdf::fresnel_conductor(
+            theta_o_deg.to_radians().cos(),
+            dvec3(0.2, 0.924, 1.102),
+            dvec3(3.912, 2.448, 2.142),
+        );
+        let error = (found - seen * fresnel) / found;
+        assert!(error.abs().max_element() < 1e-3, "{theta_o_deg}: {found} {}", seen * fresnel);
+    }
+}
+
+#[test]
+fn estimated_errors_are_honest() {
+    let map = sky(500.0);
+    let brdfs = [lambert(), conductor(0.05), conductor(0.3)];
+    for (tolerance, count) in [(2e-3, 40), (2e-4, 10)] {
+        for brdf in &brdfs {
+            let integrator = Integrator::new(&map, 1.0, [brdf], 1);
+            let (mut estimated, mut happened) = (0.0, 0.0);
+            for i in 0..count {
+                let w_o = map.direction(f64::from(i) * 7.3, 16.0 + 12.0 * f64::from(i).sin());
+                let point = [Point::new((w_o + 0.8 * map.direction(f64::from(i), 3.0)).normalize(), w_o, 0)];
+                let rough = integrator.pixel(&point, tolerance, DISPLAY);
+                let exact = integrator.pixel(&point, tolerance / 20.0, DISPLAY);
+                estimated += rough.display_error.length_squared();
+                for channel in 0..3 {
+                    let difference = DISPLAY.value(rough.radiance[channel]) - DISPLAY.value(exact.radiance[channel]);
+                    happened += difference * difference;
+                }
+            }
+            let ratio = (happened / estimated).sqrt();
+            println!("{} at {tolerance}: error / estimate {ratio:.2}", brdf.model());
+            assert!((1.0 / 3.0..3.0).contains(&ratio), "{}: {ratio}", brdf.model());
+        }
+    }
+}
+
+#[test]
+fn suns_of_a_million_in_near_mirrors_at_grazing_angles_converge() {
+    let map = sky(1e6);
+    for alpha in [0.001, 0.01, 0.3] {
+        let brdf = conductor(alpha);
+        let integrator = Integrator::new(&map, 1.0, [&brdf], 1);
+        for theta_o_deg in [0.0, 45.0, 85.0, 89.9] {
+            for point in [facing_the_sun(&map, theta_o_deg), seen_from(theta_o_deg)] {
+                let estimate = integrator.pixel(&[point], 2e-4, DISPLAY);
+                assert!(estimate.radiance.is_finite() && estimate.radiance.min_element() > 0.0, "{estimate:?}");
+                assert!(rms(estimate.display_error) <= 2e-4, "{alpha} {theta_o_deg}: {estimate:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_normal_that_faces_away_is_as_if_just_before() {
+    let map = sky(10.0);
+    let brdf = conductor(0.2);
+    let integrator = Integrator::new(&map, 1.0, [&brdf], 1);
+    let at = |theta_o_deg: f64| integrator.pixel(&[seen_from(theta_o_deg)], 1e-4, DISPLAY).radiance;
+    let (before, beyond) = (at(MAX_THETA_O_DEG), at(100.0));
+    assert!(before.min_element() > 0.0 && ((beyond - before) / before).abs().max_element() < 1e-2, "{before} {beyond}");
+}
+
+#[test]
+fn black_light_is_black_and_tiny_maps_work() {
+    let brdf = conductor(0.2);
+    let black = environment(3, 2, |_, _| [0.0; 3]);
+    let estimate = Integrator::new(&black, 1.0, [&brdf], 1).pixel(&[seen_from(30.0)], 2e-4, DISPLAY);
+    assert_eq!((estimate.radiance, estimate.display_error), (DVec3::ZERO, DVec3::ZERO));
+    for (width, height) in [(1, 1), (1, 3), (2, 1)] {
+        let white = environment(width, height, |_, _| [1.0, 0.0, 2.0]);
+        let estimate = Integrator::new(&white, 0.5, [&lambert()], 1).pixel(&[seen_from(30.0)], 2e-4, DISPLAY);
+        let error = estimate.radiance - 0.5 * dvec3(0.8, 0.0, 0.4);
+        assert!(error.abs().max_element() < 1e-3, "{width} x {height}: {}", estimate.radiance);
+    }
+}
+
+#[test]
+fn sub_pixels_share_the_work_and_average() {
+    let map = sky(500.0);
+    let brdfs = [conductor(0.2), lambert()];
+    let integrator = Integrator::new(&map, 1.0, &brdfs, 2);
+    let points = [0.0, 20.0, 40.0].map(|theta_o_deg| Point { material: 1, ..seen_from(theta_o_deg) });
+    let mixed = [points[0], Point { material: 0, ..points[1] }, points[2]];
+    for points in [points, mixed] {
+        let together = integrator.pixel(&points, 1e-4, DISPLAY).radiance;
+        let single = |point| integrator.pixel(&[point], 2e-5, DISPLAY).radiance;
+        // Each alone counts a quarter, as one of four sub-pixels.
+        let sum = points.into_iter().map(single).sum::<DVec3>();
+        assert!(((together - sum) / sum).abs().max_element() < 2e-3, "{together} {sum}");
+    }
+}
+
+#[test]
+fn the_picture_is_the_same_on_any_number_of_threads_and_can_be_cancelled() {
+    let view = View {
+        camera: crate::scene::Camera::framing(DVec3::ZERO, 1.0, 1.0),
+        width: 6,
+        height: 5,
+        subpixels: 2,
+        rotation_deg: 30.0,
+        exposure: 1.0,
+        gamma: 2.2,
+    };
+    let texel = |i: u32| [i.wrapping_mul(0x9e37_79b9), u32::from(!i.is_multiple_of(5))];
+    let geometry: Vec<_> = (0..12 * 10).map(texel).collect();
+    let (map, brdf) = (sky(500.0), conductor(0.2));
+    let images = [1, 3].map(|threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| Integrator::new(&map, 1.0, [&brdf], 2).image(&view, &geometry, 1e-2, &()).unwrap())
+    });
+    let [one, three] = images.map(|image| ReferenceImage { seconds: 0.0, ..image });
+    assert_eq!(one, three);
+    assert!(one.max_error_estimate <= 1e-2 && one.error_estimate > 0.0);
+    assert_eq!(one.covered_subpixels, 96);
+
+    struct Impatient;
+    impl Observer for Impatient {
+        fn progress(&self, _: usize, _: usize) {}
+        fn cancelled(&self) -> bool {
+            true
+        }
+    }
+    let cancelled = Integrator::new(&map, 1.0, [&brdf], 2).image(&view, &geometry, 1e-2, &Impatient);
+    assert!(matches!(cancelled, Err(Error::Cancelled)));
+}
