@@ -67,7 +67,7 @@ mod tests {
             seen[cell(v, CELLS.1) * CELLS.0 + cell(u, CELLS.0)] += 1.0;
         }
         let (mut chi_square, mut total) = (0.0, 0.0);
-        for (i, seen) in seen.iter().enumerate() {
+        for (i, count) in seen.iter().enumerate() {
             let mut mass = 0.0;
             for j in 0..grid * grid {
                 let middle = |cell: usize, step: usize, count: usize| {
@@ -76,19 +76,15 @@ mod tests {
                 let phi = (middle(i % CELLS.0, j % grid, CELLS.0) - 0.5) * std::f64::consts::TAU;
                 let theta = middle(i / CELLS.0, j / grid, CELLS.1) * std::f64::consts::PI;
                 let d = DVec3::new(theta.sin() * phi.sin(), theta.cos(), -theta.sin() * phi.cos());
-                let area = 2.0 * std::f64::consts::PI.powi(2) * theta.sin() / (seen_len(CELLS) * grid * grid) as f64;
+                let area = 2.0 * std::f64::consts::PI.powi(2) * theta.sin() / (seen.len() * grid * grid) as f64;
                 mass += f64::from(light_pdf(map.texel(d.as_vec3()), d.as_vec3())) * area;
             }
             let expected = mass * f64::from(draws);
-            chi_square += (seen - expected) * (seen - expected) / expected;
+            chi_square += (count - expected) * (count - expected) / expected;
             total += mass;
         }
         assert!((total - 1.0).abs() < 2e-3, "the density integrates to {total}");
-        let freedom = (seen_len(CELLS) - 1) as f64;
+        let freedom = (seen.len() - 1) as f64;
         assert!(chi_square < freedom + 4.5 * (2.0 * freedom).sqrt(), "chi square {chi_square} of {freedom}");
-    }
-
-    fn seen_len(cells: (usize, usize)) -> usize {
-        cells.0 * cells.1
     }
 }
