@@ -88,7 +88,7 @@ pub fn fresnel_conductor(cos_theta: f64, eta: DVec3, k: DVec3) -> DVec3 {
     let channel = |eta: f64, k: f64| {
         // (a - i b)^2 = (eta - i k)^2 - sin^2, as in Born and Wolf; only a and a^2 + b^2 are needed.
         let difference = eta * eta - k * k - sin2;
-        let a2_b2 = difference.hypot(2.0 * eta * k);
+        let a2_b2 = (difference * difference + 4.0 * eta * eta * k * k).sqrt();
         let a = (0.5 * (a2_b2 + difference)).max(0.0).sqrt();
         let (s_sum, s_cross) = (a2_b2 + cos2, 2.0 * a * cos_theta);
         let r_s = (s_sum - s_cross) / (s_sum + s_cross);

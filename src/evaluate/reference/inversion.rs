@@ -5,10 +5,12 @@
 pub fn find_step(steps: usize, mass: f64, edge: impl Fn(usize) -> f64) -> (usize, f64) {
     let target = mass * edge(steps);
     // The last edge that is not above the target.
-    let (mut low, mut high) = (0, steps);
-    while high - low > 1 {
-        let middle = (low + high) / 2;
-        if edge(middle) <= target { low = middle } else { high = middle }
+    let (mut low, mut size) = (0, steps);
+    while size > 1 {
+        let middle = low + size / 2;
+        // A choice of values, not of ways: no branch to mispredict.
+        low = if edge(middle) <= target { middle } else { low };
+        size -= size / 2;
     }
     let (from, to) = (edge(low), edge(low + 1));
     (low, if to > from { ((target - from) / (to - from)).clamp(0.0, 1.0) } else { 0.5 })

@@ -5,6 +5,7 @@ use std::sync::OnceLock;
 use glam::{DVec2, DVec3, dvec3};
 
 use super::inversion::find_step;
+use super::{KEPT_POINTS, lobe_uv};
 use crate::brdf::Brdf;
 
 /// Steps over the polar angle and the azimuth of the half vector.
@@ -21,6 +22,7 @@ const COSINE_PART: f64 = 0.1;
 /// A BRDF with tables to sample it by, each made when it is first needed.
 pub struct Lobe<'a> {
     brdf: &'a Brdf,
+    sets: usize,
     tables: Vec<OnceLock<Table>>,
 }
 
@@ -32,12 +34,31 @@ pub struct Table {
     polar_cdf: Vec<f64>,
     /// CDF over the turn in each step of x: TURN_STEPS + 1 values each.
     turn_cdf: Vec<f64>,
+    /// For each scramble its first samples, made when they are first needed.
+    kept: Vec<OnceLock<Vec<LobeSample>>>,
+}
+
+/// A half vector drawn from a table.
+#[derive(Clone, Copy, Debug)]
+pub struct LobeSample {
+    /// Unit.
+    pub h: DVec3,
+    /// With which it is drawn, per solid angle of h, in 1/sr.
+    pub pdf: f64,
+}
+
+impl LobeSample {
+    /// The density in 1/sr of the w_i that mirrors w_o in h: dw_i = 4 cos_theta_d dw_h (Walter 2007, eq 14).
+    #[inline]
+    pub fn pdf_of_w_i(self, cos_theta_d: f64) -> f64 {
+        self.pdf / (4.0 * cos_theta_d)
+    }
 }
 
 impl<'a> Lobe<'a> {
-    /// Nothing is tabulated yet.
-    pub fn new(brdf: &'a Brdf) -> Self {
-        Self { brdf, tables: (0..VIEW_RANGES).map(|_| OnceLock::new()).collect() }
+    /// Nothing is tabulated yet. Samples of scrambles below `sets` will be kept.
+    pub fn new(brdf: &'a Brdf, sets: usize) -> Self {
+        Self { brdf, sets, tables: (0..VIEW_RANGES).map(|_| OnceLock::new()).collect() }
     }
 
     /// f(w_i, w_o) (n . w_i) per channel, in 1/sr.
@@ -56,14 +77,14 @@ impl<'a> Lobe<'a> {
                 let theta_o = theta_o.min(MAX_THETA_O_DEG.to_radians());
                 dvec3(theta_o.sin(), 0.0, theta_o.cos())
             });
-            Table::new(self.brdf, edges)
+            Table::new(self.brdf, edges, self.sets)
         })
     }
 }
 
 impl Table {
     /// The mean of the slices at the two view directions that bound the range.
-    fn new(brdf: &Brdf, edges: [DVec3; 2]) -> Self {
+    fn new(brdf: &Brdf, edges: [DVec3; 2], sets: usize) -> Self {
         const CELLS: usize = POLAR_STEPS * TURN_STEPS;
         let (mut lobe, mut cosine) = (vec![0.0; CELLS], vec![0.0; CELLS]);
         for (cell, (lobe, cosine)) in lobe.iter_mut().zip(&mut cosine).enumerate() {
@@ -76,7 +97,7 @@ impl Table {
                     let cos_theta_d = w_o.dot(h);
                     let w_i = 2.0 * cos_theta_d * h - w_o;
                     if cos_theta_d > 0.0 && w_i.z > 0.0 {
-                        let measure = solid_angle_density(h, cos_theta_d);
+                        let measure = 4.0 * cos_theta_d * measure(h);
                         *lobe += brdf.evaluate(w_i, w_o).element_sum() * w_i.z * measure;
                         *cosine += FRAC_1_PI * w_i.z * measure;
                     }
@@ -85,7 +106,11 @@ impl Table {
         }
         let [lobe_sum, cosine_sum] = [&lobe, &cosine].map(|cells| cells.iter().sum::<f64>());
         let lobe_scale = if lobe_sum > 0.0 { (1.0 - COSINE_PART) / (COSINE_PART * lobe_sum) * cosine_sum } else { 0.0 };
-        let mut table = Self { polar_cdf: vec![0.0], turn_cdf: Vec::with_capacity(POLAR_STEPS * (TURN_STEPS + 1)) };
+        let mut table = Self {
+            polar_cdf: vec![0.0],
+            turn_cdf: Vec::with_capacity(POLAR_STEPS * (TURN_STEPS + 1)),
+            kept: (0..sets).map(|_| OnceLock::new()).collect(),
+        };
         let mut total = 0.0;
         for (lobe, cosine) in lobe.chunks_exact(TURN_STEPS).zip(cosine.chunks_exact(TURN_STEPS)) {
             let mut sum = 0.0;
@@ -105,22 +130,34 @@ impl Table {
         table
     }
 
+    /// The first samples of scramble `set`.
+    pub fn kept(&self, set: usize) -> &[LobeSample] {
+        self.kept[set].get_or_init(|| (0..KEPT_POINTS).map(|index| self.sample(lobe_uv(set, index))).collect())
+    }
+
     /// The half vector at `uv` in (0, 1)^2.
-    pub fn sample(&self, uv: DVec2) -> DVec3 {
+    pub fn sample(&self, uv: DVec2) -> LobeSample {
         let (i, x) = find_step(POLAR_STEPS, uv.x, |edge| self.polar_cdf[edge]);
         let turns = self.turns(i);
         let (j, turn) = find_step(TURN_STEPS, uv.y, |edge| turns[edge]);
-        half_vector((i as f64 + x) / POLAR_STEPS as f64, (j as f64 + turn) / TURN_STEPS as f64)
+        let h = half_vector((i as f64 + x) / POLAR_STEPS as f64, (j as f64 + turn) / TURN_STEPS as f64);
+        LobeSample { h, pdf: self.cell_density(i, j) / measure(h) }
     }
 
-    /// The density in 1/sr of the w_i that half vector `h` stands for; `cos_theta_d` = h . w_o, positive.
+    /// `h` with the density with which [`Self::sample`] draws it.
     #[inline]
-    pub fn pdf(&self, h: DVec3, cos_theta_d: f64) -> f64 {
+    pub fn evaluate(&self, h: DVec3) -> LobeSample {
         let i = ((x_of(h) * POLAR_STEPS as f64) as usize).min(POLAR_STEPS - 1);
         let j = ((turn_of(h) * TURN_STEPS as f64) as usize).min(TURN_STEPS - 1);
+        LobeSample { h, pdf: self.cell_density(i, j) / measure(h) }
+    }
+
+    /// The density over (x, turn) in a cell.
+    #[inline]
+    fn cell_density(&self, i: usize, j: usize) -> f64 {
         let turns = self.turns(i);
         let mass = (self.polar_cdf[i + 1] - self.polar_cdf[i]) * (turns[j + 1] - turns[j]);
-        mass * (POLAR_STEPS * TURN_STEPS) as f64 / solid_angle_density(h, cos_theta_d)
+        mass * (POLAR_STEPS * TURN_STEPS) as f64
     }
 
     fn turns(&self, i: usize) -> &[f64] {
@@ -155,16 +192,19 @@ fn direction_at(turn: f64) -> DVec2 {
     DVec2::new(along, if turn < 0.5 { -across } else { across }).normalize()
 }
 
-/// dw_i / (dx dturn): dw_i = 4 cos_theta_d dw_h (Walter 2007, eq 14); dw_h = 4 s ds dphi / (1 + s^2)^2 with s = tan(theta_h / 2) =
-/// x^4; dphi = 4 (|cos phi| + |sin phi|)^2 dturn.
-fn solid_angle_density(h: DVec3, cos_theta_d: f64) -> f64 {
-    let sin_theta_h = (h.x * h.x + h.y * h.y).sqrt();
-    let s = sin_theta_h / (1.0 + h.z);
-    // s ds = 4 x^7 dx = 4 s^(7/4) dx.
-    let s_ds = 4.0 * s * s.sqrt() * s.sqrt().sqrt();
-    let spread = if sin_theta_h > 0.0 { (h.x.abs() + h.y.abs()) / sin_theta_h } else { 1.0 };
+/// dw_h / (dx dturn): dw_h = 4 s ds dphi / (1 + s^2)^2 with s = tan(theta_h / 2) = x^4, and
+/// dphi = 4 (|cos phi| + |sin phi|)^2 dturn.
+#[inline]
+fn measure(h: DVec3) -> f64 {
+    let sin2 = h.x * h.x + h.y * h.y;
+    let s = sin2.sqrt() / (1.0 + h.z);
+    let root = s.sqrt();
+    // s ds = 4 x^7 dx.
+    let s_ds = 4.0 * s * root * root.sqrt();
+    let size = h.x.abs() + h.y.abs();
+    let spread2 = if sin2 > 0.0 { size * size / sin2 } else { 1.0 };
     let one_plus = 1.0 + s * s;
-    4.0 * cos_theta_d * 4.0 * s_ds / (one_plus * one_plus) * 4.0 * spread * spread
+    4.0 * s_ds / (one_plus * one_plus) * 4.0 * spread2
 }
 
 #[cfg(test)]
@@ -178,16 +218,17 @@ mod tests {
         for theta_o_deg in [0.0f64, 30.0, 80.0, 89.99] {
             let theta_o = theta_o_deg.to_radians();
             let w_o = dvec3(theta_o.sin(), 0.0, theta_o.cos());
-            let lobe = Lobe::new(&brdf);
+            let lobe = Lobe::new(&brdf, 0);
             let table = lobe.table(theta_o);
             // Samples divided by the pdf sum to the solid angle of what they stand for: all half vectors that see w_o.
             let (mut sum, count) = (0.0, 1 << 14);
             for i in 0..count {
-                let h = table.sample(point(3, i));
-                assert!((h.length() - 1.0).abs() < 1e-12);
-                let cos_theta_d = w_o.dot(h);
-                if cos_theta_d > 0.0 && 2.0 * cos_theta_d * h.z > w_o.z {
-                    sum += 1.0 / table.pdf(h, cos_theta_d) / f64::from(count);
+                let sample = table.sample(point(3, i));
+                let cos_theta_d = w_o.dot(sample.h);
+                assert!((sample.h.length() - 1.0).abs() < 1e-12);
+                assert!((table.evaluate(sample.h).pdf / sample.pdf - 1.0).abs() < 1e-6);
+                if cos_theta_d > 0.0 && 2.0 * cos_theta_d * sample.h.z > w_o.z {
+                    sum += 1.0 / sample.pdf_of_w_i(cos_theta_d) / f64::from(count);
                 }
             }
             let hemisphere = 2.0 * std::f64::consts::PI;

@@ -45,8 +45,8 @@ const SCRAMBLES: usize = 6;
 /// Points of each scramble and way of drawing that a sub-pixel starts with, and at which it gives up.
 const FIRST_POINTS: u32 = 32;
 const MOST_POINTS: u32 = 1 << 17;
-/// So many points of each scramble are kept; they are the same for all pixels.
-const KEPT_POINTS: u32 = 2048;
+/// Samples of so many points of each scramble are kept, as they serve many pixels.
+const KEPT_POINTS: u32 = 1024;
 /// Above display white, where display values no longer tell, linear radiance is held to 1/0.05 = 20 times the tolerance, relatively.
 const ABOVE_WHITE: f64 = 0.05;
 
@@ -214,28 +214,13 @@ impl Display {
     }
 }
 
-/// A point of each way to draw directions.
-#[derive(Clone, Copy)]
-struct Kept {
-    lobe_uv: DVec2,
-    light: LightSample,
-}
-
-impl Kept {
-    /// Point `index` of scramble `set`.
-    fn new(light: &Light, set: usize, index: u32) -> Self {
-        let set = 2 * set as u32;
-        Self { lobe_uv: point(set, index), light: light.sample(point(set + 1, index)) }
-    }
-}
-
 /// Evaluates equation (1) for one environment and some materials.
 pub struct Integrator<'a> {
     light: Light,
     intensity: f64,
     lobes: Vec<Lobe<'a>>,
-    /// The first points of each scramble.
-    kept: Vec<Vec<Kept>>,
+    /// The light's first samples of each scramble.
+    kept: Vec<Vec<LightSample>>,
     subpixels: usize,
 }
 
@@ -250,9 +235,9 @@ impl<'a> Integrator<'a> {
         let light = Light::new(environment);
         let subpixels = (subpixels * subpixels) as usize;
         let sets = (1..=subpixels).map(|points| points * scrambles(points)).max().unwrap_or(0);
-        let kept_points = |set| (0..KEPT_POINTS).map(|index| Kept::new(&light, set, index)).collect();
+        let kept_points = |set| (0..KEPT_POINTS).map(|index| light.sample(light_uv(set, index))).collect();
         let kept = (0..sets).into_par_iter().map(kept_points).collect();
-        Self { light, intensity, lobes: brdfs.into_iter().map(Lobe::new).collect(), kept, subpixels }
+        Self { light, intensity, lobes: brdfs.into_iter().map(|brdf| Lobe::new(brdf, sets)).collect(), kept, subpixels }
     }
 
     /// The picture of `geometry`, texels as [`crate::pipeline::Rendering::geometry`] has them.
@@ -360,34 +345,43 @@ impl<'a> Integrator<'a> {
     /// The sum over points `from` to `to` of scramble `set` of the integrand divided by the density of samples.
     fn sum(&self, point: &Point, set: usize, from: u32, to: u32) -> DVec3 {
         let Point { frame, w_o, material } = *point;
+        let to_local = frame.transpose();
         let lobe = &self.lobes[material];
         let table = lobe.table(point.theta_o());
         let mut sum = DVec3::ZERO;
         if self.light.is_black() {
             return sum;
         }
+        let (kept_lobe, kept_light) = (table.kept(set), &self.kept[set]);
         for i in from..to {
-            let Kept { lobe_uv, light } = match self.kept[set].get(i as usize) {
-                Some(kept) => *kept,
-                None => Kept::new(&self.light, set, i),
-            };
             // A direction from the lobe.
-            let h = table.sample(lobe_uv);
-            let cos_theta_d = w_o.dot(h);
-            let w_i = 2.0 * cos_theta_d * h - w_o;
+            let sample = kept_lobe.get(i as usize).copied().unwrap_or_else(|| table.sample(lobe_uv(set, i)));
+            let cos_theta_d = w_o.dot(sample.h);
+            let w_i = 2.0 * cos_theta_d * sample.h - w_o;
             if cos_theta_d > 0.0 && w_i.z > 0.0 {
                 let (radiance, light_pdf) = self.light.evaluate(frame * w_i);
-                sum += lobe.f_cos(w_i, w_o) * radiance / (table.pdf(h, cos_theta_d) + light_pdf);
+                sum += lobe.f_cos(w_i, w_o) * radiance / (sample.pdf_of_w_i(cos_theta_d) + light_pdf);
             }
             // A direction from the light; one without radiance may have no pdf either.
-            let w_i = frame.transpose() * light.direction;
-            if w_i.z > 0.0 && light.pdf > 0.0 {
+            let sample = kept_light.get(i as usize).copied().unwrap_or_else(|| self.light.sample(light_uv(set, i)));
+            let w_i = to_local * sample.direction;
+            if w_i.z > 0.0 && sample.pdf > 0.0 {
                 let h = (w_i + w_o).normalize();
-                sum += lobe.f_cos(w_i, w_o) * light.radiance / (table.pdf(h, w_o.dot(h)) + light.pdf);
+                let lobe_pdf = table.evaluate(h).pdf_of_w_i(w_o.dot(h));
+                sum += lobe.f_cos(w_i, w_o) * sample.radiance / (lobe_pdf + sample.pdf);
             }
         }
         sum
     }
+}
+
+/// Points of the light and of the lobe are scrambled apart.
+fn light_uv(set: usize, index: u32) -> DVec2 {
+    point(2 * set as u32, index)
+}
+
+fn lobe_uv(set: usize, index: u32) -> DVec2 {
+    point(2 * set as u32 + 1, index)
 }
 
 /// Scrambles of each of `points` sub-pixels.
