@@ -78,6 +78,8 @@ fn numbers_out_of_range_name_the_flag_and_the_range() {
         ("--rotation", "inf", "finite"),
         ("--seed", "-1", "--seed"),
         ("--repeat", "0", "0 is not in 1"),
+        ("--tolerance", "0", "positive"),
+        ("--tolerance", "nan", "positive"),
     ] {
         refuses(&folder, &format!("render -o out/image.png {flag} {value}"), &[flag, value, range]);
     }
@@ -98,6 +100,8 @@ fn unknown_names_are_told_with_the_known_ones() {
     refuses(&folder, &render("--environment mars"), &["mars", "studio", ".hdr"]);
     refuses(&folder, &render("--mesh cube"), &["cube", "sphere", ".obj"]);
     refuses(&folder, &render("--method magic"), &["magic", "paper"]);
+    refuses(&folder, &render("--tolerance 1e-3"), &["--tolerance", "paper"]);
+    refuses(&folder, &render("--method reference --print-plan"), &["--print-plan", "reference"]);
     refuses(&folder, &render("--device abacus"), &["--device abacus", "name one of"]);
     refuses(&folder, &render("--background black"), &["--background", "black", "environment, none"]);
     refuses(&folder, "threads unobtainium -o out/a.threads", &["unobtainium", "gold"]);

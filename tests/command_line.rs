@@ -304,6 +304,57 @@ fn the_environment_turns_with_the_rotation() {
 }
 
 #[test]
+fn the_reference_tells_its_error_and_comes_from_the_cache_the_second_time() {
+    let folder = workplace();
+    let reference = "--size 24x18 --environment map.hdr --method reference --tolerance 5e-3";
+    printed(&mut render(&folder, &format!("{reference} --stats first.json -o first.exr")));
+    printed(&mut render(&folder, &format!("{reference} --stats second.json -o second.exr")));
+    printed(&mut render(&folder, &format!("{reference} --no-cache --stats third.json -o third.exr")));
+    printed(&mut render(&folder, &format!("{reference} -o image.png")));
+    for (name, cache) in [("first", "miss"), ("second", "hit"), ("third", "miss")] {
+        let stats = stats(&folder, &format!("{name}.json"));
+        assert_eq!(stats["reference_cache"], cache);
+        assert_eq!((&stats["method"], &stats["tolerance"]), (&Value::from("reference"), &Value::from(5e-3)));
+        let estimate = stats["error_estimate"].as_f64().unwrap();
+        assert!(estimate > 0.0 && estimate < 5e-3 && stats["lookups"].as_u64() > Some(0), "{stats}");
+        assert_eq!(stats["validation_messages"], 0);
+    }
+    let [first, second, third] = ["first", "second", "third"].map(|name| picture(&folder, &format!("{name}.exr")));
+    assert!(first.rgba == second.rgba && first.rgba == third.rgba);
+    assert!(first.attributes["error_estimate"].parse::<f64>().unwrap() < 5e-3);
+    assert!(!first.alpha);
+
+    // Another question is another answer: nothing comes from the cache.
+    for (index, change) in ["--rotation 10", "--material clay", "--exposure 2", "--subpixels 1"].iter().enumerate() {
+        printed(&mut render(&folder, &format!("{reference} {change} --stats {index}.json")));
+        assert_eq!(stats(&folder, &format!("{index}.json"))["reference_cache"], "miss", "{change}");
+    }
+    // A damaged file is noticed and replaced.
+    for entry in fs::read_dir(cache(&folder)).unwrap().map(|entry| entry.unwrap().path()) {
+        if entry.to_string_lossy().ends_with(".reference.exr") {
+            fs::write(&entry, &fs::read(&entry).unwrap()[..300]).unwrap();
+        }
+    }
+    render(&folder, &format!("{reference} --stats again.json -o again.exr")).assert().success();
+    assert_eq!(stats(&folder, "again.json")["reference_cache"], "miss");
+    assert!(picture(&folder, "again.exr").rgba == first.rgba);
+
+    // The same surface and background as other methods show, roughly.
+    printed(&mut render(&folder, "--size 24x18 --environment map.hdr --threads 8 -o paper.exr"));
+    let (paper, display) = (picture(&folder, "paper.exr"), picture(&folder, "image.png"));
+    let mut differences = [0.0; 2];
+    for (pixel, (truth, paper)) in first.rgba.iter().zip(&paper.rgba).enumerate() {
+        for channel in 0..3 {
+            let background = usize::from(pixel / 24 == 0);
+            differences[background] = (truth[channel] - paper[channel]).abs().max(differences[background]);
+            let shown = truth[channel].clamp(0.0, 1.0).powf(1.0 / 2.2);
+            assert!((shown - display.rgba[pixel][channel]).abs() < 0.003, "{pixel}");
+        }
+    }
+    assert!(differences[0] < 0.2 && differences[1] < 2e-3, "{differences:?}");
+}
+
+#[test]
 fn the_plan_lists_passes_and_what_was_culled() {
     let folder = workplace();
     let linear = printed(&mut render(&folder, &format!("{SMALL} --print-plan -o image.exr")));
@@ -376,6 +427,7 @@ fn every_subcommand_has_help() {
         "--material",
         "--environment",
         "--method",
+        "--tolerance",
         "--threads",
         "--subpixels",
         "--size",

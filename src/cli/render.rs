@@ -156,9 +156,13 @@ impl Render {
         let scene = self.scene()?;
         let cache = cache_folder(self.no_cache);
         let is_reference = scene.shading.method == Method::Reference.name();
-        if self.tolerance.is_some() && !is_reference {
+        let useless = [
+            ("--tolerance", self.tolerance.is_some() && !is_reference),
+            ("--print-plan", self.print_plan && is_reference),
+        ];
+        if let Some((flag, _)) = useless.into_iter().find(|(_, useless)| *useless) {
             let problem = format!("is of no use to method \"{}\"", scene.shading.method);
-            return Err(Error::input("--tolerance", problem, "leave it out, or use --method reference").into());
+            return Err(Error::input(flag, problem, "leave it out, or choose another --method").into());
         }
         let progress = Progress::new("threads")?;
         let prepared = prepare(&scene, cache.as_deref(), &progress)?;

@@ -44,6 +44,8 @@ impl PipelineCache {
         if std::fs::read(file).is_ok_and(|old| old == contents) {
             return;
         }
+        // If the folder cannot be made, neither can the file, and that is what to say.
+        let _ = file.parent().map(std::fs::create_dir_all);
         if let Err(cause) = crate::output::write_whole(file, &contents) {
             tracing::warn!("the pipeline cache was not saved: {cause}");
         }

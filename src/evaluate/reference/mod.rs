@@ -291,8 +291,8 @@ impl<'a> Integrator<'a> {
         })
     }
 
-    /// The covered sub-pixels of pixel (`x`, `y`), row by row.
-    fn points(&self, view: &View, geometry: &[[u32; 2]], x: usize, y: usize) -> Vec<Point> {
+    /// What the covered sub-pixels of the pixel in column `x` and row `y` see, row by row.
+    pub fn points(&self, view: &View, geometry: &[[u32; 2]], x: usize, y: usize) -> Vec<Point> {
         let side = view.subpixels as usize;
         let [width, height] = view.cache_size();
         let to_environment = to_environment(view);
