@@ -13,7 +13,7 @@ vec3 estimate(Surface surface, Material material, uint first, uint stride) {
         if (drawn.p > 0.0) {
             ++lookups;
             vec3 direction = surface.frame * drawn.w_i;
-            float level = level_of(-log2(float(push.sample_count)) - log2(drawn.p), push.face_size, direction);
+            float level = level_of(1.0 / (float(push.sample_count) * drawn.p), push.face_size, direction);
             vec3 weight = brdf(material, drawn.w_i, w_o) * (drawn.w_i.z / drawn.p);
             sum += weight * textureLod(environment_pyramid, direction, level).rgb;
         }
