@@ -1,9 +1,9 @@
 //! The truth: equation (1) of every sub-pixel, on the CPU in double precision, with an estimate of its own error.
 //!
 //! The integrand is [`Environment::radiance`] times [`Brdf::evaluate`] times the cosine; nothing of threads or pyramids is in it.
-//! Directions are drawn in two ways, each in proportion to one of the two factors ([`lobe`], [`light`]), and weighted by the balance
+//! Directions are drawn in two ways, each in proportion to one of the two factors (`lobe`, `light`), and weighted by the balance
 //! heuristic (Veach and Guibas 1995), so that neither a narrow lobe nor a small sun makes a large weight. The points behind
-//! them are Sobol's in several independent scrambles ([`points`]). Each scramble gives a picture by itself; how far
+//! them are Sobol's in several independent scrambles (`points`). Each scramble gives a picture by itself; how far
 //! these lie apart tells the error of their mean. Points are doubled, pixel by pixel, until it is below the tolerance. All is
 //! deterministic: points depend on the sub-pixel's place in its pixel and on nothing else.
 use std::path::PathBuf;
