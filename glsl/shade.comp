@@ -61,24 +61,20 @@ uvec2 subpixel = uvec2(0);
 
 // A method defines `vec3 estimate(Surface surface, Material material, uint first, uint stride)`: the sum over its threads or
 // samples first, first + stride, ... of weight times environment, a partition of the radiance that leaves `surface` towards
-// the eye. It includes what it looks up; nothing else of the scene is made or uploaded.
+// the eye, and `const bool SHARES_SURFACE`: whether a pixel that lies on one smooth surface is one sum at its mean normal,
+// not a partition among its sub-pixels. It includes what it looks up; nothing else of the scene is made or uploaded.
 #include "method.glsl"
 
 shared uint group_lookups;
 
-// Each sub-pixel looks where its part of the threads points, and the directions of one fill the gaps between those of another,
-// but only where their normals agree. Normals d apart reflect 2 d apart, and gaps stay open once that is half of their
-// width: then each lookup has to stand for the 4 d beside it in either direction. With R the length of the mean normal,
-// the mean square deviation is 2 (1 - R), and for 2 x 2 sub-pixels that is d^2 / 2, so (4 d)^2 = 64 (1 - R), for each of
-// the other sub-pixels.
-float footprint(uvec2 pixel) {
+// The sum of the normals of a pixel that lies on one smooth surface.
+vec3 normal_sum(uvec2 pixel) {
     vec3 sum = vec3(0.0);
     for (uint j = 0; j < SUBPIXELS * SUBPIXELS; ++j) {
         uvec2 subpixel = pixel * SUBPIXELS + uvec2(j % SUBPIXELS, j / SUBPIXELS);
         sum += geometry_normal(texelFetch(geometry, ivec2(subpixel), 0).xy);
     }
-    const float count = float(SUBPIXELS * SUBPIXELS);
-    return max(64.0 * (count - 1.0) * (1.0 - length(sum) / count), 0.0);
+    return sum;
 }
 
 void main() {
@@ -97,24 +93,30 @@ void main() {
         uint slot = interior ? gl_LocalInvocationIndex : TILE_PIXELS - 1 - gl_LocalInvocationIndex;
         uint place = pixel_list.pixels[tile * TILE_PIXELS + slot];
         uvec2 pixel = uvec2(tile % tiles.x, tile / tiles.x) * TILE_SIDE + uvec2(place % TILE_SIDE, place / TILE_SIDE);
+        // With R the length of the mean normal, 1 - R is the variance along each of two axes.
+        vec3 normals = interior ? normal_sum(pixel) : vec3(0.0);
+        float normal_variance = interior ? max(1.0 - length(normals) / float(subpixel_count), 0.0) : 0.0;
+        bool shares_surface = interior && SHARES_SURFACE;
+        uint stride = interior && !SHARES_SURFACE ? subpixel_count : 1;
         vec3 sum = vec3(0.0);
         uint covered = 0;
-        float footprint_sr = interior ? footprint(pixel) : 0.0;
-        for (uint j = 0; j < subpixel_count; ++j) {
+        for (uint j = 0; j < (shares_surface ? 1 : subpixel_count); ++j) {
             subpixel = pixel * SUBPIXELS + uvec2(j % SUBPIXELS, j / SUBPIXELS);
             uvec2 texel = texelFetch(geometry, ivec2(subpixel), 0).xy;
-            if (!is_covered(texel)) {
-                continue;
+            if (is_covered(texel)) {
+                ++covered;
+                vec2 position = shares_surface ? (vec2(pixel) + 0.5) / vec2(push.size_px)
+                                               : (vec2(subpixel) + 0.5) / vec2(push.size_px * SUBPIXELS);
+                vec3 w_o = -normalize(camera_ray(push.camera, position));
+                vec3 normal = shares_surface ? normalize(normals) : geometry_normal(texel);
+                Surface surface = make_surface(to_environment(normal), to_environment(w_o));
+                surface.normal_variance = normal_variance;
+                sum += estimate(surface, materials[geometry_material(texel)], stride > 1 ? j : 0, stride);
             }
-            ++covered;
-            vec2 position = (vec2(subpixel) + 0.5) / vec2(push.size_px * SUBPIXELS);
-            vec3 w_o = -normalize(camera_ray(push.camera, position));
-            Surface surface = make_surface(to_environment(geometry_normal(texel)), to_environment(w_o));
-            surface.footprint_sr = footprint_sr;
-            Material material = materials[geometry_material(texel)];
-            sum += interior ? estimate(surface, material, j, subpixel_count) : estimate(surface, material, 0, 1);
         }
-        if (!interior) {
+        if (interior) {
+            covered = subpixel_count;
+        } else {
             sum /= float(subpixel_count);
         }
         float coverage = float(covered) / float(subpixel_count);

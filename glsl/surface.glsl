@@ -7,8 +7,8 @@ struct Surface {
     vec3 w_o;
     // Angle between the normal and w_o; above 90 degrees where an interpolated normal faces away.
     float theta_o;
-    // Solid angle by which lookups grow where sub-pixels share one sum over the threads; else 0. See shade.comp.
-    float footprint_sr;
+    // Variance of the normal within the pixel along each axis, in rad^2, where sub-pixels share one sum; else 0.
+    float normal_variance;
 };
 
 // An axis orthogonal to n, for where w_o gives none (Duff et al. 2017).
@@ -30,7 +30,7 @@ Surface make_surface(vec3 n, vec3 w_o) {
     surface.frame = mat3(x, cross(n, x), n);
     surface.w_o = w_o;
     surface.theta_o = atan(sin_theta_o, cos_theta_o);
-    surface.footprint_sr = 0.0;
+    surface.normal_variance = 0.0;
     return surface;
 }
 

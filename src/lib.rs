@@ -39,6 +39,7 @@ pub mod evaluate;
 pub mod graph;
 pub mod method;
 pub mod output;
+pub mod packing;
 pub mod passes;
 pub mod pipeline;
 pub mod prepare;

@@ -2,12 +2,15 @@
 //!
 //! A method is one GLSL file in `glsl/methods/` that defines `estimate`, one CPU twin in `shading/`, and
 //! one line here in each list.
+use crate::threads;
 use crate::vulkan::{Shader, compiled};
 use crate::{Error, Result};
 
 /// A way to estimate the radiance that leaves a surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Method {
+    /// Threads fitted to the BRDF, lookups in a pyramid of known kernels.
+    Fitted,
     /// The paper's threads: equations (2) to (10), box-filtered lookups.
     Paper,
     /// Monte Carlo, uniform over the hemisphere.
@@ -29,6 +32,7 @@ pub enum Method {
 impl Method {
     /// All of them.
     pub const ALL: &[Self] = &[
+        Self::Fitted,
         Self::Paper,
         Self::Uniform,
         Self::Cosine,
@@ -42,6 +46,7 @@ impl Method {
     /// What the command line and scene files call it.
     pub fn name(self) -> &'static str {
         match self {
+            Self::Fitted => "fitted",
             Self::Paper => "paper",
             Self::Uniform => "uniform",
             Self::Cosine => "cosine",
@@ -70,6 +75,7 @@ impl Method {
     /// The reference runs on the CPU.
     pub fn shader(self) -> Result<&'static Shader> {
         match self {
+            Self::Fitted => Ok(&compiled::SHADE_FITTED),
             Self::Paper => Ok(&compiled::SHADE_PAPER),
             Self::Uniform => Ok(&compiled::SHADE_UNIFORM),
             Self::Cosine => Ok(&compiled::SHADE_COSINE),
@@ -81,9 +87,19 @@ impl Method {
         }
     }
 
-    /// Whether it shades by sample threads, which take long to make; the others draw that many samples instead.
-    pub fn uses_threads(self) -> bool {
-        matches!(self, Self::Paper)
+    /// The threads that it shades by; the others draw that many samples instead.
+    pub fn threads(self) -> Option<threads::Kind> {
+        match self {
+            Self::Fitted => Some(threads::Kind::Fitted),
+            Self::Paper => Some(threads::Kind::Paper),
+            _ => None,
+        }
+    }
+
+    /// Whether a pixel within one smooth surface is one sum at its mean normal, not a partition among its sub-pixels:
+    /// SHARES_SURFACE in the shader.
+    pub fn shares_surface(self) -> bool {
+        matches!(self, Self::Fitted)
     }
 
     /// Whether a shader runs it: all but the reference.
@@ -93,6 +109,6 @@ impl Method {
 
     /// Whether the mean over seeds is equation (1), whatever the number of samples.
     pub fn is_unbiased(self) -> bool {
-        !matches!(self, Self::Paper | Self::Filtered | Self::Reference)
+        !matches!(self, Self::Fitted | Self::Paper | Self::Filtered | Self::Reference)
     }
 }

@@ -87,7 +87,7 @@ impl Renderer {
         let geometry_cache = upload_geometry(device, &cache, prepared)?;
         let brdfs = prepared.materials.iter().map(|material| (&material.brdf, material.threads.as_ref()));
         let materials = DeviceMaterials::new(device, *method, brdfs)?;
-        let light = DeviceLight::new(device, *method, environment, *intensity)?;
+        let light = DeviceLight::new(device, &cache, *method, environment, *intensity)?;
         let background = prepared.show_environment.then(|| Background::new(device, &cache, environment, *intensity));
         Ok(Self {
             view: view.clone(),

@@ -4,7 +4,7 @@ use crate::environment::Environment;
 use crate::method::Method;
 use crate::passes::{Object, Sampling, View};
 use crate::scene::{Camera, MaterialSource, Mesh, Scene};
-use crate::threads::{self, CacheState, Observer, ThreadTable};
+use crate::threads::{self, CacheState, Observer, Threads};
 use crate::{Error, Result};
 use glam::{DAffine3, DVec3};
 use std::path::Path;
@@ -43,7 +43,7 @@ pub struct PreparedMaterial {
     /// Its BRDF.
     pub brdf: Brdf,
     /// Its threads, for methods that use them.
-    pub threads: Option<ThreadTable>,
+    pub threads: Option<Threads>,
 }
 
 /// Reads a material: a built-in's name, or a file.
@@ -134,16 +134,16 @@ pub fn prepare(scene: &Scene, cache: Option<&Path>, observer: &dyn Observer) -> 
             MaterialSource::Model { .. } => error.within(format!("material \"{name}\"")),
             _ => error,
         })?;
-        let settings =
-            threads::Settings { count: scene.shading.threads as usize, seed: scene.shading.seed, ..Default::default() };
         let mut material = PreparedMaterial { name: name.to_owned(), brdf, threads: None };
-        if method.uses_threads() {
+        if let Some(kind) = method.threads() {
+            let count = scene.shading.threads as usize;
+            let settings = threads::Settings { kind, count, seed: scene.shading.seed, ..Default::default() };
             let (threads, state, time) = threads::load_or_generate(&material.brdf, &settings, cache, observer)?;
             thread_time += time;
             if state == CacheState::Miss {
                 thread_cache = CacheState::Miss;
             }
-            material.threads = Some(ThreadTable { material: name.to_owned(), ..threads });
+            material.threads = Some(threads.of_material(name));
         }
         materials.push(material);
     }
@@ -166,17 +166,17 @@ pub fn prepare(scene: &Scene, cache: Option<&Path>, observer: &dyn Observer) -> 
 fn check_count(method: Method, count: u32, subpixels: u32) -> Result<()> {
     // A pixel at an edge takes all samples in each sub-pixel. lavapipe silently leaves loops after 65535 iterations in all.
     const MOST_ITERATIONS: u32 = 65_000;
-    let most = match method.uses_threads() {
-        true => threads::MAX_COUNT as u32,
-        false => MOST_ITERATIONS / (subpixels * subpixels),
+    let most = match method.threads() {
+        Some(kind) => kind.max_count() as u32,
+        None => MOST_ITERATIONS / (subpixels * subpixels),
     };
     if count <= most {
         return Ok(());
     }
     let problem = format!("are {count}, more than the {most} of method \"{}\"", method.name());
-    let remedy = match method.uses_threads() {
-        true => format!("use at most {most}"),
-        false => format!("use at most {most}, or fewer sub-pixels than {subpixels} x {subpixels}"),
+    let remedy = match method.threads() {
+        Some(_) => format!("use at most {most}"),
+        None => format!("use at most {most}, or fewer sub-pixels than {subpixels} x {subpixels}"),
     };
     Err(Error::input("threads", problem, remedy))
 }

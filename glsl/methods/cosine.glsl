@@ -2,6 +2,8 @@
 #include "random.glsl"
 #include "environment_map.glsl"
 
+const bool SHARES_SURFACE = false;
+
 vec3 estimate(Surface surface, Material material, uint first, uint stride) {
     vec3 w_o = view_direction(surface);
     vec3 sum = vec3(0.0);

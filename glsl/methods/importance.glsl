@@ -3,6 +3,8 @@
 #include "environment_map.glsl"
 #include "importance_sampling.glsl"
 
+const bool SHARES_SURFACE = false;
+
 vec3 estimate(Surface surface, Material material, uint first, uint stride) {
     vec3 w_o = view_direction(surface);
     SliceRows rows = slice_rows(material, w_o);

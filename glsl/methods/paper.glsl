@@ -4,6 +4,8 @@
 // Twin: src/shading/paper.rs.
 #include "environment_pyramid.glsl"
 
+const bool SHARES_SURFACE = false;
+
 // Row by row of theta_o: the row's albedo, then thread by thread the direction in the shading frame, and the logarithm
 // to base 2 of its pdf in 1/sr. Between rows the logarithm is nearer to the pdf than a linear blend.
 layout(set = 0, binding = 7, std430) readonly buffer Threads {
@@ -22,11 +24,17 @@ struct WeightedSum {
     vec3 radiance;
 };
 
-// Solid angle of the lookup for a sample of this pdf: its share of the hemisphere, 1 / (m p), and the footprint, up to what
+// Solid angle of the lookup for a sample of this pdf: its share of the hemisphere, 1 / (m p), and a footprint, up to what
 // the partition's samples need to fill the hemisphere by themselves.
+//
+// Each sub-pixel looks where its part of the threads points, and the directions of one fill the gaps between those of another,
+// but only where their normals agree. Normals d apart reflect 2 d apart, and gaps stay open once that is half of their
+// width: then each lookup has to stand for the 4 d beside it in either direction. For 2 x 2 sub-pixels the variance is d^2 / 4
+// along each axis, so (4 d)^2 is 64 times that, for each of the other sub-pixels.
 float lookup_solid_angle(Surface surface, Material material, Partition share, float log2_p) {
     float share_sr = exp2(-log2_p) / float(material.thread_count);
-    return min(share_sr + surface.footprint_sr, share_sr * float(share.stride));
+    float footprint_sr = 64.0 * float(share.stride - 1) * surface.normal_variance;
+    return min(share_sr + footprint_sr, share_sr * float(share.stride));
 }
 
 // Adds one term of equation (2), but for 1/m; all directions in `frame`.

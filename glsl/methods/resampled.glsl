@@ -6,6 +6,8 @@
 #include "light_sampling.glsl"
 #include "importance_sampling.glsl"
 
+const bool SHARES_SURFACE = false;
+
 const int CANDIDATES = 8; // even
 
 vec3 estimate(Surface surface, Material material, uint first, uint stride) {

@@ -4,6 +4,7 @@ use super::{cache_folder, material_of, stem};
 use clap::value_parser;
 use std::path::PathBuf;
 use threadlight::Error;
+use threadlight::method::Method;
 use threadlight::output;
 use threadlight::prepare::load_material;
 use threadlight::scene::MaterialSource;
@@ -23,6 +24,9 @@ pub struct Threads {
     /// Number of threads, 1 to 1024.
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = value_parser!(u32).range(1..=MAX_COUNT as i64))]
     count: u32,
+    /// Whose threads: fitted or paper.
+    #[arg(long, value_name = "METHOD", default_value = "fitted")]
+    method: String,
     /// Seed of everything random; the same seed gives the same bytes.
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
@@ -52,19 +56,23 @@ impl Threads {
             _ => self.material.clone(),
         };
         let brdf = load_material(&source)?;
-        let settings = Settings { count: self.count as usize, seed: self.seed, ..Default::default() };
+        let kind = Method::from_name(&self.method)?.threads().ok_or_else(|| {
+            Error::input(format!("method \"{}\"", self.method), "has no threads", "use fitted or paper")
+        })?;
+        let settings = Settings { kind, count: self.count as usize, seed: self.seed, ..Default::default() };
         let progress = Progress::new("threads")?;
         let cache = cache_folder(self.no_cache);
-        let (mut table, state, time) = threads::load_or_generate(&brdf, &settings, cache.as_deref(), &progress)?;
+        let (threads, state, time) = threads::load_or_generate(&brdf, &settings, cache.as_deref(), &progress)?;
         progress.finish();
-        table.material = name;
+        let threads = threads.of_material(&name);
+        let [rows, count] = threads.size();
         let how = if state == CacheState::Hit { "read from the cache" } else { "made" };
-        eprintln!("{} threads x {} rows {how} in {:.2} s", table.count, table.rows, time.as_secs_f64());
+        eprintln!("{count} threads x {rows} rows {how} in {:.2} s", time.as_secs_f64());
         if let Some(path) = &self.output {
-            threads::write(&table, path)?;
+            threads::write(&threads, path)?;
         }
         if let Some(path) = &self.plot {
-            threads::plot(&table, path)?;
+            threads::plot(&threads, path)?;
         }
         Ok(())
     }

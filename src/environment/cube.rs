@@ -41,6 +41,18 @@ pub(super) fn point_of(face: usize, s: f64, t: f64) -> DVec3 {
     }
 }
 
+/// The coordinates of `d` along the axes of s and t of `face` and along the face's own.
+pub(super) fn coordinates(face: usize, d: DVec3) -> DVec3 {
+    match face {
+        0 => DVec3::new(-d.z, -d.y, d.x),
+        1 => DVec3::new(d.z, -d.y, -d.x),
+        2 => DVec3::new(d.x, d.z, d.y),
+        3 => DVec3::new(d.x, -d.z, -d.y),
+        4 => DVec3::new(d.x, -d.y, d.z),
+        _ => DVec3::new(-d.x, -d.y, -d.z),
+    }
+}
+
 /// The solid angle of the texel around the unit `direction`, in sr: 4 / N^2 max(|x|, |y|, |z|)^3, the area on the cube of
 /// half-side 1 times cosine over squared distance. A density: over the sphere its inverse integrates to 6 N^2.
 pub fn texel_solid_angle(face_size: usize, direction: DVec3) -> f64 {

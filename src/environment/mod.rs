@@ -4,16 +4,20 @@ use std::sync::OnceLock;
 
 use glam::DVec3;
 
+use crate::error::Result;
+
 pub mod cube;
 mod light_map;
 mod load;
 mod procedural;
 pub mod pyramid;
+mod vmf_pyramid;
 
 pub use light_map::{Alias, LightMap};
 pub use load::RepairCounts;
 pub use procedural::builtin_names;
 pub use pyramid::Pyramid;
+pub use vmf_pyramid::{Step, VmfPyramid};
 
 /// Radiance from every direction, as a lat-long picture: linear, Rec. 709.
 ///
@@ -34,6 +38,8 @@ pub struct Environment {
     pub repaired: RepairCounts,
     /// Made when first asked for.
     box_filtered: OnceLock<Pyramid>,
+    /// Made when first asked for.
+    vmf_filtered: OnceLock<VmfPyramid>,
 }
 
 impl Environment {
@@ -45,12 +51,24 @@ impl Environment {
         texels: Vec<[f32; 3]>,
         repaired: RepairCounts,
     ) -> Self {
-        Self { name, width, height, texels, repaired, box_filtered: OnceLock::new() }
+        Self { name, width, height, texels, repaired, box_filtered: OnceLock::new(), vmf_filtered: OnceLock::new() }
     }
 
     /// The box-filtered pyramid of this environment, made once for all renderers.
     pub fn box_filtered(&self) -> &Pyramid {
         self.box_filtered.get_or_init(|| Pyramid::box_filtered(self))
+    }
+
+    /// The pyramid of vMF kernels of this environment: by `make` from the box-filtered one, once for all renderers.
+    ///
+    /// # Errors
+    /// Those of `make`.
+    pub fn vmf_filtered(&self, make: impl FnOnce(&Pyramid) -> Result<VmfPyramid>) -> Result<&VmfPyramid> {
+        if let Some(pyramid) = self.vmf_filtered.get() {
+            return Ok(pyramid);
+        }
+        let pyramid = make(self.box_filtered())?;
+        Ok(self.vmf_filtered.get_or_init(|| pyramid))
     }
 
     /// The radiance that arrives from `direction` (any length but 0): bilinear between pixel centres, wrapped in u,

@@ -81,9 +81,9 @@ impl Pyramid {
         self.levels[level].par_iter().map(|&[r, g, b]| [encode(r), encode(g), encode(b), f16::ONE]).collect()
     }
 
-    /// Texels of a level as they are, alpha 1, for the GPU.
-    pub fn texels_rgba32f(&self, level: usize) -> Vec<[f32; 4]> {
-        self.levels[level].par_iter().map(|&[r, g, b]| [r, g, b, 1.0]).collect()
+    /// Texels of a level divided by `scale`, alpha 1, for the GPU.
+    pub fn texels_rgba32f(&self, level: usize, scale: f32) -> Vec<[f32; 4]> {
+        self.levels[level].par_iter().map(|&[r, g, b]| [r / scale, g / scale, b / scale, 1.0]).collect()
     }
 
     /// Bilinear in one level.
@@ -389,7 +389,7 @@ mod tests {
             assert!(encoded[0].is_finite());
             let decoded = encoded[0].to_f32() * pyramid.radiance_scale();
             assert!((decoded - value).abs() <= value / 2048.0);
-            assert_eq!(pyramid.texels_rgba32f(0)[0], [value, value, value, 1.0]);
+            assert_eq!(pyramid.texels_rgba32f(0, 1.0)[0], [value, value, value, 1.0]);
         }
     }
 }

@@ -115,12 +115,16 @@ pub fn run(
     }
     for (material_name, source) in &sweep.materials {
         let brdf = load_material(source)?;
-        let mut tables = vec![None; sweep.counts.len()];
-        if sweep.methods.iter().any(|method| method.uses_threads()) {
-            for (table, &count) in tables.iter_mut().zip(&sweep.counts) {
-                let settings = threads::Settings { count: count as usize, seed: sweep.seed, ..Default::default() };
-                let cache = sweep.cache.as_deref();
-                *table = Some(threads::load_or_generate(&brdf, &settings, cache, &OnlyCancels(observer))?.0);
+        let mut tables = Vec::new();
+        for &method in &sweep.methods {
+            for &count in &sweep.counts {
+                let table = |kind| -> Result<_> {
+                    let settings =
+                        threads::Settings { kind, count: count as usize, seed: sweep.seed, ..Default::default() };
+                    let cache = sweep.cache.as_deref();
+                    Ok(threads::load_or_generate(&brdf, &settings, cache, &OnlyCancels(observer))?.0)
+                };
+                tables.push(method.threads().map(table).transpose()?);
             }
         }
         let mut material = vec![PreparedMaterial { name: material_name.clone(), brdf, threads: None }];
@@ -135,9 +139,9 @@ pub fn run(
                 let truth = reference(prepared)?;
                 measured.reference_error = measured.reference_error.max(truth.error_estimate);
                 let truth = comparable(&truth.radiance);
-                for &method in &sweep.methods {
+                for (&method, tables) in sweep.methods.iter().zip(tables.chunks(sweep.counts.len())) {
                     prepared.method = method;
-                    for (&count, table) in sweep.counts.iter().zip(&tables) {
+                    for (&count, table) in sweep.counts.iter().zip(tables) {
                         if observer.cancelled() {
                             return Err(Error::Cancelled);
                         }

@@ -10,6 +10,7 @@ mod readback;
 mod shade;
 mod tone_map;
 mod view;
+mod vmf_pyramid;
 
 pub use background::{Background, background};
 pub use classify::{Classify, Counters, SMOOTH_DEG, Tiles, classify};
@@ -19,6 +20,7 @@ pub use readback::{read_buffer, read_image};
 pub use shade::{DeviceLight, DeviceMaterials, Sampling, Shade, Shaded, shade};
 pub use tone_map::{ToneMap, tone_map};
 pub use view::{CameraRays, View};
+pub use vmf_pyramid::vmf_pyramid;
 
 use crate::graph::{Graph, Work};
 

@@ -1,11 +1,11 @@
 //! Pass 2 of the paper (section 4.2): the radiance of every listed pixel, by its partition of the sample threads.
 use super::background::check_map_size;
-use super::{CameraRays, Counters, FrameGraph, Tiles, View, clear};
+use super::{CameraRays, Counters, FrameGraph, Tiles, View, clear, vmf_pyramid};
 use crate::brdf::Brdf;
-use crate::environment::{Environment, LightMap, Pyramid};
+use crate::environment::{Environment, LightMap, Pyramid, VmfPyramid};
 use crate::graph::{self, Access, BufferDesc, Image};
 use crate::method::Method;
-use crate::threads::{Sample, SliceTable, ThreadTable};
+use crate::threads::{Sample, SliceTable, Threads};
 use crate::vulkan::{
     self, Bindings, Buffer, ComputePipeline, Device, Groups, ImageKind, ImageShape, PipelineCache, Sampler, SamplerKind,
 };
@@ -46,11 +46,11 @@ impl DeviceMaterials {
     pub fn new<'m>(
         device: &Arc<Device>,
         method: Method,
-        materials: impl IntoIterator<Item = (&'m Brdf, Option<&'m ThreadTable>)>,
+        materials: impl IntoIterator<Item = (&'m Brdf, Option<&'m Threads>)>,
     ) -> Result<Self> {
         let use_slices = method.shader()?.declares("Slices")?;
         let mut records = Vec::new();
-        let mut threads: Vec<[f32; 4]> = Vec::new();
+        let mut threads: Vec<u32> = Vec::new();
         let mut slices: Vec<f32> = Vec::new();
         let mut tables = TableAtlas::default();
         let mut models_used = 0;
@@ -61,21 +61,18 @@ impl DeviceMaterials {
                 parameters[..2].copy_from_slice(&tables.add(device, table.texels())?.map(|texels| texels as f32));
             }
             models_used |= 1 << brdf.model_index();
+            let [row_count, thread_count] = thread_table.map_or([0, 0], Threads::size);
             records.push(MaterialRecord {
                 parameters,
                 model: brdf.model_index(),
-                first_thread: threads.len() as u32,
-                thread_count: thread_table.map_or(0, |table| table.count as u32),
-                row_count: thread_table.map_or(0, |table| table.rows as u32),
+                first_thread: (threads.len() / words_a_thread(thread_table)) as u32,
+                thread_count: thread_count as u32,
+                row_count: row_count as u32,
                 first_slice: slices.len() as u32,
                 padding: [0; 3],
             });
             if let Some(table) = thread_table {
-                for (row, albedo) in table.albedo.iter().enumerate() {
-                    threads.push([albedo[0], albedo[1], albedo[2], 0.0]);
-                    let thread = |sample: &Sample| sample.direction().as_vec3().extend(sample.p.log2()).to_array();
-                    threads.extend(table.row(row).iter().map(thread));
-                }
+                append_threads(&mut threads, table);
             }
             if use_slices {
                 slices.extend(SliceTable::new(brdf).cdfs);
@@ -92,6 +89,30 @@ impl DeviceMaterials {
             table_sampler: Sampler::new(device, "brdf tables", SamplerKind::WrappedLinear)?,
             models_used,
         })
+    }
+}
+
+/// Words of an element of the buffer of threads, as their shader declares it: a vec4, or a word.
+fn words_a_thread(threads: Option<&Threads>) -> usize {
+    if matches!(threads, Some(Threads::Paper(_))) { 4 } else { 1 }
+}
+
+/// Appends `threads` as their shader reads them: glsl/methods/paper.glsl, glsl/methods/fitted.glsl.
+fn append_threads(words: &mut Vec<u32>, threads: &Threads) {
+    match threads {
+        Threads::Fitted(table) => {
+            for (row, cosine_part) in table.cosine_part.iter().enumerate() {
+                words.extend(cosine_part.map(f32::to_bits));
+                words.extend(table.row(row).iter().flat_map(|kernel| kernel.0));
+            }
+        }
+        Threads::Paper(table) => {
+            for (row, [red, green, blue]) in table.albedo.iter().copied().enumerate() {
+                words.extend([red, green, blue, 0.0].map(f32::to_bits));
+                let thread = |sample: &Sample| sample.direction().as_vec3().extend(sample.p.log2()).to_array();
+                words.extend(table.row(row).iter().flat_map(thread).map(f32::to_bits));
+            }
+        }
     }
 }
 
@@ -151,6 +172,7 @@ impl<'a> TableAtlas<'a> {
 /// What a method looks up of the environment, on the device.
 pub struct DeviceLight {
     pyramid: Option<DevicePyramid>,
+    irradiance: Option<DevicePyramid>,
     map: Option<vulkan::Image>,
     aliases: Option<Buffer>,
     intensity: f32,
@@ -170,11 +192,26 @@ impl DeviceLight {
     ///
     /// # Errors
     /// No device memory left, or a map wider or higher than the device's images can be.
-    pub fn new(device: &Arc<Device>, method: Method, environment: &Environment, intensity: f64) -> Result<Self> {
+    pub fn new(
+        device: &Arc<Device>,
+        cache: &PipelineCache,
+        method: Method,
+        environment: &Environment,
+        intensity: f64,
+    ) -> Result<Self> {
         let shader = method.shader()?;
-        let pyramid = shader.declares("environment_pyramid")?;
-        let pyramid = pyramid.then(|| DevicePyramid::new(device, environment.box_filtered())).transpose()?;
-        let mut light = Self { pyramid, map: None, aliases: None, intensity: intensity as f32 };
+        let mut light = Self { pyramid: None, irradiance: None, map: None, aliases: None, intensity: intensity as f32 };
+        if shader.declares("irradiance_map")? {
+            let VmfPyramid { levels, irradiance } =
+                environment.vmf_filtered(|source| vmf_pyramid(device, cache, source))?;
+            let scale = levels.radiance_scale();
+            light.pyramid = Some(DevicePyramid::new(device, "environment pyramid", levels, scale)?);
+            light.irradiance = Some(DevicePyramid::new(device, "irradiance map", irradiance, scale)?);
+        } else if shader.declares("environment_pyramid")? {
+            let pyramid = environment.box_filtered();
+            let scale = pyramid.radiance_scale();
+            light.pyramid = Some(DevicePyramid::new(device, "environment pyramid", pyramid, scale)?);
+        }
         if shader.declares("environment_map")? {
             check_map_size(device, environment, "scale it down, or use --method filtered")?;
             let map = LightMap::new(environment);
@@ -192,14 +229,13 @@ impl DeviceLight {
 }
 
 impl DevicePyramid {
-    /// Uploads `pyramid`, as half floats where they hold it.
-    fn new(device: &Arc<Device>, pyramid: &Pyramid) -> Result<Self> {
+    /// Uploads `pyramid`, as half floats of radiance over `scale` where they hold it.
+    fn new(device: &Arc<Device>, name: &str, pyramid: &Pyramid, scale: f32) -> Result<Self> {
         let single = vk::Format::R32G32B32A32_SFLOAT;
         let use_single = !pyramid.fits_half() && device.filters_linearly(single);
-        let scale = if use_single { 1.0 } else { pyramid.radiance_scale() };
         let level = |level| -> Vec<u8> {
             if use_single {
-                bytemuck::cast_slice(&pyramid.texels_rgba32f(level)).to_vec()
+                bytemuck::cast_slice(&pyramid.texels_rgba32f(level, scale)).to_vec()
             } else {
                 bytemuck::cast_slice(&pyramid.texels_rgba16f(level, scale)).to_vec()
             }
@@ -213,8 +249,8 @@ impl DevicePyramid {
             kind: ImageKind::Cube,
         };
         Ok(Self {
-            image: vulkan::Image::with_texels(device, "environment pyramid", shape, &levels)?,
-            sampler: Sampler::new(device, "environment pyramid", SamplerKind::Trilinear)?,
+            image: vulkan::Image::with_texels(device, name, shape, &levels)?,
+            sampler: Sampler::new(device, name, SamplerKind::Trilinear)?,
             face_size,
             scale,
         })
@@ -315,6 +351,9 @@ pub fn shade<'a>(
         // The rest as the method declares it.
         if let Some(pyramid) = &light.pyramid {
             bindings = bindings.sampled("environment_pyramid", &pyramid.image, &pyramid.sampler);
+        }
+        if let Some(map) = &light.irradiance {
+            bindings = bindings.sampled("irradiance_map", &map.image, &map.sampler);
         }
         if let Some(map) = &light.map {
             bindings = bindings.image("environment_map", map);

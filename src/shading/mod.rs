@@ -3,8 +3,9 @@
 //! It starts from the texels of the geometry cache, so that the two can be compared pixel by pixel. BRDFs are evaluated
 //! in double precision; everything else follows the shader line by line.
 use crate::Result;
-use crate::environment::{Alias, LightMap, Pyramid};
+use crate::environment::{Alias, LightMap, Pyramid, VmfPyramid};
 use crate::method::Method;
+use crate::packing::{octahedral_decode, unpack_snorm_2x16};
 use crate::passes::SMOOTH_DEG;
 use crate::prepare::{Prepared, PreparedMaterial};
 use crate::threads::SliceTable;
@@ -14,6 +15,7 @@ use random::random_bits;
 mod cosine;
 mod environment;
 mod filtered;
+mod fitted;
 mod importance;
 mod importance_sampling;
 mod light_sampling;
@@ -31,8 +33,8 @@ pub struct Surface {
     pub w_o: Vec3,
     /// Angle between the normal and w_o in radians; above 90 degrees where an interpolated normal faces away.
     pub theta_o: f32,
-    /// Solid angle by which lookups grow where sub-pixels share one sum over the threads; else 0.
-    pub footprint_sr: f32,
+    /// Variance of the normal within the pixel along each axis, in rad^2, where sub-pixels share one sum; else 0.
+    pub normal_variance: f32,
 }
 
 impl Surface {
@@ -47,7 +49,7 @@ impl Surface {
             frame: Mat3::from_cols(x, n.cross(x), n),
             w_o,
             theta_o: sin_theta_o.atan2(cos_theta_o),
-            footprint_sr: 0.0,
+            normal_variance: 0.0,
         }
     }
 
@@ -65,30 +67,10 @@ fn any_tangent(n: Vec3) -> Vec3 {
     Vec3::new(1.0 + s * n.x * n.x * a, s * n.x * n.y * a, -s * n.x)
 }
 
-/// Octahedral map of a unit vector to [-1, 1]^2. Twin of `octahedral_encode` in glsl/packing.glsl.
-pub fn octahedral_encode(n: Vec3) -> Vec2 {
-    let n = n / (n.x.abs() + n.y.abs() + n.z.abs());
-    let sign = |x: f32| if x >= 0.0 { 1.0 } else { -1.0 };
-    if n.z >= 0.0 {
-        Vec2::new(n.x, n.y)
-    } else {
-        Vec2::new((1.0 - n.y.abs()) * sign(n.x), (1.0 - n.x.abs()) * sign(n.y))
-    }
-}
-
-/// The unit vector back. Twin of `octahedral_decode`.
-pub fn octahedral_decode(e: Vec2) -> Vec3 {
-    let z = 1.0 - e.x.abs() - e.y.abs();
-    let fold = (-z).max(0.0);
-    let unfold = |x: f32| if x >= 0.0 { x - fold } else { x + fold };
-    Vec3::new(unfold(e.x), unfold(e.y), z).normalize()
-}
-
 /// Normal and material index of a texel of the geometry cache; `None` for the background.
 /// Twin of `geometry_normal` and `geometry_material`.
 pub fn unpack_geometry(texel: UVec2) -> Option<(Vec3, usize)> {
-    let unpack = |bits: u32| (f32::from(bits as u16 as i16) / 32767.0).clamp(-1.0, 1.0);
-    let normal = octahedral_decode(Vec2::new(unpack(texel.x), unpack(texel.x >> 16)));
+    let normal = octahedral_decode(unpack_snorm_2x16(texel.x));
     (texel.y != 0).then(|| (normal, texel.y as usize - 1))
 }
 
@@ -102,18 +84,16 @@ pub fn is_interior(texels: &[UVec2]) -> bool {
     })
 }
 
-/// Solid angle in sr by which lookups grow in a pixel of these sub-pixels. Twin of `footprint` in glsl/shade.comp, which
-/// derives it.
-fn footprint(texels: &[UVec2]) -> f32 {
-    let sum: Vec3 = texels.iter().filter_map(|texel| unpack_geometry(*texel)).map(|(normal, _)| normal).sum();
-    let count = texels.len() as f32;
-    (64.0 * (count - 1.0) * (1.0 - sum.length() / count)).max(0.0)
+/// The sum of the normals of these sub-pixels. Twin of `normal_sum` in glsl/shade.comp.
+fn normal_sum(texels: &[UVec2]) -> Vec3 {
+    texels.iter().filter_map(|texel| unpack_geometry(*texel)).map(|(normal, _)| normal).sum()
 }
 
 /// The CPU twin of pass 2 for one scene.
 pub struct Twin<'a> {
     prepared: &'a Prepared,
     pyramid: Option<&'a Pyramid>,
+    vmf_pyramid: Option<&'a VmfPyramid>,
     map: Option<LightMap>,
     aliases: Vec<Alias>,
     /// One for each material, for methods that draw by them.
@@ -128,12 +108,16 @@ impl<'a> Twin<'a> {
     pub fn new(prepared: &'a Prepared) -> Result<Self> {
         let shader = prepared.method.shader()?;
         let environment = &prepared.environment;
-        let pyramid = shader.declares("environment_pyramid")?.then(|| environment.box_filtered());
+        let blurred = shader.declares("irradiance_map")?;
+        let vmf_pyramid =
+            blurred.then(|| environment.vmf_filtered(|source| Ok(VmfPyramid::new(source)))).transpose()?;
+        let pyramid = (shader.declares("environment_pyramid")? && !blurred).then(|| environment.box_filtered());
         let map = shader.declares("environment_map")?.then(|| LightMap::new(environment));
         let aliases = map.as_ref().filter(|_| shader.declares("LightAliases").unwrap_or(false));
         let mut twin = Self {
             prepared,
             pyramid,
+            vmf_pyramid,
             aliases: aliases.map(LightMap::aliases).unwrap_or_default(),
             map,
             slices: vec![],
@@ -153,17 +137,29 @@ impl<'a> Twin<'a> {
         let [cos, sin] = view.rotation();
         let to_environment = |d: Vec3| Vec3::new(cos * d.x - sin * d.z, d.y, sin * d.x + cos * d.z);
         let interior = is_interior(texels);
-        let footprint_sr = if interior { footprint(texels) } else { 0.0 };
+        let normals = normal_sum(texels);
+        let normal_variance = if interior { (1.0 - normals.length() / texels.len() as f32).max(0.0) } else { 0.0 };
+        let surface_at = |position: Vec2, normal: Vec3| {
+            let w_o = -rays.ray(position).normalize();
+            Surface { normal_variance, ..Surface::new(to_environment(normal), to_environment(w_o)) }
+        };
         let mut sum = Vec3::ZERO;
         let mut covered = 0;
         for (j, texel) in texels.iter().enumerate() {
             let Some((normal, material)) = unpack_geometry(*texel) else { continue };
             covered += 1;
             let subpixel = pixel * view.subpixels + UVec2::new(j as u32 % view.subpixels, j as u32 / view.subpixels);
-            let w_o = -rays.ray((subpixel.as_vec2() + 0.5) / size.as_vec2()).normalize();
-            let surface = Surface { footprint_sr, ..Surface::new(to_environment(normal), to_environment(w_o)) };
-            let (first, stride) = if interior { (j as u32, texels.len()) } else { (0, 1) };
             let axis = to_environment(rays.right());
+            if interior && self.prepared.method.shares_surface() {
+                if j == 0 {
+                    let position = (pixel.as_vec2() + 0.5) / UVec2::new(view.width, view.height).as_vec2();
+                    let surface = surface_at(position, normals.normalize());
+                    sum = Point { twin: self, surface, axis, material, subpixel, first: 0, stride: 1 }.estimate();
+                }
+                continue;
+            }
+            let surface = surface_at((subpixel.as_vec2() + 0.5) / size.as_vec2(), normal);
+            let (first, stride) = if interior { (j as u32, texels.len()) } else { (0, 1) };
             sum += Point { twin: self, surface, axis, material, subpixel, first, stride }.estimate();
         }
         if !interior {
@@ -189,6 +185,7 @@ struct Point<'a> {
 impl Point<'_> {
     fn estimate(&self) -> Vec3 {
         match self.twin.prepared.method {
+            Method::Fitted => fitted::estimate(self),
             Method::Paper => paper::estimate(self),
             Method::Uniform => uniform::estimate(self),
             Method::Cosine => cosine::estimate(self),

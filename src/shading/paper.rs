@@ -4,7 +4,7 @@ use std::f32::consts::FRAC_PI_2;
 use glam::{Mat3, Vec3, Vec4};
 
 use super::{Point, Surface, any_tangent};
-use crate::threads::ThreadTable;
+use crate::threads::{ThreadTable, Threads};
 
 /// A frame at `n` that does not turn with w_o. Twin of `fixed_frame` in glsl/surface.glsl.
 fn fixed_frame(n: Vec3, axis: Vec3) -> Mat3 {
@@ -50,7 +50,7 @@ struct Paper<'a> {
 /// # Panics
 /// A scene prepared for another method has no threads.
 pub(super) fn estimate(point: &Point) -> Vec3 {
-    let threads = point.material().threads.as_ref().expect("the paper's method has threads");
+    let Some(Threads::Paper(threads)) = &point.material().threads else { panic!("the paper's method has its threads") };
     Paper { point, threads }.estimate(&point.surface, point.axis)
 }
 
@@ -74,7 +74,8 @@ impl Paper<'_> {
 
     fn lookup_solid_angle(&self, log2_p: f32) -> f32 {
         let share_sr = (-log2_p).exp2() / self.threads.count as f32;
-        (share_sr + self.point.surface.footprint_sr).min(share_sr * self.point.stride as f32)
+        let footprint_sr = 64.0 * (self.point.stride - 1) as f32 * self.point.surface.normal_variance;
+        (share_sr + footprint_sr).min(share_sr * self.point.stride as f32)
     }
 
     fn add_term(&self, sum: &mut WeightedSum, frame: Mat3, w_i: Vec3, w_o: Vec3, log2_p: f32) {

@@ -2,7 +2,7 @@
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use super::{FORMAT_VERSION, Observer, Settings, ThreadTable, file, generate};
+use super::{FORMAT_VERSION, Observer, Settings, Threads, file, generate};
 use crate::brdf::Brdf;
 use crate::error::Result;
 
@@ -32,13 +32,13 @@ pub fn load_or_generate(
     settings: &Settings,
     folder: Option<&Path>,
     observer: &dyn Observer,
-) -> Result<(ThreadTable, CacheState, Duration)> {
+) -> Result<(Threads, CacheState, Duration)> {
     let start = Instant::now();
     let path = folder.map(|folder| folder.join(format!("{}.threads", key(brdf, settings))));
     if let Some(path) = path.as_deref().filter(|path| path.exists()) {
         match file::read(path) {
-            Ok(table) if (table.count, table.rows, table.seed) == (settings.count, settings.rows, settings.seed) => {
-                return Ok((table, CacheState::Hit, start.elapsed()));
+            Ok(threads) if (threads.kind(), threads.size()) == (settings.kind, [settings.rows, settings.count]) => {
+                return Ok((threads, CacheState::Hit, start.elapsed()));
             }
             Ok(_) => tracing::warn!("{}: cached threads are of another kind; generating them again", path.display()),
             Err(error) => tracing::warn!("cached threads are useless: {error}"),
@@ -60,6 +60,7 @@ pub fn load_or_generate(
 fn key(brdf: &Brdf, settings: &Settings) -> blake3::Hash {
     let mut hasher = blake3::Hasher::new();
     hasher.update(brdf.fingerprint().as_bytes());
+    hasher.update(settings.kind.name().as_bytes());
     for number in [settings.count as u64, settings.rows as u64, settings.seed, u64::from(FORMAT_VERSION)] {
         hasher.update(&number.to_le_bytes());
     }
@@ -68,15 +69,16 @@ fn key(brdf: &Brdf, settings: &Settings) -> blake3::Hash {
 
 #[cfg(test)]
 mod tests {
+    use super::super::Kind;
     use super::*;
 
-    const SETTINGS: Settings = Settings { count: 4, rows: 3, seed: 1 };
+    const SETTINGS: Settings = Settings { kind: Kind::Paper, count: 4, rows: 3, seed: 1 };
 
     fn clay() -> Brdf {
         Brdf::builtin("clay").unwrap()
     }
 
-    fn fetch(brdf: &Brdf, settings: &Settings, folder: &Path) -> (ThreadTable, CacheState) {
+    fn fetch(brdf: &Brdf, settings: &Settings, folder: &Path) -> (Threads, CacheState) {
         let (table, state, _) = load_or_generate(brdf, settings, Some(folder), &()).unwrap();
         (table, state)
     }
@@ -88,9 +90,12 @@ mod tests {
         let (table, state) = fetch(&clay(), &SETTINGS, &folder);
         assert_eq!(state, CacheState::Miss);
         assert_eq!(fetch(&clay(), &SETTINGS, &folder), (table, CacheState::Hit));
-        for settings in
-            [Settings { count: 5, ..SETTINGS }, Settings { rows: 4, ..SETTINGS }, Settings { seed: 2, ..SETTINGS }]
-        {
+        for settings in [
+            Settings { kind: Kind::Fitted, ..SETTINGS },
+            Settings { count: 5, ..SETTINGS },
+            Settings { rows: 4, ..SETTINGS },
+            Settings { seed: 2, ..SETTINGS },
+        ] {
             assert_eq!(fetch(&clay(), &settings, &folder).1, CacheState::Miss);
         }
         assert_eq!(fetch(&Brdf::builtin("gold").unwrap(), &SETTINGS, &folder).1, CacheState::Miss);

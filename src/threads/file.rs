@@ -1,30 +1,41 @@
-//! The `.threads` file: a thread table on disk.
+//! The `.threads` file: threads on disk.
 //!
 //! Little-endian throughout:
 //!
 //! | bytes | content |
 //! |---|---|
 //! | 8 | magic `THREADS\0` |
-//! | 4 | u32 format version, now 2 |
+//! | 4 | u32 format version, now 3 |
 //! | 4 | u32 length H of the header |
-//! | H | header, JSON: `method` ("paper"), `material`, `count`, `rows`, `seed` |
-//! | 12 rows | albedo of each row as three f32, linear Rec. 709 |
-//! | 12 rows count | samples as three f32 theta, phi (radians), p (1/sr); thread k of row r is sample r count + k |
+//! | H | header, JSON: `method` ("fitted" or "paper"), `material`, `count`, `rows`, `seed` |
+//! | ... | the rows, then the threads, see below |
 //! | 32 | BLAKE3 digest of everything before |
 //!
-//! Row r is for the view angle theta_o = r 90 deg / rows; theta and phi are in the frame whose z is the normal and in which
-//! w_o = (sin theta_o, 0, cos theta_o).
+//! Row r is for the view angle theta_o = r 90 deg / rows, in the frame whose z is the normal and in which w_o = (sin theta_o, 0,
+//! cos theta_o). Colours are linear Rec. 709. Thread k of row r is the (r count + k)-th.
+//!
+//! | method | a row | a thread |
+//! |---|---|---|
+//! | `paper` | albedo, 3 f32 | theta, phi (radians), p (1/sr), 3 f32 |
+//! | `fitted` | weight of the irradiance over pi, 3 f32; expected relative error, f32 | 3 words, below |
+//!
+//! The words of a fitted thread: its direction, octahedral, x and y as 16-bit signed normalised numbers, x in the low half; level and
+//! red weight as half floats, level in the low half; green and blue weight as half floats, green in the low half. The level says
+//! by which von Mises-Fisher kernel the environment is to be blurred: of width 2^level / 256 radians if it is whole, and
+//! otherwise by the linear blend of the two kernels of whole levels beside it.
 use std::f32::consts::FRAC_PI_2;
 use std::io::Write;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::{Sample, ThreadTable};
+use super::fitted::kernel::WIDEST_LEVEL;
+use super::fitted::{FittedTable, PackedKernel, UnpackedKernel};
+use super::{Kind, Sample, ThreadTable, Threads};
 use crate::error::{Error, Result};
 
 /// Version of the file format and of the threads in it: to be raised when either changes, since caches depend on it.
-pub const FORMAT_VERSION: u32 = 2;
+pub const FORMAT_VERSION: u32 = 3;
 
 const MAGIC: &[u8; 8] = b"THREADS\0";
 const DIGEST_BYTES: usize = blake3::OUT_LEN;
@@ -38,39 +49,53 @@ struct Header {
     seed: u64,
 }
 
-/// Writes `table` to `path`, whole or not at all.
-pub fn write(table: &ThreadTable, path: &Path) -> Result<()> {
+/// Writes `threads` to `path`, whole or not at all.
+pub fn write(threads: &Threads, path: &Path) -> Result<()> {
     let unwritable = |cause: std::io::Error| Error::unwritable(path, cause);
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let mut file = tempfile::NamedTempFile::new_in(folder).map_err(unwritable)?;
-    file.write_all(&encode(table)).map_err(unwritable)?;
+    file.write_all(&encode(threads)).map_err(unwritable)?;
     file.persist(path).map_err(|error| unwritable(error.error))?;
     Ok(())
 }
 
-/// Reads a table back. Errors: unreadable, not a thread file, of another version, damaged.
-pub fn read(path: &Path) -> Result<ThreadTable> {
+/// Reads threads back. Errors: unreadable, not a thread file, of another version, damaged.
+pub fn read(path: &Path) -> Result<Threads> {
     let bytes = std::fs::read(path).map_err(|cause| Error::unreadable(path, cause))?;
     decode(&bytes).map_err(|problem| Error::in_file(path, problem, "generate it again"))
 }
 
-fn encode(table: &ThreadTable) -> Vec<u8> {
-    let (count, rows, seed) = (table.count, table.rows, table.seed);
-    let header = Header { method: "paper".into(), material: table.material.clone(), count, rows, seed };
-    let header = serde_json::to_vec(&header).expect("a header of strings and numbers is always JSON");
+fn encode(threads: &Threads) -> Vec<u8> {
+    let [rows, count] = threads.size();
+    let method = threads.kind().name().to_owned();
+    let (material, seed) = match threads {
+        Threads::Fitted(table) => (table.material.clone(), 0),
+        Threads::Paper(table) => (table.material.clone(), table.seed),
+    };
+    let header = serde_json::to_vec(&Header { method, material, count, rows, seed });
+    let header = header.expect("a header of strings and numbers is always JSON");
     let mut bytes = MAGIC.to_vec();
     bytes.extend(FORMAT_VERSION.to_le_bytes());
     bytes.extend((header.len() as u32).to_le_bytes());
     bytes.extend(header);
-    bytes.extend_from_slice(bytemuck::cast_slice(&to_little_endian(table.albedo.as_flattened())));
-    let samples = table.samples.iter().flat_map(|s| [s.theta, s.phi, s.p]).collect::<Vec<_>>();
-    bytes.extend_from_slice(bytemuck::cast_slice(&to_little_endian(&samples)));
+    let words: Vec<u32> = match threads {
+        Threads::Fitted(table) => {
+            let rows = table.cosine_part.iter().zip(&table.relative_error);
+            let rows = rows.flat_map(|([red, green, blue], error)| [*red, *green, *blue, *error]).map(f32::to_bits);
+            rows.chain(table.kernels.iter().flat_map(|kernel| kernel.0)).collect()
+        }
+        Threads::Paper(table) => {
+            let samples = table.samples.iter().flat_map(|s| [s.theta, s.phi, s.p]);
+            table.albedo.as_flattened().iter().copied().chain(samples).map(f32::to_bits).collect()
+        }
+    };
+    bytes.extend(words.iter().flat_map(|word| word.to_le_bytes()));
     let digest = blake3::hash(&bytes);
     bytes.extend(digest.as_bytes());
     bytes
 }
 
-fn decode(bytes: &[u8]) -> Result<ThreadTable, String> {
+fn decode(bytes: &[u8]) -> Result<Threads, String> {
     let rest = bytes.strip_prefix(MAGIC).ok_or("is not a thread file")?;
     let (&version, rest) = rest.split_first_chunk().ok_or("is cut short")?;
     let version = u32::from_le_bytes(version);
@@ -85,15 +110,57 @@ fn decode(bytes: &[u8]) -> Result<ThreadTable, String> {
     let (&length, rest) = rest.split_first_chunk().ok_or("is cut short")?;
     let (header, payload) = rest.split_at_checked(u32::from_le_bytes(length) as usize).ok_or("is cut short")?;
     let header: Header = serde_json::from_slice(header).map_err(|error| format!("has a bad header ({error})"))?;
-    // Of three numbers each: a row's albedo, and its samples.
-    let expected = header.count.checked_add(1).and_then(|per_row| per_row.checked_mul(header.rows)?.checked_mul(12));
-    if header.method != "paper" || header.count == 0 || header.rows == 0 || expected != Some(payload.len()) {
+    let Header { method, material, count, rows, seed } = header;
+    let kind = [Kind::Fitted, Kind::Paper].into_iter().find(|kind| kind.name() == method);
+    let kind = kind.ok_or_else(|| format!("holds threads of the unknown method {method:?}"))?;
+    let words_a_row = match kind {
+        Kind::Fitted => 4,
+        Kind::Paper => 3,
+    };
+    let per_row = count.checked_mul(3).and_then(|words| words.checked_add(words_a_row));
+    let expected = per_row.and_then(|words| words.checked_mul(rows)?.checked_mul(4));
+    if count == 0 || rows == 0 || expected != Some(payload.len()) {
         return Err("has a header that does not fit its content".into());
     }
-    let values = payload.as_chunks().0.iter().map(|&value| f32::from_le_bytes(value)).collect::<Vec<f32>>();
-    let (albedo, samples) = values.as_chunks().0.split_at(header.rows);
-    let samples: Vec<Sample> = samples.iter().map(|&[theta, phi, p]| Sample { theta, phi, p }).collect();
-    // A foreign writer can get the checksum right and a number wrong.
+    let words: Vec<u32> = payload.as_chunks().0.iter().map(|&word| u32::from_le_bytes(word)).collect();
+    let (of_rows, of_threads) = words.split_at(words_a_row * rows);
+    match kind {
+        Kind::Fitted => fitted_threads(of_rows, of_threads).map(|table| FittedTable { rows, count, material, ..table }),
+        Kind::Paper => {
+            return paper_threads(of_rows, of_threads)
+                .map(|table| Threads::Paper(ThreadTable { rows, count, material, seed, ..table }));
+        }
+    }
+    .map(Threads::Fitted)
+}
+
+/// Fitted threads of such words. A foreign writer can get the checksum right and a number wrong.
+fn fitted_threads(of_rows: &[u32], of_threads: &[u32]) -> Result<FittedTable, String> {
+    let (of_rows, kernels) = (of_rows.as_chunks::<4>().0, of_threads.as_chunks().0);
+    let kernels: Vec<_> = kernels.iter().copied().map(PackedKernel).collect();
+    let cosine_part: Vec<[f32; 3]> = of_rows.iter().map(|&[r, g, b, _]| [r, g, b].map(f32::from_bits)).collect();
+    let relative_error: Vec<f32> = of_rows.iter().map(|&[.., error]| f32::from_bits(error)).collect();
+    if !cosine_part.iter().flatten().chain(&relative_error).all(|value| value.is_finite()) {
+        return Err("holds a row that is not of finite numbers".into());
+    }
+    let is_usable = |kernel: &PackedKernel| {
+        let UnpackedKernel { level, weight, .. } = kernel.unpack();
+        (0.0..=WIDEST_LEVEL as f32).contains(&level) && weight.min_element() >= 0.0 && weight.is_finite()
+    };
+    if !kernels.iter().all(is_usable) {
+        return Err("holds a thread whose level or weight is none".into());
+    }
+    Ok(FittedTable { rows: 0, count: 0, material: String::new(), cosine_part, relative_error, kernels })
+}
+
+/// The paper's threads of such words.
+fn paper_threads(of_rows: &[u32], of_threads: &[u32]) -> Result<ThreadTable, String> {
+    let numbers = |words: &[u32]| -> Vec<[f32; 3]> {
+        words.as_chunks().0.iter().map(|words: &[u32; 3]| words.map(f32::from_bits)).collect()
+    };
+    let albedo = numbers(of_rows);
+    let samples: Vec<Sample> =
+        numbers(of_threads).into_iter().map(|[theta, phi, p]| Sample { theta, phi, p }).collect();
     let is_usable =
         |s: &Sample| (0.0..FRAC_PI_2).contains(&s.theta) && s.phi.is_finite() && s.p > 0.0 && s.p.is_finite();
     if !samples.iter().all(is_usable) {
@@ -102,12 +169,7 @@ fn decode(bytes: &[u8]) -> Result<ThreadTable, String> {
     if !albedo.as_flattened().iter().all(|value| (0.0..=f32::MAX).contains(value)) {
         return Err("holds an albedo that is none".into());
     }
-    let Header { material, count, rows, seed, .. } = header;
-    Ok(ThreadTable { rows, count, seed, material, albedo: albedo.to_vec(), samples })
-}
-
-fn to_little_endian(values: &[f32]) -> Vec<[u8; 4]> {
-    values.iter().map(|value| value.to_le_bytes()).collect()
+    Ok(ThreadTable { rows: 0, count: 0, seed: 0, material: String::new(), albedo, samples })
 }
 
 #[cfg(test)]
@@ -119,19 +181,32 @@ mod tests {
         ThreadTable { rows: 3, count: 2, seed: 9, material: "a \"name\"".into(), albedo: vec![[0.5; 3]; 3], samples }
     }
 
+    fn fitted() -> Threads {
+        Threads::Fitted(FittedTable {
+            rows: 2,
+            count: 1,
+            material: "b".into(),
+            cosine_part: vec![[0.1, 0.2, -0.01]; 2],
+            relative_error: vec![1e-3; 2],
+            kernels: vec![PackedKernel([0x1234_5678, 0x3800_4000, 0x3400_3000]); 2],
+        })
+    }
+
     #[test]
     fn a_table_is_read_as_it_was_written() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.threads");
-        write(&table(), &path).unwrap();
-        assert_eq!(read(&path).unwrap(), table());
+        for threads in [Threads::Paper(table()), fitted()] {
+            write(&threads, &path).unwrap();
+            assert_eq!(read(&path).unwrap(), threads);
+        }
     }
 
     #[test]
     fn any_damage_is_an_error_that_names_the_file() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.threads");
-        let good = encode(&table());
+        let good = encode(&Threads::Paper(table()));
         for length in 0..good.len() {
             assert!(decode(&good[..length]).is_err());
             let mut bad = good.clone();
@@ -153,7 +228,7 @@ mod tests {
         ] {
             let mut table = table();
             table.samples[3] = bad;
-            assert!(decode(&encode(&table)).unwrap_err().contains("sample"));
+            assert!(decode(&encode(&Threads::Paper(table))).unwrap_err().contains("sample"));
         }
     }
 
@@ -161,10 +236,10 @@ mod tests {
     fn an_unwritable_place_is_an_error_and_leaves_nothing() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("absent/a.threads");
-        assert!(write(&table(), &path).unwrap_err().to_string().contains("cannot be written"));
+        assert!(write(&Threads::Paper(table()), &path).unwrap_err().to_string().contains("cannot be written"));
         let taken = folder.path().join("taken");
         std::fs::create_dir(&taken).unwrap();
-        assert!(write(&table(), &taken).is_err());
+        assert!(write(&Threads::Paper(table()), &taken).is_err());
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
     }
 }

@@ -5,7 +5,7 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::slice::{Slice, fibonacci_lattice};
-use super::{MAX_COUNT, MIN_COS, Observer, Sample, Settings, ThreadTable, theta_o};
+use super::{MIN_COS, Observer, Sample, Settings, ThreadTable, theta_o};
 use super::{forces, peaks, smoothing};
 use crate::brdf::Brdf;
 use crate::error::{Error, Result};
@@ -17,7 +17,7 @@ const ITERATIONS: usize = 25;
 ///
 /// Errors: no or too many threads, no rows, or cancelled by `observer` (noticed within one step of one row).
 pub fn generate(brdf: &Brdf, settings: &Settings, observer: &dyn Observer) -> Result<ThreadTable> {
-    let &Settings { count, rows, seed } = settings;
+    let &Settings { count, rows, seed, .. } = settings;
     settings.check()?;
 
     // Each row is finished twice: its slice is tabulated (on all cores), then its samples settle.
@@ -68,20 +68,6 @@ pub fn generate(brdf: &Brdf, settings: &Settings, observer: &dyn Observer) -> Re
     let samples = (0..rows).flat_map(|row| threads.iter().map(move |thread| thread[row])).collect();
     let albedo = slices.iter().map(|(slice, _)| slice.albedo().as_vec3().to_array()).collect();
     Ok(ThreadTable { rows, count, seed, material: brdf.model().to_string(), albedo, samples })
-}
-
-impl Settings {
-    /// Errors where there is nothing or too much to make.
-    fn check(&self) -> Result<()> {
-        if !(1..=MAX_COUNT).contains(&self.count) {
-            let remedy = format!("use a number from 1 to {MAX_COUNT}");
-            return Err(Error::input("threads", format!("{} is not possible", self.count), remedy));
-        }
-        if self.rows == 0 {
-            return Err(Error::input("rows", "0 is not possible", "use at least 1; the paper uses 90"));
-        }
-        Ok(())
-    }
 }
 
 /// Evenly spread points of the CDF's square, in the order of a Hilbert curve: every S-th of them is then evenly spread too,
@@ -145,7 +131,7 @@ mod tests {
     use crate::threads::test_materials;
 
     fn small(count: usize, rows: usize) -> Settings {
-        Settings { count, rows, seed: 7 }
+        Settings { count, rows, seed: 7, ..Settings::default() }
     }
 
     #[test]

@@ -8,14 +8,19 @@
 //! | 3.2.2, smoothing | [`smoothing`] |
 //! | 3.2.3, peaks | [`peaks`] |
 //! | the whole | [`generate()`] |
+//! | beyond it: threads fitted to the BRDF | [`fitted`] |
 //!
 use std::f64::consts::FRAC_PI_2;
 
 use glam::{DVec3, dvec3};
 
+use crate::brdf::Brdf;
+use crate::error::{Error, Result};
+
 mod cache;
 pub mod cones;
 mod file;
+pub mod fitted;
 pub mod forces;
 mod generate;
 pub mod peaks;
@@ -28,7 +33,7 @@ pub(crate) mod test_materials;
 
 pub use cache::{CacheState, default_directory, load_or_generate};
 pub use file::{FORMAT_VERSION, read, write};
-pub use generate::generate;
+pub use fitted::FittedTable;
 pub use plot::plot;
 pub use slice_table::SliceTable;
 
@@ -39,9 +44,94 @@ pub const MIN_COS: f64 = 1e-4;
 /// Most threads that a table can have.
 pub const MAX_COUNT: usize = 1024;
 
+/// Which threads.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Kind {
+    /// Fitted to the BRDF: [`fitted`].
+    #[default]
+    Fitted,
+    /// The paper's.
+    Paper,
+}
+
+impl Kind {
+    /// What files call it, and the method that shades by it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Fitted => "fitted",
+            Self::Paper => "paper",
+        }
+    }
+
+    /// Most threads that a table can have.
+    pub fn max_count(self) -> usize {
+        match self {
+            Self::Fitted => fitted::MAX_COUNT,
+            Self::Paper => MAX_COUNT,
+        }
+    }
+}
+
+/// Threads of either kind.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Threads {
+    /// Fitted to the BRDF.
+    Fitted(FittedTable),
+    /// The paper's.
+    Paper(ThreadTable),
+}
+
+impl Threads {
+    /// Which they are.
+    pub fn kind(&self) -> Kind {
+        match self {
+            Self::Fitted(_) => Kind::Fitted,
+            Self::Paper(_) => Kind::Paper,
+        }
+    }
+
+    /// Number of view angles and of threads.
+    pub fn size(&self) -> [usize; 2] {
+        match self {
+            Self::Fitted(table) => [table.rows, table.count],
+            Self::Paper(table) => [table.rows, table.count],
+        }
+    }
+
+    /// Where `thread` looks in `row`, unit, in the shading frame.
+    pub fn direction(&self, row: usize, thread: usize) -> DVec3 {
+        match self {
+            Self::Fitted(table) => table.row(row)[thread].unpack().direction.as_dvec3(),
+            Self::Paper(table) => table.row(row)[thread].direction(),
+        }
+    }
+
+    /// The same, with this name of the material.
+    pub fn of_material(mut self, name: &str) -> Self {
+        match &mut self {
+            Self::Fitted(table) => name.clone_into(&mut table.material),
+            Self::Paper(table) => name.clone_into(&mut table.material),
+        }
+        self
+    }
+}
+
+/// The threads of `brdf`. `observer` hears of rows and may cancel.
+///
+/// # Errors
+/// [`Error::Cancelled`](crate::Error::Cancelled); settings that ask for no threads, no rows or too many.
+pub fn generate(brdf: &Brdf, settings: &Settings, observer: &dyn Observer) -> Result<Threads> {
+    Ok(match settings.kind {
+        Kind::Fitted => Threads::Fitted(fitted::generate(brdf, settings, observer)?),
+        Kind::Paper => Threads::Paper(generate::generate(brdf, settings, observer)?),
+    })
+}
+
 /// What threads to make; together with the BRDF it determines the table to the last bit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Settings {
+    /// Which they are.
+    pub kind: Kind,
     /// Number of threads m, 1 to [`MAX_COUNT`].
     pub count: usize,
     /// Number of view angles, evenly spaced from 0 to just below 90 degrees; at least 1, the paper's is 90.
@@ -52,7 +142,22 @@ pub struct Settings {
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { count: 100, rows: 90, seed: 0 }
+        Self { kind: Kind::Paper, count: 100, rows: 90, seed: 0 }
+    }
+}
+
+impl Settings {
+    /// Errors where there is nothing or too much to make.
+    fn check(&self) -> Result<()> {
+        let most = self.kind.max_count();
+        if !(1..=most).contains(&self.count) {
+            let problem = format!("{} is not possible for method \"{}\"", self.count, self.kind.name());
+            return Err(Error::input("threads", problem, format!("use a number from 1 to {most}")));
+        }
+        if self.rows == 0 {
+            return Err(Error::input("rows", "0 is not possible", "use at least 1; the paper uses 90"));
+        }
+        Ok(())
     }
 }
 

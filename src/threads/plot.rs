@@ -5,7 +5,7 @@ use std::path::Path;
 use glam::{DVec2, DVec3, dvec2, dvec3};
 use plotters::prelude::*;
 
-use super::ThreadTable;
+use super::{Threads, theta_o};
 use crate::error::{Error, Result};
 
 /// Each view is a square of this side.
@@ -46,10 +46,10 @@ impl View {
     }
 }
 
-/// Writes a PNG of `table` to `path`: left from above (the light comes from the left, the eye moves to the right), right at a
+/// Writes a PNG of `threads` to `path`: left from above (the light comes from the left, the eye moves to the right), right at a
 /// slant. Each thread is a curve of its own hue over theta_o with a dot per row, small and pale at the normal, large and dark
 /// at grazing view; grey circles are theta = 0, 15, 30 ... degrees; the black arc is w_o. Errors: `path` cannot be written.
-pub fn plot(table: &ThreadTable, path: &Path) -> Result<()> {
+pub fn plot(threads: &Threads, path: &Path) -> Result<()> {
     let unwritable = |cause: String| Error::unwritable(path, cause);
     let size = (2 * VIEW_PX * OVERSAMPLING, VIEW_PX * OVERSAMPLING);
     let mut pixels = vec![0; (3 * size.0 * size.1) as usize];
@@ -58,7 +58,7 @@ pub fn plot(table: &ThreadTable, path: &Path) -> Result<()> {
         area.fill(&BACKGROUND).map_err(|error| unwritable(error.to_string()))?;
         // w_o moves along +x: seen from above it goes to the right, as seen from azimuth -90 degrees.
         for view in [View::from(FRAC_PI_2, -FRAC_PI_2, 0), View::from(0.5, -1.0, 1)] {
-            draw(table, &view, &area).map_err(|error| unwritable(error.to_string()))?;
+            draw(threads, &view, &area).map_err(|error| unwritable(error.to_string()))?;
         }
         area.present().map_err(|error| unwritable(error.to_string()))?;
     }
@@ -77,7 +77,7 @@ pub fn plot(table: &ThreadTable, path: &Path) -> Result<()> {
 
 type Canvas<'a> = DrawingArea<BitMapBackend<'a>, plotters::coord::Shift>;
 
-fn draw<'a>(table: &ThreadTable, view: &View, canvas: &Canvas<'a>) -> Result<(), Box<dyn std::error::Error + 'a>> {
+fn draw<'a>(threads: &Threads, view: &View, canvas: &Canvas<'a>) -> Result<(), Box<dyn std::error::Error + 'a>> {
     // Segment by segment: a thick path grows spikes where it turns back.
     let line = |points: &mut dyn Iterator<Item = DVec3>, style: ShapeStyle| {
         let points: Vec<_> = points.map(|point| view.project(point)).collect();
@@ -102,25 +102,26 @@ fn draw<'a>(table: &ThreadTable, view: &View, canvas: &Canvas<'a>) -> Result<(),
     }
 
     // Width of a curve so that many threads do not bury each other.
-    let crowd = (table.count as f64 / 32.0).sqrt().max(1.0);
-    for thread in 0..table.count {
-        let directions: Vec<DVec3> = (0..table.rows).map(|row| table.row(row)[thread].direction()).collect();
-        let hue = thread as f64 / table.count as f64;
+    let [rows, count] = threads.size();
+    let crowd = (count as f64 / 32.0).sqrt().max(1.0);
+    for thread in 0..count {
+        let directions: Vec<DVec3> = (0..rows).map(|row| threads.direction(row, thread)).collect();
+        let hue = thread as f64 / count as f64;
         let colour = HSLColor(hue, 0.72, 0.45);
         let width = (f64::from(px) * 2.2 / crowd).max(2.0);
         line(&mut directions.iter().copied(), colour.stroke_width(width.round() as u32))?;
         for (row, &direction) in directions.iter().enumerate() {
-            let progress = row as f64 / table.rows as f64;
+            let progress = row as f64 / rows as f64;
             let radius = (f64::from(px) * (1.2 + 2.4 * progress) / crowd).max(2.0).round() as i32;
             let shade = HSLColor(hue, 0.72, 0.66 - 0.34 * progress);
             canvas.draw(&Circle::new(view.project(direction), radius, shade.filled()))?;
         }
     }
 
-    let view_angles = (0..table.rows).map(|row| table.theta_o(row));
-    let arc: Vec<DVec3> = view_angles.map(|theta_o| dvec3(theta_o.sin(), 0.0, theta_o.cos())).collect();
+    let arc: Vec<DVec3> =
+        (0..rows).map(|row| theta_o(row, rows)).map(|theta_o| dvec3(theta_o.sin(), 0.0, theta_o.cos())).collect();
     line(&mut arc.iter().copied(), VIEW_ARC.stroke_width(2 * px))?;
-    for &w_o in arc.iter().step_by((table.rows / 9).max(1)) {
+    for &w_o in arc.iter().step_by((rows / 9).max(1)) {
         canvas.draw(&Circle::new(view.project(w_o), 4 * px as i32, VIEW_ARC.filled()))?;
     }
     Ok(())
@@ -134,7 +135,9 @@ mod tests {
 
     #[test]
     fn a_picture_of_both_views_is_written_whole_or_not_at_all() {
-        let table = generate(&Brdf::builtin("gold").unwrap(), &Settings { count: 3, rows: 6, seed: 0 }, &()).unwrap();
+        let table =
+            generate(&Brdf::builtin("gold").unwrap(), &Settings { count: 3, rows: 6, ..Settings::default() }, &())
+                .unwrap();
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("threads.png");
         plot(&table, &path).unwrap();

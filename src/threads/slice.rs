@@ -101,13 +101,12 @@ impl<'a> Slice<'a> {
 
     /// Equation (4): p(w_i) in 1/sr.
     pub fn pdf(&self, w_i: DVec3) -> f64 {
-        if w_i.z <= 0.0 {
-            0.0
-        } else if self.albedo == DVec3::ZERO {
-            w_i.z * FRAC_1_PI
-        } else {
-            luminance(self.f_cos(w_i)) / self.total
-        }
+        if w_i.z <= 0.0 { 0.0 } else { self.pdf_of(self.f_cos(w_i), w_i) }
+    }
+
+    /// The same where f cos at `w_i`, above the horizon, is known already.
+    pub fn pdf_of(&self, f_cos: DVec3, w_i: DVec3) -> f64 {
+        if self.albedo == DVec3::ZERO { w_i.z * FRAC_1_PI } else { luminance(f_cos) / self.total }
     }
 
     /// f(w_i, w_o) (n . w_i) per channel, in 1/sr.

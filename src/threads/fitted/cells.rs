@@ -1,0 +1,45 @@
+//! Where a fit starts: the slice's mass divided into cells, and each cell's moments.
+use glam::DVec3;
+
+use super::kernel::{FINEST_WIDTH_RAD, WIDEST_LEVEL};
+use super::solve::Kernel;
+use crate::threads::slice::Slice;
+
+/// Kernels at the centroids of `count` cells of `slice`, as wide as their second moments say, with the mass of the cell.
+///
+/// Lloyd's relaxation (1982) of points of equal mass.
+pub fn cells(slice: &Slice, count: usize) -> Vec<Kernel> {
+    const POINTS_A_CELL: usize = 60;
+    const ROUNDS: usize = 20;
+    let total = (count * POINTS_A_CELL).max(600);
+    let points: Vec<(DVec3, DVec3)> = slice
+        .points(total)
+        .map(|w| (w, slice.f_cos(w) / (slice.pdf(w).max(f64::MIN_POSITIVE) * total as f64)))
+        .collect();
+    let mut centres: Vec<DVec3> = slice.points(count).collect();
+    let mut kernels = Vec::new();
+    for _ in 0..ROUNDS {
+        let mut sums = vec![(DVec3::ZERO, DVec3::ZERO, 0usize); count];
+        for &(w, mass) in &points {
+            let nearest = (0..count).max_by(|&a, &b| w.dot(centres[a]).total_cmp(&w.dot(centres[b]))).unwrap_or(0);
+            let sum = &mut sums[nearest];
+            sum.0 += w;
+            sum.1 += mass;
+            sum.2 += 1;
+        }
+        kernels = sums
+            .iter()
+            .zip(&centres)
+            .map(|(&(sum, mass, number), centre)| {
+                let mean = sum / number.max(1) as f64;
+                // For a narrow kernel the length of the mean is 1 - sigma^2.
+                let variance = (1.0 - mean.length()).max(0.0);
+                let level = (variance.sqrt() / FINEST_WIDTH_RAD).max(1.0).log2().min(WIDEST_LEVEL);
+                let direction = mean.try_normalize().unwrap_or(*centre);
+                Kernel { direction, level, weight: mass }
+            })
+            .collect();
+        centres = kernels.iter().map(|kernel| kernel.direction).collect();
+    }
+    kernels
+}

@@ -1,0 +1,86 @@
+//! The fit of all rows: from the middle one outwards, each starts from its neighbour.
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use glam::{DVec3, dvec3};
+
+use super::cells::cells;
+use super::kernel::FINEST_WIDTH_RAD;
+use super::lights::TestLights;
+use super::solve::{Effort, Fit, Kernel};
+use super::table::FittedTable;
+use crate::brdf::Brdf;
+use crate::error::{Error, Result};
+use crate::threads::slice::Slice;
+use crate::threads::{Observer, Settings, theta_o};
+
+/// Steps of the first row, which starts from cells, and of the others.
+const FIRST: Effort = Effort { steps: 300, least_gain: 1e-5 };
+const NEXT: Effort = Effort { steps: 20, least_gain: 1e-3 };
+
+/// Test lights of a row: so many for each unknown of a channel, and at least so many.
+const LIGHTS_A_THREAD: usize = 12;
+const FEWEST_LIGHTS: usize = 600;
+
+/// Kernels narrower than this, in radians, stay where a facet mirrors the view to; wider ones stay where they are.
+const FOLLOWS_BELOW_RAD: f64 = 0.15;
+
+/// A row: its kernels, the albedo and the relative error.
+type Row = (Vec<Kernel>, DVec3, f64);
+
+/// Fits `settings.count` threads to `brdf`, the same to the last bit on any number of cores.
+///
+/// # Errors
+/// No or too many threads, no rows, or cancelled by `observer` (noticed within a row).
+pub fn generate(brdf: &Brdf, settings: &Settings, observer: &dyn Observer) -> Result<FittedTable> {
+    settings.check()?;
+    let rows = settings.rows;
+    let done = AtomicUsize::new(0);
+    let fit = |row: usize, from: Option<(usize, &[Kernel])>| -> Result<Row> {
+        if observer.cancelled() {
+            return Err(Error::Cancelled);
+        }
+        let slice = Slice::new(brdf, theta_o(row, rows));
+        let lights = TestLights::new(&slice, (LIGHTS_A_THREAD * settings.count).max(FEWEST_LIGHTS), row);
+        let (mut kernels, effort) = match from {
+            Some((before, kernels)) => (carried(kernels, theta_o(before, rows), theta_o(row, rows)), NEXT),
+            None => (cells(&slice, settings.count), FIRST),
+        };
+        let fit = Fit::new(&lights, slice.albedo(), None);
+        fit.solve(&mut kernels, effort);
+        let error = fit.relative_error(&kernels);
+        observer.progress(done.fetch_add(1, Ordering::Relaxed) + 1, rows);
+        Ok((kernels, slice.albedo(), error))
+    };
+    let middle = rows / 2;
+    let first = fit(middle, None)?;
+    let chain = |order: &mut dyn Iterator<Item = usize>| -> Result<Vec<Row>> {
+        let mut chain: Vec<Row> = Vec::new();
+        let mut before = middle;
+        for row in order {
+            let kernels = &chain.last().unwrap_or(&first).0;
+            let next = fit(row, Some((before, kernels)))?;
+            chain.push(next);
+            before = row;
+        }
+        Ok(chain)
+    };
+    let (down, up) = rayon::join(|| chain(&mut (0..middle).rev()), || chain(&mut (middle + 1..rows)));
+    let mut all = down?;
+    all.reverse();
+    all.push(first);
+    all.extend(up?);
+    Ok(FittedTable::pack(&all))
+}
+
+/// Kernels of the row for view angle `from` as a start for that of `to`.
+fn carried(kernels: &[Kernel], from: f64, to: f64) -> Vec<Kernel> {
+    let [w_from, w_to] = [from, to].map(|theta_o| dvec3(theta_o.sin(), 0.0, theta_o.cos()));
+    let carry = |kernel: &Kernel| {
+        let h = (kernel.direction + w_from).normalize();
+        let mirrored = (2.0 * w_to.dot(h) * h - w_to).normalize();
+        let width = FINEST_WIDTH_RAD * kernel.level.exp2();
+        let follows = width < FOLLOWS_BELOW_RAD && mirrored.z > -width;
+        Kernel { direction: if follows { mirrored } else { kernel.direction }, ..*kernel }
+    };
+    kernels.iter().map(carry).collect()
+}

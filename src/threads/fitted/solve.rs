@@ -1,0 +1,263 @@
+//! The fit of one row: kernels and weights that answer test lights as the slice does, by Levenberg and Marquardt's method.
+use glam::{DVec3, dvec3};
+use nalgebra::{Cholesky, DMatrix, DVector};
+
+use super::kernel::{FINEST_WIDTH_RAD, Pair, WIDEST_LEVEL, kappa_of_level, overlap};
+use super::lights::{SCALES, TestLights, light_kappa};
+
+/// A thread in one row: a kernel of the environment's pyramid, and the radiance it gives under light of radiance 1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Kernel {
+    /// Where it looks, unit, in the shading frame.
+    pub direction: DVec3,
+    /// Level of the pyramid, 0 to [`WIDEST_LEVEL`]: its width.
+    pub level: f64,
+    /// Linear Rec. 709, not negative.
+    pub weight: DVec3,
+}
+
+/// What is left of the albedo for the cosine kernel.
+pub fn cosine_part(kernels: &[Kernel], albedo: DVec3) -> DVec3 {
+    albedo - kernels.iter().map(|kernel| kernel.weight).sum::<DVec3>()
+}
+
+/// Kernels of whole levels against lights of all scales.
+fn pairs() -> &'static [[Pair; SCALES]] {
+    static PAIRS: std::sync::OnceLock<Vec<[Pair; SCALES]>> = std::sync::OnceLock::new();
+    PAIRS.get_or_init(|| {
+        let levels = 0..=WIDEST_LEVEL as usize;
+        levels
+            .map(|level| std::array::from_fn(|scale| Pair::new(kappa_of_level(level as f64), light_kappa(scale))))
+            .collect()
+    })
+}
+
+/// How a kernel answers a light, and the derivatives by the cosine between them and by the level.
+fn answer(direction: DVec3, level: f64, light: DVec3, scale: usize) -> (f64, f64, f64) {
+    let finer = (level as usize).min(WIDEST_LEVEL as usize - 1);
+    let t = level - finer as f64;
+    let pairs = pairs();
+    let cos = direction.dot(light);
+    let (a, a_cos) = overlap(cos, &pairs[finer][scale]);
+    let (b, b_cos) = overlap(cos, &pairs[finer + 1][scale]);
+    (a + t * (b - a), a_cos + t * (b_cos - a_cos), b - a)
+}
+
+/// Iterations and when to stop.
+#[derive(Clone, Copy, Debug)]
+pub struct Effort {
+    /// Most steps, taken or not.
+    pub steps: usize,
+    /// Ends when a step lowers the error by less than this part of it.
+    pub least_gain: f64,
+}
+
+/// The state of a fit.
+pub struct Fit<'a> {
+    lights: &'a TestLights,
+    albedo: DVec3,
+    /// Tied to these, with this strength: the row before.
+    prior: Option<(&'a [Kernel], f64)>,
+}
+
+/// The weighted design: columns of B (answers less the cosine's) and D (their derivatives), lights down the columns.
+struct Design {
+    columns: DMatrix<f64>,
+}
+
+impl<'a> Fit<'a> {
+    /// Of the slice with this albedo, which answers `lights` as they say.
+    pub fn new(lights: &'a TestLights, albedo: DVec3, prior: Option<(&'a [Kernel], f64)>) -> Self {
+        Self { lights, albedo, prior }
+    }
+
+    /// Sum over lights and channels of the squared weighted residuals, over the sum of the squared weighted responses: the square
+    /// of the relative error.
+    pub fn relative_error(&self, kernels: &[Kernel]) -> f64 {
+        let residuals = self.residuals(kernels);
+        let total: f64 = (0..self.lights.lights.len())
+            .map(|j| (self.lights.weight[j] * self.lights.response[j]).length_squared())
+            .sum();
+        (residuals.iter().map(|r| r.length_squared()).sum::<f64>() / total.max(f64::MIN_POSITIVE)).sqrt()
+    }
+
+    fn residuals(&self, kernels: &[Kernel]) -> Vec<DVec3> {
+        let cosine = cosine_part(kernels, self.albedo);
+        let TestLights { lights, weight, cosine: cosine_answer, response } = self.lights;
+        let residual = |j: usize| {
+            let mut sum = cosine * cosine_answer[j] - response[j];
+            for kernel in kernels {
+                sum += kernel.weight * answer(kernel.direction, kernel.level, lights[j].direction, lights[j].scale).0;
+            }
+            weight[j] * sum
+        };
+        (0..lights.len()).map(residual).collect()
+    }
+
+    fn prior_cost(&self, kernels: &[Kernel]) -> f64 {
+        let Some((before, strength)) = self.prior else { return 0.0 };
+        let cost = kernels.iter().zip(before).map(|(kernel, before)| {
+            let width = FINEST_WIDTH_RAD * before.level.exp2();
+            (kernel.direction - before.direction).length_squared() / (width * width)
+                + (kernel.level - before.level).powi(2)
+        });
+        strength * cost.sum::<f64>()
+    }
+
+    fn design(&self, kernels: &[Kernel]) -> Design {
+        let m = kernels.len();
+        let TestLights { lights, weight, cosine, .. } = self.lights;
+        let mut columns = DMatrix::zeros(lights.len(), 4 * m);
+        for (k, kernel) in kernels.iter().enumerate() {
+            let (x, y) = kernel.direction.any_orthonormal_pair();
+            for (j, light) in lights.iter().enumerate() {
+                let (value, by_cos, by_level) = answer(kernel.direction, kernel.level, light.direction, light.scale);
+                columns[(j, k)] = weight[j] * (value - cosine[j]);
+                columns[(j, m + 3 * k)] = weight[j] * by_cos * x.dot(light.direction);
+                columns[(j, m + 3 * k + 1)] = weight[j] * by_cos * y.dot(light.direction);
+                columns[(j, m + 3 * k + 2)] = weight[j] * by_level;
+            }
+        }
+        Design { columns }
+    }
+
+    /// Improves `kernels`; returns the number of steps tried.
+    pub fn solve(&self, kernels: &mut Vec<Kernel>, effort: Effort) -> usize {
+        let m = kernels.len();
+        let mut damping = 1e-3;
+        let mut tried = 0;
+        let squares = |r: &[DVec3]| r.iter().map(|r| r.length_squared()).sum::<f64>();
+        let mut residuals = self.residuals(kernels);
+        let mut cost = squares(&residuals) + self.prior_cost(kernels);
+        while tried < effort.steps {
+            let design = self.design(kernels).columns;
+            let gram = design.transpose() * &design;
+            let right: [DVector<f64>; 3] = std::array::from_fn(|c| {
+                let r = DVector::from_iterator(residuals.len(), residuals.iter().map(|r| r[c]));
+                design.tr_mul(&r)
+            });
+            let (hessian, gradient) = self.normal_equations(kernels, &gram, &right);
+            let before = cost;
+            loop {
+                tried += 1;
+                let next = step(kernels, &hessian, &gradient, damping);
+                let next_residuals = self.residuals(&next);
+                let next_cost = squares(&next_residuals) + self.prior_cost(&next);
+                if next_cost < cost {
+                    (*kernels, residuals, cost) = (next, next_residuals, next_cost);
+                    damping = (damping * 0.2).max(1e-9);
+                    break;
+                }
+                damping *= 5.0;
+                if tried >= effort.steps || damping > 1e6 {
+                    return tried;
+                }
+            }
+            if cost > before * (1.0 - effort.least_gain) || cost == 0.0 {
+                break;
+            }
+            debug_assert!(kernels.len() == m);
+        }
+        tried
+    }
+
+    /// Gauss and Newton's matrix and the gradient. Unknowns: red, green and blue weights of all kernels, then two tangents and the
+    /// level of each kernel.
+    fn normal_equations(
+        &self,
+        kernels: &[Kernel],
+        gram: &DMatrix<f64>,
+        right: &[DVector<f64>; 3],
+    ) -> (DMatrix<f64>, DVector<f64>) {
+        let m = kernels.len();
+        let mut hessian = DMatrix::zeros(6 * m, 6 * m);
+        let mut gradient = DVector::zeros(6 * m);
+        for c in 0..3 {
+            for l in 0..m {
+                for k in 0..m {
+                    hessian[(c * m + k, c * m + l)] = gram[(k, l)];
+                }
+                for p in 0..3 * m {
+                    let value = kernels[p / 3].weight[c] * gram[(m + p, l)];
+                    hessian[(3 * m + p, c * m + l)] = value;
+                    hessian[(c * m + l, 3 * m + p)] = value;
+                }
+                gradient[c * m + l] = right[c][l];
+            }
+            for p in 0..3 * m {
+                gradient[3 * m + p] += kernels[p / 3].weight[c] * right[c][m + p];
+            }
+        }
+        for q in 0..3 * m {
+            for p in 0..3 * m {
+                hessian[(3 * m + p, 3 * m + q)] =
+                    kernels[p / 3].weight.dot(kernels[q / 3].weight) * gram[(m + p, m + q)];
+            }
+        }
+        if let Some((before, strength)) = self.prior {
+            for (k, (kernel, before)) in kernels.iter().zip(before).enumerate() {
+                let width = FINEST_WIDTH_RAD * before.level.exp2();
+                let (x, y) = kernel.direction.any_orthonormal_pair();
+                let away = kernel.direction - before.direction;
+                let scale = strength / (width * width);
+                for (p, (gradient_part, scale)) in [
+                    (x.dot(away) * scale, scale),
+                    (y.dot(away) * scale, scale),
+                    ((kernel.level - before.level) * strength, strength),
+                ]
+                .into_iter()
+                .enumerate()
+                {
+                    gradient[3 * m + 3 * k + p] += gradient_part;
+                    hessian[(3 * m + 3 * k + p, 3 * m + 3 * k + p)] += scale;
+                }
+            }
+        }
+        (hessian, gradient)
+    }
+}
+
+/// The step of damped normal equations, within bounds: a weight at zero that would fall stays there.
+fn step(kernels: &[Kernel], hessian: &DMatrix<f64>, gradient: &DVector<f64>, damping: f64) -> Vec<Kernel> {
+    let m = kernels.len();
+    let mut matrix = hessian.clone();
+    let mut right = -gradient;
+    let largest = (0..6 * m).map(|i| hessian[(i, i)]).fold(0.0, f64::max);
+    let frozen = |i: usize| i < 3 * m && kernels[i % m].weight[i / m] <= 0.0 && gradient[i] > 0.0;
+    let floor = |k: usize| {
+        let width = FINEST_WIDTH_RAD * kernels[k].level.exp2();
+        // Kernels without weight have no gradient in direction and level: they stay where they are.
+        1e-10 * largest / (width * width)
+    };
+    for i in 0..6 * m {
+        matrix[(i, i)] += damping * hessian[(i, i)] + if i < 3 * m { 1e-12 * largest } else { floor((i - 3 * m) / 3) };
+        if frozen(i) {
+            for j in 0..6 * m {
+                matrix[(i, j)] = 0.0;
+                matrix[(j, i)] = 0.0;
+            }
+            matrix[(i, i)] = 1.0;
+            right[i] = 0.0;
+        }
+    }
+    let Some(factor) = Cholesky::new(matrix) else { return kernels.to_vec() };
+    let change = factor.solve(&right);
+    kernels
+        .iter()
+        .enumerate()
+        .map(|(k, kernel)| {
+            let (x, y) = kernel.direction.any_orthonormal_pair();
+            let at = 3 * m + 3 * k;
+            let width = FINEST_WIDTH_RAD * kernel.level.exp2();
+            // The model of a kernel's answer is linear over about its own width.
+            let limit = |value: f64, most: f64| value.clamp(-most, most);
+            let tangent = limit(change[at], 2.0 * width) * x + limit(change[at + 1], 2.0 * width) * y;
+            let weight = dvec3(change[k], change[m + k], change[2 * m + k]);
+            Kernel {
+                direction: (kernel.direction + tangent).normalize(),
+                level: (kernel.level + limit(change[at + 2], 1.0)).clamp(0.0, WIDEST_LEVEL),
+                weight: (kernel.weight + weight).max(DVec3::ZERO),
+            }
+        })
+        .collect()
+}

@@ -1,0 +1,89 @@
+//! Fitted threads as they are stored, uploaded and looked up: twelve bytes a thread and row.
+use glam::{DVec3, Vec3};
+use half::f16;
+
+use super::solve::{Kernel, cosine_part};
+use crate::packing::{octahedral_decode, octahedral_encode, pack_snorm_2x16, unpack_snorm_2x16};
+
+/// A kernel in three words: direction (octahedral, 2 x 16 bits), level and red weight, green and blue weight (half floats).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub struct PackedKernel(pub [u32; 3]);
+
+/// A kernel as shaders see it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct UnpackedKernel {
+    /// Where it looks, unit, in the shading frame.
+    pub direction: Vec3,
+    /// Its width: [`super::kernel::FINEST_WIDTH_RAD`] 2^level.
+    pub level: f32,
+    /// Linear Rec. 709.
+    pub weight: Vec3,
+}
+
+impl PackedKernel {
+    /// The nearest to `kernel`.
+    pub fn new(kernel: &Kernel) -> Self {
+        let half = |x: f64| u32::from(f16::from_f64(x.min(f64::from(f16::MAX))).to_bits());
+        let direction = pack_snorm_2x16(octahedral_encode(kernel.direction.as_vec3()));
+        let DVec3 { x: red, y: green, z: blue } = kernel.weight;
+        Self([direction, half(kernel.level) | half(red) << 16, half(green) | half(blue) << 16])
+    }
+
+    /// Twin of `unpack_kernel` in glsl/methods/fitted.glsl.
+    pub fn unpack(self) -> UnpackedKernel {
+        let half = |bits: u32| f16::from_bits(bits as u16).to_f32();
+        let [direction, level_red, green_blue] = self.0;
+        UnpackedKernel {
+            direction: octahedral_decode(unpack_snorm_2x16(direction)),
+            level: half(level_red),
+            weight: Vec3::new(half(level_red >> 16), half(green_blue), half(green_blue >> 16)),
+        }
+    }
+}
+
+/// The fitted threads of one material: `rows` x `count` kernels. Row r is for theta_o = r 90 deg / rows.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FittedTable {
+    /// Number of view angles.
+    pub rows: usize,
+    /// Number of threads.
+    pub count: usize,
+    /// Name of the material, for people.
+    pub material: String,
+    /// What the cosine kernel is weighted by in each row: with the threads' weights it sums to the albedo, as stored.
+    pub cosine_part: Vec<[f32; 3]>,
+    /// Expected error of each row, relative to the radiance under lights of all sizes.
+    pub relative_error: Vec<f32>,
+    /// Row by row: thread k of row r is `kernels[r * count + k]`.
+    pub kernels: Vec<PackedKernel>,
+}
+
+impl FittedTable {
+    /// The kernels of `row`, one per thread.
+    pub fn row(&self, row: usize) -> &[PackedKernel] {
+        &self.kernels[row * self.count..][..self.count]
+    }
+
+    /// Packs rows of kernels, with the albedo and the relative error of each.
+    pub(super) fn pack(rows: &[(Vec<Kernel>, DVec3, f64)]) -> Self {
+        let kernels: Vec<_> = rows.iter().flat_map(|(kernels, ..)| kernels.iter().map(PackedKernel::new)).collect();
+        let count = rows.first().map_or(0, |(kernels, ..)| kernels.len());
+        // From the weights as they were rounded, so that a white furnace does not see it.
+        let cosine = rows.iter().zip(kernels.chunks(count.max(1))).map(|((.., albedo, _), packed)| {
+            let rounded = |packed: &PackedKernel| {
+                let UnpackedKernel { direction, level, weight } = packed.unpack();
+                Kernel { direction: direction.as_dvec3(), level: level.into(), weight: weight.as_dvec3() }
+            };
+            cosine_part(&packed.iter().map(rounded).collect::<Vec<_>>(), *albedo).as_vec3().to_array()
+        });
+        Self {
+            rows: rows.len(),
+            count,
+            material: String::new(),
+            cosine_part: cosine.collect(),
+            relative_error: rows.iter().map(|&(.., error)| error as f32).collect(),
+            kernels,
+        }
+    }
+}
