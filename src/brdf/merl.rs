@@ -4,9 +4,9 @@
 //! the red, green and blue planes of f64, index phi_d + 180 (theta_d + 90 theta_h). Angles: Rusinkiewicz (1998).
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::path::Path;
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
 
-use glam::{DVec3, DVec4, Vec4, dvec3};
+use glam::{DVec3, Vec4, dvec3};
 
 use super::{Model, Parameters};
 use crate::error::{Error, Result};
@@ -126,22 +126,44 @@ impl Horizon {
 #[inline]
 fn table_coordinate(w_i: DVec3, w_o: DVec3) -> DVec3 {
     let h = (w_i + w_o).normalize();
-    let sin_theta_h = h.x.hypot(h.y);
+    let sin_theta_h = (h.x * h.x + h.y * h.y).sqrt();
     // The azimuth of a half vector at the pole is arbitrary.
     let (cos_phi_h, sin_phi_h) = if sin_theta_h > 0.0 { (h.x / sin_theta_h, h.y / sin_theta_h) } else { (1.0, 0.0) };
     // d: w_i seen from a frame with h as its pole.
     let along = w_i.x * cos_phi_h + w_i.y * sin_phi_h;
     let d = dvec3(h.z * along - sin_theta_h * w_i.z, w_i.y * cos_phi_h - w_i.x * sin_phi_h, w_i.dot(h));
-    // atan2 rather than acos, which has no digits left near the pole, just where bins are smallest.
-    let theta_h = sin_theta_h.atan2(h.z);
-    let theta_d = d.x.hypot(d.y).atan2(d.z);
-    let phi_d = d.y.atan2(d.x);
+    // Tangents rather than cosines, which have no digits left near the pole, just where bins are smallest.
+    let theta_h = acute_angle(sin_theta_h, h.z);
+    let theta_d = acute_angle((d.x * d.x + d.y * d.y).sqrt(), d.z);
+    // Reciprocity: phi_d and phi_d + 180 degrees are the same cell, so d may be turned to where y is positive.
+    let phi_d = acute_angle(d.y.abs(), d.x.abs());
     dvec3(
         THETA_H_BINS as f64 * (theta_h / FRAC_PI_2).sqrt(),
         THETA_D_BINS as f64 * (theta_d / FRAC_PI_2),
-        // Reciprocity: phi_d and phi_d + 180 degrees are the same cell.
-        PHI_D_BINS as f64 * (if phi_d < 0.0 { phi_d + PI } else { phi_d } / PI),
+        PHI_D_BINS as f64 * (if d.x * d.y < 0.0 { PI - phi_d } else { phi_d } / PI),
     )
+}
+
+/// Steps from 0 to 1 at which [`acute_angle`] knows the arc tangent.
+const TANGENT_STEPS: usize = 64;
+
+/// The angle in [0, pi/2] of tangent y / x, neither negative; 0 if both are 0. To the last digits, in a third of the time of
+/// `atan2`: the nearest tabulated arc tangent, and what is left of the angle by its series.
+#[inline]
+fn acute_angle(y: f64, x: f64) -> f64 {
+    static ARC_TANGENTS: LazyLock<[f64; TANGENT_STEPS + 1]> =
+        LazyLock::new(|| std::array::from_fn(|i| (i as f64 / TANGENT_STEPS as f64).atan()));
+    let (low, high) = (y.min(x), y.max(x));
+    // The smallest positive number stands in for 0, to divide by.
+    let high = high.max(f64::MIN_POSITIVE);
+    let step = ((low / high) * TANGENT_STEPS as f64 + 0.5) as usize;
+    let tangent = step as f64 / TANGENT_STEPS as f64;
+    // tan(a - b) = (tan a - tan b) / (1 + tan a tan b): at most 1/128, whose ninth power is nothing to a double.
+    let rest = (low - tangent * high) / (high + tangent * low);
+    let square = rest * rest;
+    let rest_angle = rest * (1.0 - square * (1.0 / 3.0 - square * (1.0 / 5.0 - square / 7.0)));
+    let angle = ARC_TANGENTS[step] + rest_angle;
+    if y > x { FRAC_PI_2 - angle } else { angle }
 }
 
 /// The two bins whose centres enclose `position`, clamped at the ends, and the weight of the second.
@@ -160,17 +182,19 @@ impl Model for MerlTable {
         let (d0, d1, d_weight) = clamped_pair(position.y, THETA_D_BINS);
         // + bins - 0.5 keeps the number positive, so that truncation is the floor.
         let p = position.z + PHI_D_BINS as f64 - 0.5;
-        let (p0, p_weight) = (p as usize % PHI_D_BINS, p.fract());
+        let p_weight = p - (p as usize) as f64;
+        let p0 = p as usize % PHI_D_BINS;
         let p1 = if p0 + 1 == PHI_D_BINS { 0 } else { p0 + 1 };
 
+        // In single precision, as texels are: 1e-7 of the largest of the eight.
+        let [h_weight, d_weight, p_weight] = [h_weight, d_weight, p_weight].map(|weight| weight as f32);
         let line = |theta_h: usize, theta_d: usize| {
-            let start = PHI_D_BINS * (theta_d + THETA_D_BINS * theta_h);
-            let (a, b) = (self.texels[start + p0].as_dvec4(), self.texels[start + p1].as_dvec4());
-            a + (b - a) * p_weight
+            let texels = &self.texels[PHI_D_BINS * (theta_d + THETA_D_BINS * theta_h)..][..PHI_D_BINS];
+            texels[p0].lerp(texels[p1], p_weight)
         };
-        let plane = |theta_h: usize| line(theta_h, d0) * (1.0 - d_weight) + line(theta_h, d1) * d_weight;
-        let sum: DVec4 = plane(h0) * (1.0 - h_weight) + plane(h1) * h_weight;
-        if sum.w > 0.0 { sum.truncate() / sum.w } else { DVec3::ZERO }
+        let plane = |theta_h: usize| line(theta_h, d0).lerp(line(theta_h, d1), d_weight);
+        let sum = plane(h0).lerp(plane(h1), h_weight);
+        if sum.w > 0.0 { sum.truncate().as_dvec3() / f64::from(sum.w) } else { DVec3::ZERO }
     }
 
     fn from_parameters(_: &mut Parameters) -> Result<Self> {
@@ -184,5 +208,23 @@ impl Model for MerlTable {
 
     fn hash_content(&self, hasher: &mut blake3::Hasher) {
         hasher.update(self.fingerprint.as_bytes());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn acute_angles_are_arc_tangents() {
+        assert_eq!(acute_angle(0.0, 0.0), 0.0);
+        assert_eq!((acute_angle(0.0, 1.0), acute_angle(1.0, 0.0)), (0.0, FRAC_PI_2));
+        for i in 0..=10_000 {
+            let angle = FRAC_PI_2 * f64::from(i) / 10_000.0;
+            let (y, x) = angle.sin_cos();
+            assert!((acute_angle(y, x.max(0.0)) - angle).abs() < 1e-15, "{angle}");
+            let small = 1e-9 * angle;
+            assert!((acute_angle(small, 1.0) / small.max(f64::MIN_POSITIVE) - 1.0).abs() < 1e-12 || i == 0, "{small}");
+        }
     }
 }

@@ -1,210 +1,290 @@
-//! The environment as the reference sees it: radiance of a direction, and directions drawn in proportion to radiance.
+//! The environment as the reference sees it: cells of the sphere, and for each the weights of a quadrature that are exact for its light.
+//!
+//! A product quadrature: for g smooth over a cell, the integral of L g is a sum of g at a few nodes times weights, which are the
+//! integrals of L times the Lagrange polynomials of the nodes. Weights are exact however rough the light is, a sun or an edge,
+//! so only g has to be resolved.
 use std::f64::consts::{PI, TAU};
 
-use glam::{DVec2, DVec3, Vec3A};
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
 
-use super::inversion::{find_step, invert_ramp};
 use crate::environment::Environment;
 
-/// Fewest strips from pole to pole: over a strip the sine of theta counts as constant in the pdf, within a few percent.
-const MIN_STRIPS: usize = 256;
+/// Nodes of a cell per axis: equal steps from edge to edge, so that the cells within a cell share them.
+pub const NODES: usize = 3;
+/// Nodes of a cell, row by row.
+pub const CELL_NODES: usize = NODES * NODES;
+/// Nodes per axis of the four cells within a cell.
+pub const FINE_NODES: usize = 2 * NODES - 1;
+/// The level that quadrature starts from: cells of 45 degrees.
+pub const FIRST_LEVEL: u32 = 2;
+/// The level that it ends at: cells of 4e-7 rad, still far from the roundings of their places.
+pub const LAST_LEVEL: u32 = 23;
 
-/// The function [`Environment::radiance`], tabulated to be fast, with a pdf proportional to it (mean of the channels).
-///
-/// The pdf over the picture is the bilinear function itself times the sine of theta, the latter constant over strips of rows.
-/// So it is positive wherever any channel is, and what it misses is a factor close to 1 that the estimate knows exactly.
-pub struct Light {
-    width: usize,
-    height: usize,
-    /// With a border of one pixel: wrapped at the sides, repeated at the poles.
-    texels: Vec<Vec3A>,
-    /// For each row of pixels, the integral of its interpolated channel sum from column 0 to each column; width + 1 a row.
-    columns: Vec<f64>,
-    /// CDF over strips of equal height in theta: one more than there are strips.
-    strips: Vec<f64>,
-    /// Mean sine of theta over each strip divided by the integral of radiance so weighted: pdf over the picture by channel sum.
-    strip_density: Vec<f64>,
+/// Weights are kept for cells of about so many pixels a side or more; those of smaller ones are cheap to make again.
+const KEPT_PX: usize = 2;
+/// Kept levels end here, at 226 MB, however large the picture is; and here, where the sine of theta is a polynomial over a cell.
+const LAST_KEPT_LEVEL: u32 = 10;
+const LEAST_KEPT_LEVEL: u32 = 5;
+
+/// A part of the sphere: phi from 2 pi column / 2^(level + 1) and theta from pi row / 2^level, to the next.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CellPlace {
+    pub level: u32,
+    pub column: u32,
+    pub row: u32,
 }
 
-/// A direction with the radiance that comes from it.
-#[derive(Clone, Copy, Debug)]
-pub struct LightSample {
-    /// Unit.
-    pub direction: DVec3,
-    /// From that direction.
-    pub radiance: DVec3,
-    /// With which the direction is drawn, in 1/sr.
-    pub pdf: f64,
+impl CellPlace {
+    /// All cells of a level.
+    pub fn all(level: u32) -> impl Iterator<Item = Self> {
+        (0..1 << level).flat_map(move |row| (0..2 << level).map(move |column| Self { level, column, row }))
+    }
+
+    /// The four cells within: row by row.
+    pub fn parts(self) -> [Self; 4] {
+        let part = |i: u32| Self { level: self.level + 1, column: 2 * self.column + i % 2, row: 2 * self.row + i / 2 };
+        [0, 1, 2, 3].map(part)
+    }
+
+    /// The length of an edge of constant phi, in radians; other edges are at most as long.
+    pub fn side(self) -> f64 {
+        PI / f64::from(1 << self.level)
+    }
+
+    /// The direction in the middle.
+    pub fn middle(self) -> DVec3 {
+        let [phi, theta] = [self.column, self.row].map(|index| (f64::from(index) + 0.5) * self.side());
+        DVec3::new(theta.sin() * phi.sin(), theta.cos(), -theta.sin() * phi.cos())
+    }
+
+    /// The directions of nodes in `N` equal steps from edge to edge along each axis, row by row.
+    pub fn directions<const N: usize>(self) -> [[DVec3; N]; N] {
+        let angle = |index: u32, i: usize| (f64::from(index) + i as f64 / (N - 1) as f64) * self.side();
+        let phis: [_; N] = std::array::from_fn(|i| angle(self.column, i).sin_cos());
+        std::array::from_fn(|j| {
+            let (sin_theta, cos_theta) = angle(self.row, j).sin_cos();
+            phis.map(|(sin_phi, cos_phi)| DVec3::new(sin_theta * sin_phi, cos_theta, -sin_theta * cos_phi))
+        })
+    }
 }
 
-impl Light {
-    /// Tabulates `environment`.
-    pub fn new(environment: &Environment) -> Self {
-        let (width, height) = (environment.width, environment.height);
-        let mut texels = Vec::with_capacity((width + 2) * (height + 2));
-        for row in 0..height + 2 {
-            let row = &environment.texels[row.saturating_sub(1).min(height - 1) * width..][..width];
-            let padded = row[width - 1..].iter().chain(row).chain(&row[..1]);
-            texels.extend(padded.map(|&texel| Vec3A::from_array(texel)));
+/// The integrals of radiance times each node's polynomial over a cell, in radiance times sr. In single precision, as texels
+/// are: 1e-7 of the cell's light.
+pub type Weights = [Vec3; CELL_NODES];
+
+/// The environment's cells.
+pub struct Light<'a> {
+    environment: &'a Environment,
+    /// Weights level by level from the first, row by row.
+    kept: Vec<Vec<Weights>>,
+}
+
+impl<'a> Light<'a> {
+    /// Integrates `environment`.
+    pub fn new(environment: &'a Environment) -> Self {
+        let fits =
+            |level: &u32| (1 << level) * KEPT_PX >= environment.height && (2 << level) * KEPT_PX >= environment.width;
+        let last = (LEAST_KEPT_LEVEL..LAST_KEPT_LEVEL).find(fits).unwrap_or(LAST_KEPT_LEVEL);
+        let mut light = Self { environment, kept: Vec::new() };
+        let places: Vec<_> = CellPlace::all(last).collect();
+        let mut levels = vec![places.into_par_iter().map(|place| light.integrate(place)).collect::<Vec<_>>()];
+        for level in (FIRST_LEVEL..last).rev() {
+            let finer = &levels[levels.len() - 1];
+            let places: Vec<_> = CellPlace::all(level).collect();
+            let of_parts = |place: CellPlace| sum_of_parts(place.parts().map(|part| &finer[index(part)]));
+            levels.push(places.into_par_iter().map(of_parts).collect());
         }
-        let mut columns = Vec::with_capacity((width + 1) * height);
-        for row in environment.texels.chunks_exact(width) {
-            let mut sum = 0.0;
-            columns.push(sum);
-            for column in 0..width {
-                sum += 0.5 * (channel_sum(row[column]) + channel_sum(row[(column + 1) % width]));
-                columns.push(sum);
-            }
-        }
-        // Strips end at all centres and edges of pixel rows, so that each lies between two neighbouring centres.
-        let strip_count = 2 * height * MIN_STRIPS.div_ceil(2 * height);
-        let edge = |edge: usize| edge as f64 / strip_count as f64;
-        let mean_sine = |strip| {
-            let [from, to] = [PI * edge(strip), PI * edge(strip + 1)];
-            (from.cos() - to.cos()) / (to - from)
-        };
-        let strip_density: Vec<_> = (0..strip_count).map(mean_sine).collect();
-        let mut light = Self { width, height, texels, columns, strips: vec![0.0], strip_density };
-        for strip in 0..strip_count {
-            let mean = 0.5 * (light.row_sum(strip, edge(strip)) + light.row_sum(strip, edge(strip + 1))) / width as f64;
-            let mass = mean * light.strip_density[strip] / strip_count as f64;
-            light.strips.push(light.strips[strip] + mass);
-        }
-        let total = light.strips[strip_count];
-        if total > 0.0 {
-            light.strips.iter_mut().for_each(|mass| *mass /= total);
-            light.strip_density.iter_mut().for_each(|density| *density /= total);
-        }
+        levels.reverse();
+        light.kept = levels;
         light
     }
 
-    /// Whether no light comes from anywhere.
-    pub fn is_black(&self) -> bool {
-        !self.strips.last().is_some_and(|&total| total > 0.0)
-    }
-
-    /// Radiance from unit `direction` and the pdf with which [`Self::sample`] draws it.
-    #[inline]
-    pub fn evaluate(&self, direction: DVec3) -> (DVec3, f64) {
-        let sin_theta = (direction.x * direction.x + direction.z * direction.z).sqrt();
-        let phi = direction.x.atan2(-direction.z);
-        let u = if phi < 0.0 { phi / TAU + 1.0 } else { phi / TAU };
-        let v = sin_theta.atan2(direction.y) / PI;
-        let radiance = self.bilinear(u * self.width as f64 - 0.5, v * self.height as f64 - 0.5);
-        let strip = ((v * self.strip_density.len() as f64) as usize).min(self.strip_density.len() - 1);
-        (radiance, self.pdf(radiance, strip, sin_theta))
-    }
-
-    /// The direction at `uv` in (0, 1)^2. Its pdf is 0 where the picture is black throughout.
-    pub fn sample(&self, uv: DVec2) -> LightSample {
-        let (strip, rest) = find_step(self.strip_density.len(), uv.y, |edge| self.strips[edge]);
-        let strip_count = self.strip_density.len() as f64;
-        let edges = [strip as f64 / strip_count, (strip + 1) as f64 / strip_count];
-        let v = (strip as f64 + invert_ramp(edges.map(|v| self.row_sum(strip, v)), rest)) / strip_count;
-
-        let (above, below, t) = self.rows(strip, v);
-        let prefix = |column: usize| {
-            let [a, b] = [above, below].map(|row| self.columns[row * (self.width + 1) + column]);
-            a + t * (b - a)
-        };
-        let (column, rest) = find_step(self.width, uv.x, prefix);
-        let y = v * self.height as f64 - 0.5;
-        let ends = [column, column + 1].map(|column| channel_sum(self.bilinear(column as f64, y).to_array()));
-        let x = column as f64 + invert_ramp(ends, rest);
-
-        let (sin_theta, cos_theta) = (PI * v).sin_cos();
-        let (sin_phi, cos_phi) = (TAU * (x + 0.5) / self.width as f64).sin_cos();
-        let radiance = self.bilinear(x, y);
-        LightSample {
-            direction: DVec3::new(sin_theta * sin_phi, cos_theta, -sin_theta * cos_phi),
-            radiance,
-            pdf: self.pdf(radiance, strip, sin_theta),
+    /// The weights of a cell at [`FIRST_LEVEL`] or below it.
+    pub fn weights(&self, place: CellPlace) -> Weights {
+        match self.kept.get((place.level - FIRST_LEVEL) as usize) {
+            Some(level) => level[index(place)],
+            None => self.integrate(place),
         }
     }
 
-    /// In 1/sr: the pdf over the picture by the solid angle of the picture, 2 pi^2 sin(theta). At the very poles it is infinite,
-    /// and such a sample counts nothing.
-    fn pdf(&self, radiance: DVec3, strip: usize, sin_theta: f64) -> f64 {
-        radiance.element_sum() * self.strip_density[strip] / (2.0 * PI * PI * sin_theta)
-    }
-
-    /// Bilinear at column `x` in [-0.5, width] and row `y` in [-0.5, height - 0.5]; whole numbers are pixel centres.
-    /// Single precision, as texels are: 1e-7 of the brightest of the four.
-    #[inline]
-    fn bilinear(&self, x: f64, y: f64) -> DVec3 {
-        // + 1 for the border, which also makes truncation the floor.
-        let (x, y) = (x + 1.0, y + 1.0);
-        let (column, row) = ((x as usize).min(self.width), (y as usize).min(self.height));
-        let above = row * (self.width + 2) + column;
-        let below = above + self.width + 2;
-        let t = (x - column as f64) as f32;
-        let above = self.texels[above].lerp(self.texels[above + 1], t);
-        let below = self.texels[below].lerp(self.texels[below + 1], t);
-        above.lerp(below, (y - row as f64) as f32).as_dvec3()
-    }
-
-    /// The rows of pixels between whose centres v in `strip` lies, and how far it is from the first to the second.
-    fn rows(&self, strip: usize, v: f64) -> (usize, usize, f64) {
-        // Two half-rows of pixels lie between two centres; the first and the last half have only one centre beside them.
-        let half_row = strip * 2 * self.height / self.strip_density.len();
-        let (above, below) = (half_row.div_ceil(2), half_row.div_ceil(2) + 1);
-        let t = v * self.height as f64 + 0.5 - above as f64;
-        (above.saturating_sub(1), (below - 1).min(self.height - 1), t.clamp(0.0, 1.0))
-    }
-
-    /// The interpolated channel sum, summed over the row at v in `strip`.
-    fn row_sum(&self, strip: usize, v: f64) -> f64 {
-        let (above, below, t) = self.rows(strip, v);
-        let [above, below] = [above, below].map(|row| self.columns[row * (self.width + 1) + self.width]);
-        above + t * (below - above)
+    /// The weights from pixels.
+    fn integrate(&self, place: CellPlace) -> Weights {
+        let Environment { width, height, ref texels, .. } = *self.environment;
+        let part = 1.0 / f64::from(1 << place.level);
+        let (u, v) = (0.5 * part * f64::from(place.column), part * f64::from(place.row));
+        let (first_column, columns) = tent_integrals(u, 0.5 * part, width, |_| TAU);
+        let (first_row, rows) = tent_integrals(v, part, height, |v| PI * (PI * v).sin());
+        let mut weights = [DVec3::ZERO; CELL_NODES];
+        for (row, of_row) in (first_row..).zip(&rows) {
+            let texels = &texels[row.clamp(0, height as isize - 1) as usize * width..][..width];
+            let mut along = [DVec3::ZERO; NODES];
+            for (column, of_column) in (first_column..).zip(&columns) {
+                let texel = DVec3::from_array(texels[column.rem_euclid(width as isize) as usize].map(f64::from));
+                for (sum, integral) in along.iter_mut().zip(of_column) {
+                    *sum += texel * *integral;
+                }
+            }
+            for (weights, integral) in weights.chunks_exact_mut(NODES).zip(of_row) {
+                for (weight, along) in weights.iter_mut().zip(along) {
+                    *weight += along * *integral;
+                }
+            }
+        }
+        weights.map(|weight| weight.as_vec3())
     }
 }
 
-fn channel_sum<T: Into<f64> + Copy>(texel: [T; 3]) -> f64 {
-    texel[0].into() + texel[1].into() + texel[2].into()
+/// A cell's index in its level.
+fn index(place: CellPlace) -> usize {
+    place.row as usize * (2 << place.level) + place.column as usize
+}
+
+/// The weights of a cell from those of its parts: a polynomial of the whole is, on a part, the sum over the part's nodes of
+/// its values there times their polynomials.
+fn sum_of_parts(parts: [&Weights; 4]) -> Weights {
+    let mut whole = [DVec3::ZERO; CELL_NODES];
+    for (part, weights) in parts.into_iter().enumerate() {
+        let (left, top) = (part % 2 * (NODES - 1), part / 2 * (NODES - 1));
+        for (node, weight) in weights.iter().enumerate() {
+            let (along, down) = (&FINE_VALUES[left + node % NODES], &FINE_VALUES[top + node / NODES]);
+            for (i, sum) in whole.iter_mut().enumerate() {
+                *sum += weight.as_dvec3() * (along[i % NODES] * down[i / NODES]);
+            }
+        }
+    }
+    whole.map(|weight| weight.as_vec3())
+}
+
+/// Interpolates from nodes of a cell to those of its parts.
+pub fn interpolate(coarse: &[DVec3; CELL_NODES]) -> [[DVec3; FINE_NODES]; FINE_NODES] {
+    let along: [[DVec3; FINE_NODES]; NODES] = std::array::from_fn(|row| {
+        FINE_VALUES.map(|values| (0..NODES).map(|i| coarse[row * NODES + i] * values[i]).sum())
+    });
+    FINE_VALUES.map(|values| std::array::from_fn(|column| (0..NODES).map(|i| along[i][column] * values[i]).sum()))
+}
+
+/// The polynomials at the nodes of the parts.
+static FINE_VALUES: [[f64; NODES]; FINE_NODES] = {
+    let mut values = [[0.0; NODES]; FINE_NODES];
+    let mut i = 0;
+    while i < FINE_NODES {
+        values[i] = polynomials(i as f64 / (FINE_NODES - 1) as f64);
+        i += 1;
+    }
+    values
+};
+
+/// The Lagrange polynomials of the nodes at t in [0, 1]: each is 1 at its own node and 0 at the others.
+const fn polynomials(t: f64) -> [f64; NODES] {
+    let mut values = [1.0; NODES];
+    let mut i = 0;
+    while i < NODES {
+        let mut j = 0;
+        while j < NODES {
+            if i != j {
+                values[i] *= (t * (NODES - 1) as f64 - j as f64) / (i as f64 - j as f64);
+            }
+            j += 1;
+        }
+        i += 1;
+    }
+    values
+}
+
+/// Abscissae in (0, 1) and weights of the Gauss-Legendre rule of four points: exact for degree 7.
+const GAUSS: [(f64, f64); 4] = [
+    (0.069_431_844_202_973_71, 0.173_927_422_568_726_93),
+    (0.330_009_478_207_571_9, 0.326_072_577_431_273_07),
+    (0.669_990_521_792_428_1, 0.326_072_577_431_273_07),
+    (0.930_568_155_797_026_3, 0.173_927_422_568_726_93),
+];
+
+/// The integrals over an axis from `start` to `start + size` (of a whole of 1, on which `count` pixels lie) of `measure` times a
+/// pixel's bilinear weight times each polynomial; for all pixels that reach into it, from the first.
+fn tent_integrals(start: f64, size: f64, count: usize, measure: impl Fn(f64) -> f64) -> (isize, Vec<[f64; NODES]>) {
+    let place = |x: f64| x * count as f64 - 0.5;
+    let (from, to) = (place(start), place(start + size));
+    let (first, last) = (from.floor() as isize, to.ceil() as isize);
+    let mut integrals = vec![[0.0; NODES]; (last - first) as usize + 1];
+    for piece in first..last {
+        let (left, right) = (from.max(piece as f64), to.min((piece + 1) as f64));
+        for (abscissa, gauss) in GAUSS {
+            let x = left + (right - left) * abscissa;
+            let density = gauss * (right - left) / count as f64 * measure((x + 0.5) / count as f64);
+            let second = x - piece as f64;
+            for (node, value) in polynomials((x - from) / (to - from)).into_iter().enumerate() {
+                integrals[(piece - first) as usize][node] += density * (1.0 - second) * value;
+                integrals[(piece - first) as usize + 1][node] += density * second * value;
+            }
+        }
+    }
+    (first, integrals)
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::points::point;
     use super::*;
     use crate::environment::tests::environment;
 
+    /// The integral of radiance times g over a cell, by midpoints.
+    fn midpoints(map: &Environment, place: CellPlace, g: impl Fn(f64, f64) -> f64) -> DVec3 {
+        const STEPS: usize = 400;
+        let mut sum = DVec3::ZERO;
+        for (i, j) in (0..STEPS).flat_map(|i| (0..STEPS).map(move |j| (i, j))) {
+            let [s, t] = [i, j].map(|step| (step as f64 + 0.5) / STEPS as f64);
+            let (phi, theta) =
+                ((f64::from(place.column) + s) * place.side(), (f64::from(place.row) + t) * place.side());
+            let direction = DVec3::new(theta.sin() * phi.sin(), theta.cos(), -theta.sin() * phi.cos());
+            sum += map.radiance(direction) * (theta.sin() * g(s, t));
+        }
+        sum * (place.side() / STEPS as f64).powi(2)
+    }
+
     #[test]
-    fn radiance_is_the_environments_and_samples_know_their_own() {
-        for (width, height) in [(1, 1), (2, 1), (1, 7), (9, 5), (40, 300)] {
+    fn weights_are_exact_for_polynomials_under_any_light() {
+        for (width, height) in [(1, 1), (2, 1), (1, 7), (9, 5), (40, 30), (64, 32)] {
             let map = environment(width, height, |column, row| {
-                [(column * 7 % 5) as f32, (row * 3 % 7) as f32, if column == row { 1e4 } else { 0.0 }]
+                [(column * 7 % 5) as f32, (row * 3 % 7) as f32, if (column + row) % 11 == 0 { 50.0 } else { 0.0 }]
             });
             let light = Light::new(&map);
-            for i in 0..500 {
-                let p = point(1, i);
-                let (cos_theta, phi) = (2.0 * p.x - 1.0, TAU * p.y);
-                let sin_theta = (1.0 - cos_theta * cos_theta).sqrt();
-                let direction = DVec3::new(sin_theta * phi.cos(), cos_theta, sin_theta * phi.sin());
-                let error = light.evaluate(direction).0 - map.radiance(direction);
-                assert!(
-                    error.abs().max_element() < 1e-6 * map.max_radiance(),
-                    "{width} x {height} {direction}: {error}"
-                );
-
-                let sample = light.sample(p);
-                let (radiance, pdf) = light.evaluate(sample.direction);
-                assert!(((radiance - sample.radiance) / sample.radiance.element_sum()).abs().max_element() < 1e-6);
-                assert!((pdf / sample.pdf - 1.0).abs() < 1e-6, "{width} x {height}: {pdf} {}", sample.pdf);
+            for place in [(2, 0, 0), (2, 7, 3), (3, 5, 2), (5, 63, 31), (6, 0, 17), (9, 1000, 300)] {
+                let place = CellPlace { level: place.0, column: place.1, row: place.2 };
+                let weights = light.weights(place);
+                let g = |s: f64, t: f64| (0.3 + s - 1.5 * s * s) * (1.0 + t + t * t);
+                let nodes = weights.iter().enumerate();
+                let step = 1.0 / (NODES - 1) as f64;
+                let found: DVec3 = nodes
+                    .map(|(i, weight)| weight.as_dvec3() * g((i % NODES) as f64 * step, (i / NODES) as f64 * step))
+                    .sum();
+                let exact = midpoints(&map, place, g);
+                let size = midpoints(&map, place, |s, t| g(s, t).abs()).max_element();
+                let error = (found - exact).abs().max_element();
+                assert!(error <= 1e-4 * size, "{width} x {height}, {place:?}: {found} {exact}");
             }
         }
     }
 
     #[test]
-    fn the_mean_of_radiance_by_pdf_is_the_light_as_a_whole() {
+    fn weights_sum_to_the_light_as_a_whole() {
         let map = environment(11, 6, |column, row| [(column + row) as f32, 1.0, if column == 3 { 50.0 } else { 0.1 }]);
         let light = Light::new(&map);
-        let count = 1 << 14;
-        let mean =
-            (0..count).map(|i| light.sample(point(5, i))).map(|sample| sample.radiance / sample.pdf).sum::<DVec3>()
-                / f64::from(count);
-        let exact = map.mean_radiance() * 4.0 * PI;
-        assert!(((mean - exact) / exact).abs().max_element() < 1e-3, "{mean} {exact}");
+        for level in FIRST_LEVEL..8 {
+            let sum: DVec3 = CellPlace::all(level).flat_map(|place| light.weights(place)).map(Vec3::as_dvec3).sum();
+            let exact = map.mean_radiance() * 4.0 * PI;
+            assert!(((sum - exact) / exact).abs().max_element() < 1e-6, "level {level}: {sum} {exact}");
+        }
+    }
+
+    #[test]
+    fn interpolation_reproduces_polynomials_at_nodes_of_parts() {
+        let g = |s: f64, t: f64| DVec3::new(s * s, t - s * t, 1.0 + s * s * t * t);
+        let at = |i: usize, count: usize| i as f64 / (count - 1) as f64;
+        let coarse = std::array::from_fn(|i| g(at(i % NODES, NODES), at(i / NODES, NODES)));
+        for (j, row) in interpolate(&coarse).into_iter().enumerate() {
+            for (i, value) in row.into_iter().enumerate() {
+                assert!((value - g(at(i, FINE_NODES), at(j, FINE_NODES))).length() < 1e-12);
+            }
+        }
     }
 }

@@ -1,17 +1,17 @@
 //! The truth: equation (1) of every sub-pixel, on the CPU in double precision, with an estimate of its own error.
 //!
-//! The integrand is [`Environment::radiance`] times [`Brdf::evaluate`] times the cosine; nothing of threads or pyramids is in it.
-//! Directions are drawn in two ways, each in proportion to one of the two factors (`lobe`, `light`), and weighted by the balance
-//! heuristic (Veach and Guibas 1995), so that neither a narrow lobe nor a small sun makes a large weight. The points behind
-//! them are Sobol's in several independent scrambles (`points`). Each scramble gives a picture by itself; how far
-//! these lie apart tells the error of their mean. Points are doubled, pixel by pixel, until it is below the tolerance. All is
-//! deterministic: points depend on the sub-pixel's place in its pixel and on nothing else.
+//! The integrand is [`Environment::radiance`] times [`Brdf::evaluate`] times the cosine; nothing of threads or pyramids is in it,
+//! and nothing random. The sphere is cut into cells; over each, BRDF times cosine is a polynomial through a few nodes, and
+//! the integral of radiance times each polynomial is known exactly (`light`). So every pixel of the environment counts in full, and only
+//! the BRDF has to be resolved: cells are split where that changes the result most, pixel by pixel, until what splitting still
+//! changes is below the tolerance (`cubature`). Around mirror directions cells are split from the start until they
+//! are as small as the lobe (`lobe`), so that none is missed, however narrow.
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::time::Instant;
 
-use glam::{DMat3, DVec2, DVec3, UVec2, dvec3};
+use glam::{DMat3, DVec3, UVec2, dvec3};
 use rayon::prelude::*;
 
 use crate::brdf::Brdf;
@@ -25,28 +25,28 @@ use crate::vulkan::Device;
 use crate::{Error, Result};
 
 mod cache;
-mod inversion;
+mod cubature;
 mod light;
 mod lobe;
-mod points;
 #[cfg(test)]
 mod tests;
 
-use light::{Light, LightSample};
-use lobe::Lobe;
-pub use lobe::MAX_THETA_O_DEG;
-use points::point;
+use cubature::Cubature;
+use light::{CellPlace, Light};
+use lobe::half_vector_width;
 
 /// Tolerance where none is given: a twentieth of a step of an 8-bit display value.
 pub const TOLERANCE: f64 = 2e-4;
-/// Scrambles of a pixel, shared out among its sub-pixels: about 5 degrees of freedom, so one estimate of an error is good to a
-/// third. More would tell the error better and make it larger: it falls nearly as 1 / points, and more scrambles have fewer.
-const SCRAMBLES: usize = 6;
-/// Points of each scramble and way of drawing that a sub-pixel starts with, and at which it gives up.
-const FIRST_POINTS: u32 = 32;
-const MOST_POINTS: u32 = 1 << 17;
-/// Samples of so many points of each scramble are kept, as they serve many pixels.
-const KEPT_POINTS: u32 = 1024;
+/// A pixel gives up at so many cells.
+const MOST_CELLS: usize = 1 << 18;
+/// What the view angle is held below: at 90 degrees f is 0 and no slice is left. A renderer only meets it where an
+/// interpolated normal turns from the eye.
+pub const MAX_THETA_O_DEG: f64 = 89.99;
+/// At grazing angles lobes grow ever thinner across. Beyond this (87 degrees, a rim of 0.1 % of a sphere) cells are small enough to find
+/// part of them, and what is found is split like all else.
+const MIN_COS_THETA_D: f64 = 0.05;
+/// What is left of a cell's error by splitting it: see the test that estimates are honest.
+const ERROR_LEFT: f64 = 0.5;
 /// Above display white, where display values no longer tell, linear radiance is held to 1/0.05 = 20 times the tolerance, relatively.
 const ABOVE_WHITE: f64 = 0.05;
 
@@ -175,8 +175,22 @@ impl Point {
         Self { frame: DMat3::from_cols(x, n.cross(x), n), w_o: dvec3(theta_o.sin(), 0.0, theta_o.cos()), material }
     }
 
-    fn theta_o(&self) -> f64 {
-        self.w_o.x.atan2(self.w_o.z)
+    /// f(w_i, w_o) (n . w_i) per channel, in 1/sr, for unit `direction` in the axes of the environment.
+    #[inline]
+    fn f_cos(&self, brdf: &Brdf, direction: DVec3) -> DVec3 {
+        let w_i = self.frame.transpose() * direction;
+        if w_i.z > 0.0 { brdf.evaluate(w_i, self.w_o) * w_i.z } else { DVec3::ZERO }
+    }
+
+    /// Whether a lobe whose half vectors are within `width` (radians) of the normal may hide between the nodes of a cell: the
+    /// cell's half vectors then spread farther than both the lobe and their distance from the normal.
+    fn may_hide_lobe(&self, width: f64, place: CellPlace) -> bool {
+        let w_i = self.frame.transpose() * place.middle();
+        let half_vector = (w_i + self.w_o).normalize_or_zero();
+        let cos_theta_d = half_vector.dot(self.w_o).max(MIN_COS_THETA_D);
+        // Reflection doubles angles in the plane of incidence; across it, it shrinks them by the cosine.
+        let spread = place.side() / (2.0 * cos_theta_d);
+        w_i.z > -place.side() && spread > width && spread > half_vector.distance(DVec3::Z)
     }
 }
 
@@ -216,28 +230,23 @@ impl Display {
 
 /// Evaluates equation (1) for one environment and some materials.
 pub struct Integrator<'a> {
-    light: Light,
+    light: Light<'a>,
     intensity: f64,
-    lobes: Vec<Lobe<'a>>,
-    /// The light's first samples of each scramble.
-    kept: Vec<Vec<LightSample>>,
+    /// With the widths of their lobes.
+    brdfs: Vec<(&'a Brdf, f64)>,
     subpixels: usize,
 }
 
 impl<'a> Integrator<'a> {
     /// For `environment` times `intensity`, materials `brdfs`, and pixels of up to `subpixels` squared points.
     pub fn new(
-        environment: &Environment,
+        environment: &'a Environment,
         intensity: f64,
         brdfs: impl IntoIterator<Item = &'a Brdf>,
         subpixels: u32,
     ) -> Self {
-        let light = Light::new(environment);
-        let subpixels = (subpixels * subpixels) as usize;
-        let sets = (1..=subpixels).map(|points| points * scrambles(points)).max().unwrap_or(0);
-        let kept_points = |set| (0..KEPT_POINTS).map(|index| light.sample(light_uv(set, index))).collect();
-        let kept = (0..sets).into_par_iter().map(kept_points).collect();
-        Self { light, intensity, lobes: brdfs.into_iter().map(|brdf| Lobe::new(brdf, sets)).collect(), kept, subpixels }
+        let brdfs = brdfs.into_iter().map(|brdf| (brdf, half_vector_width(brdf))).collect();
+        Self { light: Light::new(environment), intensity, brdfs, subpixels: (subpixels * subpixels) as usize }
     }
 
     /// The picture of `geometry`, texels as [`crate::pipeline::Rendering::geometry`] has them.
@@ -313,80 +322,25 @@ impl<'a> Integrator<'a> {
     /// With more points than sub-pixels, or of materials that are not there.
     pub fn pixel(&self, points: &[Point], tolerance: f64, display: Display) -> PixelEstimate {
         assert!(points.len() <= self.subpixels, "at most one point a sub-pixel");
-        let scrambles = scrambles(points.len());
-        // Point by point, the sums of its scrambles.
-        let mut sums = vec![DVec3::ZERO; points.len() * scrambles];
-        let (mut done, mut next, mut radiance_error) = (0, FIRST_POINTS, DVec3::ZERO);
+        let f_cos =
+            |direction: DVec3| points.iter().map(|point| point.f_cos(self.brdfs[point.material].0, direction)).sum();
+        let must_split = |place| points.iter().any(|point| point.may_hide_lobe(self.brdfs[point.material].1, place));
+        let mut cubature = Cubature::new(&self.light, f_cos, must_split);
+        let scale = self.intensity / self.subpixels as f64;
         loop {
-            for (set, sum) in sums.iter_mut().enumerate() {
-                *sum += self.sum(&points[set / scrambles], set, done, next);
-            }
-            (done, next) = (next, 2 * next);
-            let scale = self.intensity / (f64::from(done) * (scrambles * self.subpixels) as f64);
-            let radiance = scale * sums.iter().sum::<DVec3>();
-            // Each point's variance from the spread of its scrambles; different points are independent.
-            let variance = sums.chunks_exact(scrambles).map(|sums| {
-                let mean = sums.iter().sum::<DVec3>() / scrambles as f64;
-                let squares = sums.iter().map(|sum| (scale * (sum - mean)).powf(2.0)).sum::<DVec3>();
-                squares * (scrambles as f64 / (scrambles - 1) as f64)
-            });
-            // Few scrambles may lie together by luck, and the first such luck would end the work. Errors halve at best when points
-            // are doubled, so half of the estimate before stands if it is larger.
-            radiance_error = variance.sum::<DVec3>().powf(0.5).max(0.5 * radiance_error);
+            let radiance = scale * cubature.integral;
+            let radiance_error = scale * ERROR_LEFT * cubature.squares.powf(0.5);
             let channel = |i: usize| display.error(radiance[i], radiance_error[i]);
             let display_error = DVec3::from_array([0, 1, 2].map(channel));
-            if rms(display_error) <= tolerance || done >= MOST_POINTS {
-                let evaluations = 2 * u64::from(done) * sums.len() as u64;
+            // A channel matters as much as its error is seen.
+            let seen = display_error / radiance_error.max(DVec3::splat(f64::MIN_POSITIVE));
+            let done = rms(display_error) <= tolerance || cubature.len() >= MOST_CELLS;
+            if done || !cubature.refine(seen * seen) {
+                let evaluations = cubature.evaluations * points.len() as u64;
                 return PixelEstimate { radiance, radiance_error, display_error, evaluations };
             }
         }
     }
-
-    /// The sum over points `from` to `to` of scramble `set` of the integrand divided by the density of samples.
-    fn sum(&self, point: &Point, set: usize, from: u32, to: u32) -> DVec3 {
-        let Point { frame, w_o, material } = *point;
-        let to_local = frame.transpose();
-        let lobe = &self.lobes[material];
-        let table = lobe.table(point.theta_o());
-        let mut sum = DVec3::ZERO;
-        if self.light.is_black() {
-            return sum;
-        }
-        let (kept_lobe, kept_light) = (table.kept(set), &self.kept[set]);
-        for i in from..to {
-            // A direction from the lobe.
-            let sample = kept_lobe.get(i as usize).copied().unwrap_or_else(|| table.sample(lobe_uv(set, i)));
-            let cos_theta_d = w_o.dot(sample.h);
-            let w_i = 2.0 * cos_theta_d * sample.h - w_o;
-            if cos_theta_d > 0.0 && w_i.z > 0.0 {
-                let (radiance, light_pdf) = self.light.evaluate(frame * w_i);
-                sum += lobe.f_cos(w_i, w_o) * radiance / (sample.pdf_of_w_i(cos_theta_d) + light_pdf);
-            }
-            // A direction from the light; one without radiance may have no pdf either.
-            let sample = kept_light.get(i as usize).copied().unwrap_or_else(|| self.light.sample(light_uv(set, i)));
-            let w_i = to_local * sample.direction;
-            if w_i.z > 0.0 && sample.pdf > 0.0 {
-                let h = (w_i + w_o).normalize();
-                let lobe_pdf = table.evaluate(h).pdf_of_w_i(w_o.dot(h));
-                sum += lobe.f_cos(w_i, w_o) * sample.radiance / (lobe_pdf + sample.pdf);
-            }
-        }
-        sum
-    }
-}
-
-/// Points of the light and of the lobe are scrambled apart.
-fn light_uv(set: usize, index: u32) -> DVec2 {
-    point(2 * set as u32, index)
-}
-
-fn lobe_uv(set: usize, index: u32) -> DVec2 {
-    point(2 * set as u32 + 1, index)
-}
-
-/// Scrambles of each of `points` sub-pixels.
-fn scrambles(points: usize) -> usize {
-    SCRAMBLES.div_ceil(points.max(1)).max(2)
 }
 
 fn rms(channels: DVec3) -> f64 {

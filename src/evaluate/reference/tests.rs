@@ -126,7 +126,8 @@ fn estimated_errors_are_honest() {
             }
             let ratio = (happened / estimated).sqrt();
             println!("{} at {tolerance}: error / estimate {ratio:.2}", brdf.model());
-            assert!((1.0 / 3.0..3.0).contains(&ratio), "{}: {ratio}", brdf.model());
+            // On the safe side, but not so far that work is wasted.
+            assert!((0.1..1.0).contains(&ratio), "{}: {ratio}", brdf.model());
         }
     }
 }
