@@ -65,6 +65,24 @@ pub fn load_material(source: &MaterialSource) -> Result<Brdf> {
     }
 }
 
+/// The threads that `method` shades `brdf` by, as [`threads::load_or_generate`] has them; none for a method that draws
+/// samples instead.
+///
+/// # Errors
+/// A number of threads that is out of range, or a cancelled generation.
+pub fn load_threads(
+    method: Method,
+    brdf: &Brdf,
+    settings: &threads::Settings,
+    cache: Option<&Path>,
+    observer: &dyn Observer,
+) -> Result<Option<(ThreadTable, CacheState, Duration)>> {
+    match method.uses_threads() {
+        true => threads::load_or_generate(brdf, settings, cache, observer).map(Some),
+        false => Ok(None),
+    }
+}
+
 /// Loads and makes everything; thread generation reports to `observer` and is cached in `cache` if that is a folder.
 ///
 /// # Errors
@@ -137,8 +155,7 @@ pub fn prepare(scene: &Scene, cache: Option<&Path>, observer: &dyn Observer) -> 
         let settings =
             threads::Settings { count: scene.shading.threads as usize, seed: scene.shading.seed, ..Default::default() };
         let mut material = PreparedMaterial { name: name.to_owned(), brdf, threads: None };
-        if method.uses_threads() {
-            let (threads, state, time) = threads::load_or_generate(&material.brdf, &settings, cache, observer)?;
+        if let Some((threads, state, time)) = load_threads(method, &material.brdf, &settings, cache, observer)? {
             thread_time += time;
             if state == CacheState::Miss {
                 thread_cache = CacheState::Miss;

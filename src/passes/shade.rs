@@ -157,9 +157,9 @@ pub struct DeviceLight {
 }
 
 /// The environment's pyramid on the device.
-struct DevicePyramid {
-    image: vulkan::Image,
-    sampler: Sampler,
+pub(super) struct DevicePyramid {
+    pub(super) image: vulkan::Image,
+    pub(super) sampler: Sampler,
     face_size: u32,
     /// Radiance of a texel of value 1: what keeps suns within half floats.
     scale: f32,
@@ -193,7 +193,7 @@ impl DeviceLight {
 
 impl DevicePyramid {
     /// Uploads `pyramid`, as half floats where they hold it.
-    fn new(device: &Arc<Device>, pyramid: &Pyramid) -> Result<Self> {
+    pub(super) fn new(device: &Arc<Device>, pyramid: &Pyramid) -> Result<Self> {
         let single = vk::Format::R32G32B32A32_SFLOAT;
         let use_single = !pyramid.fits_half() && device.filters_linearly(single);
         let scale = if use_single { 1.0 } else { pyramid.radiance_scale() };
