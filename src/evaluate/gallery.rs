@@ -61,9 +61,11 @@ pub fn comparison_sheets(measured: &Measured) -> Vec<Named> {
     let sheet = |(place, reference): &([String; 3], RgbImage)| {
         let [material, environment, scene] = place;
         let here = || {
-            measured.rows.iter().zip(&measured.pictures).filter(|(row, _)| {
-                (&row.material, &row.environment, &row.scene) == (material, environment, scene)
-            })
+            measured
+                .rows
+                .iter()
+                .zip(&measured.pictures)
+                .filter(|(row, _)| (&row.material, &row.environment, &row.scene) == (material, environment, scene))
         };
         let counts = in_order(here().map(|(row, _)| row.threads));
         let mut rows = Vec::new();
@@ -74,9 +76,12 @@ pub fn comparison_sheets(measured: &Measured) -> Vec<Named> {
             };
             rows.push((method.clone(), counts.iter().map(tile).collect()));
         }
-        let reference = Tile { picture: reference.clone(), caption: String::new() };
-        rows.push(("reference".to_owned(), vec![Some(reference)]));
-        (place.join("_"), Sheet { headings: counts.iter().map(u32::to_string).collect(), rows }.draw())
+        // Below the pictures that are the nearest to it.
+        let mut last = vec![None; counts.len().saturating_sub(1)];
+        last.push(Some(Tile { picture: reference.clone(), caption: String::new() }));
+        rows.push(("reference".to_owned(), last));
+        let headings = counts.iter().map(|count| format!("n = {count}")).collect();
+        (place.join("_"), Sheet { headings, rows }.draw())
     };
     measured.references.iter().map(sheet).collect()
 }

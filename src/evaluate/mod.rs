@@ -10,6 +10,7 @@
 //! | time of a frame beside its floor, and as things double: table 1 | [`speed`] |
 //! | pictures side by side: figures 10, 11 and 13 | [`gallery`] |
 //! | how it looks | [`tables`], [`plots`], [`sheet`] |
+//! | all of it on one page | [`report`](mod@report) |
 
 pub mod cases;
 pub mod difference;
@@ -18,6 +19,7 @@ pub mod metrics;
 pub mod plots;
 pub mod reference;
 mod reference_picture;
+pub mod report;
 pub mod sheet;
 pub mod speed;
 pub mod ssim;

@@ -30,6 +30,8 @@ const COLOURS: [RGBColor; 8] = [
     RGBColor(0, 0, 0),
     RGBColor(128, 130, 136),
 ];
+/// Place of grey among them.
+const GREY: usize = 7;
 /// Outlines in pixels around the point. As many as colours, but for one: so curves with one colour differ in their markers.
 const MARKERS: [&[(i32, i32)]; 7] = [
     &[(-2, -5), (2, -5), (5, -2), (5, 2), (2, 5), (-2, 5), (-5, 2), (-5, -2)],
@@ -65,15 +67,18 @@ struct Curve {
     name: String,
     /// What is not above 0 is not drawn.
     points: Vec<(f64, f64)>,
-    /// Of another curve that this one belongs to, it takes the colour and is dashed; curves count from 0.
-    companion_of: Option<usize>,
+    /// Which colour and marker.
+    style: usize,
+    /// Drawn dashed and without markers: a bound rather than a measurement of the method.
+    dashed: bool,
 }
 
 /// RMS over the number of threads, `rms_over_threads`, and over time on the GPU, `rms_over_gpu_ms`: a line a method, means over
 /// all rows; and where there are several materials, the same for each, its name in front.
 pub fn error_charts(rows: &[Row]) -> Vec<Chart> {
     let materials = in_order(rows.iter().map(|row| &row.material));
-    let mut subjects = vec![(String::new(), "all materials".to_owned(), rows.iter().collect::<Vec<_>>())];
+    let all = format!("mean of {} materials", materials.len());
+    let mut subjects = vec![(String::new(), all, rows.iter().collect::<Vec<_>>())];
     if let [only] = materials.as_slice() {
         subjects[0].1 = (*only).clone();
     } else {
@@ -84,10 +89,8 @@ pub fn error_charts(rows: &[Row]) -> Vec<Chart> {
     }
     let threads = Axis { label: "threads or samples".to_owned(), ticks: counts(rows.iter().map(|row| row.threads)) };
     let time = Axis { label: "time on the GPU, ms".to_owned(), ticks: Vec::new() };
-    let axes: [(&str, Axis, fn(&Row) -> f64); 2] = [
-        ("rms_over_threads", threads, |row| f64::from(row.threads)),
-        ("rms_over_gpu_ms", time, |row| row.gpu_ms),
-    ];
+    let axes: [(&str, Axis, fn(&Row) -> f64); 2] =
+        [("rms_over_threads", threads, |row| f64::from(row.threads)), ("rms_over_gpu_ms", time, |row| row.gpu_ms)];
     let mut charts = Vec::new();
     for (prefix, subject, rows) in subjects {
         for (name, axis, value) in &axes {
@@ -105,7 +108,7 @@ pub fn error_charts(rows: &[Row]) -> Vec<Chart> {
 
 /// Mean RMS over mean `x` of each method, a point for each count.
 fn error_curves(rows: &[&Row], x: fn(&Row) -> f64) -> Vec<Curve> {
-    let curve = |method: &String| {
+    let curve = |(style, method): (usize, &String)| {
         let rows: Vec<_> = rows.iter().filter(|row| row.method == *method).collect();
         let point = |count: f64| {
             let mean_of = |value: fn(&Row) -> f64| {
@@ -115,16 +118,16 @@ fn error_curves(rows: &[&Row], x: fn(&Row) -> f64) -> Vec<Curve> {
             (mean_of(x), mean_of(|row| row.rms))
         };
         let points = counts(rows.iter().map(|row| row.threads)).into_iter().map(point).collect();
-        Curve { name: method.clone(), points, companion_of: None }
+        Curve { name: method.clone(), points, style, dashed: false }
     };
-    in_order(rows.iter().map(|row| &row.method)).into_iter().map(curve).collect()
+    in_order(rows.iter().map(|row| &row.method)).into_iter().enumerate().map(curve).collect()
 }
 
 /// Time over the number of threads with the floor of each method dashed, `frame_over_threads`, and for each method the cost as
 /// other things grow, `METHOD_cost_over_growth`: means over materials, environments and scenes.
 pub fn speed_charts(timings: &Timings) -> Vec<Chart> {
     let mut curves = Vec::new();
-    for method in in_order(timings.frames.iter().map(|frame| &frame.method)) {
+    for (style, method) in in_order(timings.frames.iter().map(|frame| &frame.method)).into_iter().enumerate() {
         let frames: Vec<_> = timings.frames.iter().filter(|frame| frame.method == *method).collect();
         let points = |value: fn(&Frame) -> f64| {
             let point = |count: f64| {
@@ -133,9 +136,9 @@ pub fn speed_charts(timings: &Timings) -> Vec<Chart> {
             };
             counts(frames.iter().map(|frame| frame.threads)).into_iter().map(point).collect()
         };
-        let floor = points(|frame| frame.floor_ms);
-        curves.push(Curve { name: method.clone(), points: points(|frame| frame.gpu_ms), companion_of: None });
-        curves.push(Curve { name: format!("{method}, floor"), points: floor, companion_of: Some(curves.len() - 1) });
+        let (all, floor) = (points(|frame| frame.gpu_ms), points(|frame| frame.floor_ms));
+        curves.push(Curve { name: method.clone(), points: all, style, dashed: false });
+        curves.push(Curve { name: format!("{method}, floor"), points: floor, style, dashed: true });
     }
     let mut charts = vec![Chart {
         name: "frame_over_threads".to_owned(),
@@ -147,13 +150,14 @@ pub fn speed_charts(timings: &Timings) -> Vec<Chart> {
         y: Axis { label: "time on the GPU, ms".to_owned(), ticks: Vec::new() },
         curves,
     }];
+    let times = |label: &str| Axis { label: label.to_owned(), ticks: (0..8).map(|power| 2_f64.powi(power)).collect() };
     for method in in_order(timings.growths.iter().map(|growth| &growth.frame.method)) {
         let growths: Vec<_> = timings.growths.iter().filter(|growth| growth.frame.method == *method).collect();
         charts.push(Chart {
             name: format!("{method}_cost_over_growth"),
             title: format!("Cost of a frame as one thing grows, {method}"),
-            x: Axis { label: "how many times as much".to_owned(), ticks: vec![1.0, 2.0, 4.0, 8.0, 16.0] },
-            y: Axis { label: "how many times the time".to_owned(), ticks: Vec::new() },
+            x: times("how many times as much"),
+            y: times("how many times the time"),
             curves: growth_curves(&growths),
         });
     }
@@ -163,7 +167,7 @@ pub fn speed_charts(timings: &Timings) -> Vec<Chart> {
 /// Relative time over relative quantity, a curve for each thing that grows, and what would be in proportion.
 fn growth_curves(growths: &[&Growth]) -> Vec<Curve> {
     let mut curves = Vec::new();
-    for what in in_order(growths.iter().map(|growth| &growth.what)) {
+    for (style, what) in in_order(growths.iter().map(|growth| &growth.what)).into_iter().enumerate() {
         let series: Vec<_> = growths.iter().filter(|growth| growth.what == *what).collect();
         let quantities = in_order(series.iter().map(|growth| growth.quantity));
         let ms = |quantity: u64| {
@@ -172,10 +176,11 @@ fn growth_curves(growths: &[&Growth]) -> Vec<Curve> {
         };
         let first = quantities[0];
         let point = |&quantity: &u64| (quantity as f64 / first as f64, ms(quantity) / ms(first));
-        curves.push(Curve { name: what.clone(), points: quantities.iter().map(point).collect(), companion_of: None });
+        curves.push(Curve { name: what.clone(), points: quantities.iter().map(point).collect(), style, dashed: false });
     }
     let last = curves.iter().flat_map(|curve| &curve.points).map(|point| point.0).fold(1.0, f64::max);
-    curves.push(Curve { name: "in proportion".to_owned(), points: vec![(1.0, 1.0), (last, last)], companion_of: None });
+    let points = vec![(1.0, 1.0), (last, last)];
+    curves.push(Curve { name: "in proportion".to_owned(), points, style: GREY, dashed: true });
     curves
 }
 
@@ -250,13 +255,13 @@ impl Chart {
             .y_label_formatter(&|value| short(*value))
             .draw()?;
         for (index, curve) in self.curves.iter().enumerate() {
-            let style = curve.companion_of.unwrap_or(index);
-            let (colour, marker) = (COLOURS[style % COLOURS.len()], MARKERS[style % MARKERS.len()].to_vec());
+            let marker = MARKERS[curve.style % MARKERS.len()].to_vec();
+            let colour = COLOURS[curve.style % COLOURS.len()];
             let line = colour.stroke_width(2);
             let points = drawn(curve);
             let legend_y = 60 + 26 * index as i32;
             let legend_line = [(4, legend_y), (36, legend_y)];
-            if curve.companion_of.is_some() {
+            if curve.dashed {
                 chart.draw_series(DashedLineSeries::new(points, 6, 5, line))?;
                 legend.draw(&plotters::element::DashedPathElement::new(legend_line, 6, 5, line))?;
             } else {
@@ -375,16 +380,17 @@ mod tests {
             floor_ms: 0.5 * f64::from(threads),
             ns_per_lookup: 1.0,
         };
-        let growth = |threads: u32, ratio| {
-            Growth { what: "threads".into(), quantity: threads.into(), ratio, frame: frame(threads) }
+        let growth = |threads: u32, ratio| Growth {
+            what: "threads".into(),
+            quantity: threads.into(),
+            ratio,
+            frame: frame(threads),
         };
-        let timings = Timings {
-            frames: vec![frame(16), frame(64)],
-            growths: vec![growth(10, None), growth(20, Some(2.0))],
-        };
+        let timings =
+            Timings { frames: vec![frame(16), frame(64)], growths: vec![growth(10, None), growth(20, Some(2.0))] };
         let charts = speed_charts(&timings);
         assert_eq!(charts[0].curves[1].points, [(16.0, 8.0), (64.0, 32.0)]);
-        assert_eq!(charts[0].curves[1].companion_of, Some(0));
+        assert!(charts[0].curves[1].dashed && charts[0].curves[1].style == charts[0].curves[0].style);
         assert_eq!(charts[1].curves[0].points, [(1.0, 1.0), (2.0, 2.0)]);
         assert!(charts.iter().all(|chart| chart.svg().is_ok()));
         assert!(speed_charts(&Timings::default()).iter().all(|chart| chart.svg().is_ok()));

@@ -12,6 +12,8 @@ use std::convert::Infallible;
 use super::metrics::Display;
 
 const PAPER: Rgb<u8> = Rgb([255, 255, 255]);
+/// Behind surfaces: neither white, as highlights are, nor dark.
+const GREY: u8 = 216;
 const INK: Rgb888 = Rgb888::new(40, 42, 48);
 /// Around everything, and between pictures.
 const MARGIN_PX: u32 = 16;
@@ -65,9 +67,9 @@ impl Sheet {
         let left = MARGIN_PX + if label_width > 0 { label_width + GAP_PX } else { 0 };
         let top = MARGIN_PX + if self.headings.is_empty() { 0 } else { line_px + GAP_PX };
         let columns = self.rows.iter().map(|(_, cells)| cells.len()).max().unwrap_or(0).max(self.headings.len()) as u32;
-        let extent = |start: u32, count: u32, cell: u32| start + count * (cell + GAP_PX) - GAP_PX.min(count) + MARGIN_PX;
-        let (width, height) =
-            (extent(left, columns, cell_width), extent(top, self.rows.len() as u32, cell_height));
+        let extent =
+            |start: u32, count: u32, cell: u32| start + count * (cell + GAP_PX) - GAP_PX.min(count) + MARGIN_PX;
+        let (width, height) = (extent(left, columns, cell_width), extent(top, self.rows.len() as u32, cell_height));
 
         let mut canvas = Canvas(RgbImage::from_pixel(width, height, PAPER));
         let column_left = |column: usize| left + column as u32 * (cell_width + GAP_PX);
@@ -100,8 +102,7 @@ struct Canvas(RgbImage);
 impl Canvas {
     fn write(&mut self, text: &str, [x, y]: [u32; 2], font: &MonoFont, alignment: Alignment, baseline: Baseline) {
         let style = TextStyleBuilder::new().alignment(alignment).baseline(baseline).build();
-        let text =
-            Text::with_text_style(text, Point::new(x as i32, y as i32), MonoTextStyle::new(font, INK), style);
+        let text = Text::with_text_style(text, Point::new(x as i32, y as i32), MonoTextStyle::new(font, INK), style);
         let Ok(_) = text.draw(self);
     }
 }
@@ -131,12 +132,12 @@ impl DrawTarget for Canvas {
     }
 }
 
-/// Linear radiance times coverage, and coverage, as display values in 8 bits, laid over white paper. Values that are not
+/// Linear radiance times coverage, and coverage, as display values in 8 bits, laid over light grey. Values that are not
 /// finite are black.
 ///
 /// # Panics
 /// If there are not `width` x `height` pixels.
-pub fn over_paper(radiance: &[[f32; 4]], width: u32, height: u32, display: Display) -> RgbImage {
+pub fn over_grey(radiance: &[[f32; 4]], width: u32, height: u32, display: Display) -> RgbImage {
     assert_eq!(radiance.len(), width as usize * height as usize, "one value a pixel");
     RgbImage::from_fn(width, height, |x, y| {
         let [r, g, b, coverage] = radiance[(y * width + x) as usize];
@@ -145,7 +146,7 @@ pub fn over_paper(radiance: &[[f32; 4]], width: u32, height: u32, display: Displ
             let surface = if coverage > 0.0 { f64::from(value) / coverage } else { 0.0 };
             // The clamp of a NaN is a NaN, which as a byte is 0.
             let displayed = (display.exposure * surface).clamp(0.0, 1.0).powf(1.0 / display.gamma);
-            (255.0 * (coverage * displayed + 1.0 - coverage)).round() as u8
+            (255.0 * coverage * displayed + f64::from(GREY) * (1.0 - coverage)).round() as u8
         }))
     })
 }
@@ -189,14 +190,14 @@ mod tests {
     }
 
     #[test]
-    fn radiance_is_displayed_over_white() {
+    fn radiance_is_displayed_over_grey() {
         let pixels = [[0.0; 4], [0.5, 0.25, 0.0, 0.5], [2.0, 0.5, f32::NAN, 1.0]];
-        let picture = over_paper(&pixels, 3, 1, Display::default());
-        assert_eq!(picture.get_pixel(0, 0), &PAPER);
-        // Half covered: the mean of white, and of 1, a half and 0 in display values.
-        let half = 0.5_f64.powf(1.0 / 2.2);
-        let mean = |displayed: f64| (255.0 * (displayed + 1.0) / 2.0).round() as u8;
-        assert_eq!(picture.get_pixel(1, 0).0, [255, mean(half), mean(0.0)]);
-        assert_eq!(picture.get_pixel(2, 0).0, [255, (255.0 * half).round() as u8, 0]);
+        let picture = over_grey(&pixels, 3, 1, Display::default());
+        assert_eq!(picture.get_pixel(0, 0).0, [GREY; 3]);
+        // Half covered: the mean of grey, and of 1, a half and 0 in display values.
+        let half = 255.0 * 0.5_f64.powf(1.0 / 2.2);
+        let mean = |displayed: f64| ((displayed + f64::from(GREY)) / 2.0).round() as u8;
+        assert_eq!(picture.get_pixel(1, 0).0, [mean(255.0), mean(half), mean(0.0)]);
+        assert_eq!(picture.get_pixel(2, 0).0, [255, half.round() as u8, 0]);
     }
 }

@@ -1,7 +1,7 @@
 //! What a frame costs: by the number of threads beside the floor (the paper's table 1), and as other things double.
 use std::sync::Arc;
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use super::cases::{Cases, Estimator, Place};
 use crate::error::{Error, Result};
@@ -22,7 +22,7 @@ pub struct Speed {
 }
 
 /// What one frame cost, and what it did.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Frame {
     /// Name of the method.
     pub method: String,
@@ -57,7 +57,7 @@ pub struct Frame {
 }
 
 /// Time of a pass.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Pass {
     /// Its name.
     pub name: String,
@@ -66,7 +66,7 @@ pub struct Pass {
 }
 
 /// A frame of a series in which one quantity grows.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Growth {
     /// What grows: `pixels`, `sub-pixels`, `threads` or `triangles`.
     pub what: String,
@@ -80,7 +80,7 @@ pub struct Growth {
 }
 
 /// All measurements.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Timings {
     /// Each method at each count.
     pub frames: Vec<Frame>,
@@ -261,7 +261,7 @@ impl Entrant {
             gpu_ms: median_of(&|rendering| rendering.passes[index].gpu_ms),
         };
         frame.passes = passes.iter().enumerate().filter(|(_, pass)| !pass.is_readback()).map(pass).collect();
-        frame.gpu_ms = median_of(&Rendering::gpu_ms);
+        frame.gpu_ms = frame.passes.iter().map(|pass| pass.gpu_ms).sum();
         frame.frame_ms = median_of(&|rendering| rendering.frame_ms);
         frame.floor_ms = median(floor_ms);
         frame.ns_per_lookup = 1e6 * frame.pass_ms("shade") / frame.lookups as f64;

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::cases::{Cases, Place};
 use super::metrics::{Comparable, Metrics, compare};
 use super::reference_picture::ReferencePicture;
-use super::sheet::over_paper;
+use super::sheet::over_grey;
 use crate::error::{Error, Result};
 use crate::pipeline::{Renderer, Rendering, Wanted};
 use crate::prepare::Prepared;
@@ -101,7 +101,7 @@ pub fn run(
         measured.reference_error = measured.reference_error.max(truth.error_estimate);
         if sweep.keep_pictures {
             let names = [place.material, place.environment, place.scene].map(str::to_owned);
-            measured.references.push((names, over_paper(&truth.radiance, width, height, display)));
+            measured.references.push((names, over_grey(&truth.radiance, width, height, display)));
         }
         let truth = comparable(&truth.radiance);
         for estimator in sweep.cases.estimators() {
@@ -115,7 +115,7 @@ pub fn run(
                 .map_err(|error| error.within(format!("{} on {}", place.material, place.scene)))?;
             measured.rows.push(row(place, &metrics, &rendering));
             if sweep.keep_pictures {
-                measured.pictures.push(over_paper(&rendering.radiance, width, height, display));
+                measured.pictures.push(over_grey(&rendering.radiance, width, height, display));
             }
             observer.progress(measured.rows.len(), total);
         }

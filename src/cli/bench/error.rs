@@ -59,8 +59,7 @@ impl BenchError {
             counts: &[1, 4, 16, 32, 64, 100, 512],
             size: None,
         })?;
-        let sweep =
-            Sweep { cases, repeat: self.repeat, whole_picture: self.whole_picture, keep_pictures: false };
+        let sweep = Sweep { cases, repeat: self.repeat, whole_picture: self.whole_picture, keep_pictures: false };
         let device = self.cases.open_device()?;
         let progress = Progress::of("bench error", "pictures")?;
         let mut measured = Measured::default();

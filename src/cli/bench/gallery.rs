@@ -52,7 +52,9 @@ pub struct BenchGallery {
 impl BenchGallery {
     pub fn run(self) -> anyhow::Result<()> {
         let Some(folder) = &self.output.plot else {
-            return Err(Error::input("bench gallery", "has nowhere to put pictures", "name a folder with --plot DIR").into());
+            return Err(
+                Error::input("bench gallery", "has nowhere to put pictures", "name a folder with --plot DIR").into()
+            );
         };
         self.output.check()?;
         let materials = self.cases.cases(&Defaults {
@@ -66,7 +68,7 @@ impl BenchGallery {
         let compared = compared.into_iter().map(|(name, text)| (name, material_of(text))).collect();
         let sweep = Sweep {
             cases: Cases { materials: compared, ..materials.clone() },
-            repeat: 1,
+            repeat: 3,
             whole_picture: false,
             keep_pictures: true,
         };

@@ -2,6 +2,7 @@
 mod arguments;
 mod error;
 mod gallery;
+mod report;
 mod speed;
 
 use clap::Subcommand;
@@ -18,6 +19,7 @@ enum What {
     Error(Box<error::BenchError>),
     Speed(Box<speed::BenchSpeed>),
     Gallery(Box<gallery::BenchGallery>),
+    Report(Box<report::BenchReport>),
 }
 
 impl Bench {
@@ -26,6 +28,7 @@ impl Bench {
             What::Error(bench) => bench.run(),
             What::Speed(bench) => bench.run(),
             What::Gallery(bench) => bench.run(),
+            What::Report(bench) => bench.run(),
         }
     }
 }
