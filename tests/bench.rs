@@ -7,7 +7,7 @@ use std::fs;
 use tempfile::TempDir;
 
 /// What makes measurements quick.
-const SMALL: &str = "--environments white --methods paper,uniform --counts 1,4 --size 24x18";
+const SMALL: &str = "--environments white --counts 1,4 --size 24x18";
 const QUICK_TRUTH: &str = "--reference-tolerance 1e-2";
 
 /// What `threadlight bench` prints in `folder`; it must succeed and have nothing to complain about.
@@ -43,7 +43,8 @@ fn keys(object: &Value) -> Vec<&str> {
 #[test]
 fn speed_prints_tables_and_writes_json_and_plots() {
     let folder = tempfile::tempdir().unwrap();
-    let arguments = format!("speed --materials clay {SMALL} --threads 4 --repeat 1 --json speed.json --plot plots");
+    let arguments =
+        format!("speed --materials clay {SMALL} --methods paper --threads 4 --repeat 1 --json speed.json --plot plots");
     let said = bench(&folder, &arguments);
     for text in
         ["paper, clay, white, sphere: 24 x 18 pixels", "floor", "ns/lookup", "geometry_cache", "triangles", "ratio"]
@@ -53,7 +54,7 @@ fn speed_prints_tables_and_writes_json_and_plots() {
     let timings = json(&folder, "speed.json");
     assert_eq!(keys(&timings), ["frames", "growths"]);
     let (frames, growths) = (timings["frames"].as_array().unwrap(), timings["growths"].as_array().unwrap());
-    assert_eq!((frames.len(), growths.len()), (4, 24));
+    assert_eq!((frames.len(), growths.len()), (2, 12));
     let documented = [
         "floor_ms",
         "frame_ms",
@@ -74,7 +75,7 @@ fn speed_prints_tables_and_writes_json_and_plots() {
     assert_eq!(keys(&frames[0]).len(), documented.len());
     assert!(documented.iter().all(|key| frames[0].get(key).is_some() && growths[0].get(key).is_some()));
     assert!(growths[0]["ratio"].is_null() && growths[1]["ratio"].as_f64().unwrap() > 0.0);
-    let plots = ["frame_over_threads.svg", "paper_cost_over_growth.svg", "uniform_cost_over_growth.svg"];
+    let plots = ["frame_over_threads.svg", "paper_cost_over_growth.svg"];
     assert_eq!(files(&folder, "plots"), plots);
 }
 
@@ -82,7 +83,7 @@ fn speed_prints_tables_and_writes_json_and_plots() {
 fn a_gallery_has_all_materials_and_the_methods_on_one() {
     let folder = tempfile::tempdir().unwrap();
     let arguments = format!(
-        "gallery --materials clay --threads 4 --compare clay {SMALL} {QUICK_TRUTH} --plot out --json rows.json"
+        "gallery --materials clay --threads 4 --compare clay {SMALL} --methods paper,uniform {QUICK_TRUTH} --plot out --json rows.json"
     );
     let said = bench(&folder, &arguments);
     assert!(said.starts_with("clay\n  RMS"), "{said}");
@@ -97,14 +98,11 @@ fn a_gallery_has_all_materials_and_the_methods_on_one() {
 #[test]
 fn a_report_is_one_page_that_needs_no_other_file() {
     let folder = tempfile::tempdir().unwrap();
-    let small = format!("--materials clay {SMALL} {QUICK_TRUTH} --threads 4 --repeat 1");
-    bench(
-        &folder,
-        &format!("error --materials clay,white-plastic {SMALL} {QUICK_TRUTH} --json rows.json --plot plots"),
-    );
+    let small = format!("{SMALL} --methods uniform {QUICK_TRUTH}");
+    bench(&folder, &format!("error --materials clay,white-plastic {small} --json rows.json --plot plots"));
     assert_eq!(files(&folder, "plots").len(), 6);
     for from in ["", " --from rows.json"] {
-        let said = bench(&folder, &format!("report now {small}{from}"));
+        let said = bench(&folder, &format!("report now --materials clay {small} --threads 4 --repeat 1{from}"));
         assert_eq!(said, "now/report.html\n");
         assert_eq!(files(&folder, "now"), ["report.html"]);
         let page = fs::read_to_string(folder.path().join("now/report.html")).unwrap();
@@ -115,7 +113,7 @@ fn a_report_is_one_page_that_needs_no_other_file() {
         }
         assert_eq!(page.contains("white-plastic</summary>"), !from.is_empty());
         assert_eq!(page.matches("<img").count(), page.matches("src=\"data:image/png;base64,").count());
-        assert!(page.matches("<img").count() == 2 && page.matches("<svg").count() >= 5);
+        assert!(page.matches("<img").count() == 2 && page.matches("<svg").count() >= 4);
         assert!(!page.contains("href=") && !page.contains("<script") && !page.contains("NaN"), "the page needs others");
     }
 }

@@ -48,6 +48,14 @@ impl Cases {
         self.materials.len() * self.environments.len() * self.scenes.len()
     }
 
+    /// Whether all materials can be used: better found out before hours are spent on the first one.
+    ///
+    /// # Errors
+    /// The first that cannot.
+    pub fn check_materials(&self) -> Result<()> {
+        self.materials.iter().try_for_each(|(_, source)| load_material(source).map(drop))
+    }
+
     /// Calls `visit` for each combination of material, scene and environment, the last one changing fastest.
     ///
     /// # Errors
@@ -67,10 +75,7 @@ impl Cases {
             let display = Display { exposure: scene.image.exposure, gamma: scene.image.gamma };
             scenes.push((name, self.prepare_scene(scene)?, display));
         }
-        // Before hours are spent on the first material, whether the last one is there.
-        for (_, source) in self.materials.iter().skip(1) {
-            load_material(source)?;
-        }
+        self.check_materials()?;
         for (material_name, source) in &self.materials {
             let brdf = load_material(source)?;
             let mut material = vec![PreparedMaterial { name: material_name.clone(), brdf, threads: None }];

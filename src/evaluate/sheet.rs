@@ -68,7 +68,7 @@ impl Sheet {
         let top = MARGIN_PX + if self.headings.is_empty() { 0 } else { line_px + GAP_PX };
         let columns = self.rows.iter().map(|(_, cells)| cells.len()).max().unwrap_or(0).max(self.headings.len()) as u32;
         let extent =
-            |start: u32, count: u32, cell: u32| start + count * (cell + GAP_PX) - GAP_PX.min(count) + MARGIN_PX;
+            |start: u32, count: u32, cell: u32| start + (count * (cell + GAP_PX)).saturating_sub(GAP_PX) + MARGIN_PX;
         let (width, height) = (extent(left, columns, cell_width), extent(top, self.rows.len() as u32, cell_height));
 
         let mut canvas = Canvas(RgbImage::from_pixel(width, height, PAPER));

@@ -73,6 +73,7 @@ impl BenchGallery {
             keep_pictures: true,
         };
 
+        sweep.cases.check_materials()?;
         let device = self.cases.open_device()?;
         let progress = Progress::of("materials", "pictures")?;
         let mut sheets = gallery::material_sheets(&materials, estimator, &device, &progress)?;
