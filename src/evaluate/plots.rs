@@ -89,8 +89,9 @@ pub fn error_charts(rows: &[Row]) -> Vec<Chart> {
     }
     let threads = Axis { label: "threads or samples".to_owned(), ticks: counts(rows.iter().map(|row| row.threads)) };
     let time = Axis { label: "time on the GPU, ms".to_owned(), ticks: Vec::new() };
-    let axes: [(&str, Axis, fn(&Row) -> f64); 2] =
-        [("rms_over_threads", threads, |row| f64::from(row.threads)), ("rms_over_gpu_ms", time, |row| row.gpu_ms)];
+    let over_threads: fn(&Row) -> f64 = |row| f64::from(row.threads);
+    let over_time: fn(&Row) -> f64 = |row| row.gpu_ms;
+    let axes = [("rms_over_threads", threads, over_threads), ("rms_over_gpu_ms", time, over_time)];
     let mut charts = Vec::new();
     for (prefix, subject, rows) in subjects {
         for (name, axis, value) in &axes {
@@ -271,7 +272,7 @@ impl Chart {
                 legend.draw(&PathElement::new(legend_line, line))?;
                 legend.draw(&(EmptyElement::at((20, legend_y)) + Polygon::new(marker.clone(), colour.filled())))?;
             }
-            let style = TextStyle::from(font(16)).pos(Pos::new(HPos::Left, VPos::Center));
+            let style = font(16).pos(Pos::new(HPos::Left, VPos::Center));
             legend.draw(&Text::new(curve.name.clone(), (44, legend_y), style))?;
         }
         area.present()?;

@@ -110,7 +110,10 @@ pub fn run(
             }
             place.choose(estimator)?;
             let renderer = Renderer::new(device, sweep.cases.cache.as_deref(), place.prepared)?;
-            let rendering = renderer.render(Wanted { radiance: true, ..Wanted::default() }, sweep.repeat)?;
+            let wanted = Wanted { radiance: true, ..Wanted::default() };
+            // A frame that does not count: drivers compile then.
+            renderer.render(wanted, 1)?;
+            let rendering = renderer.render(wanted, sweep.repeat)?;
             let metrics = compare(&comparable(&rendering.radiance), &truth, !sweep.whole_picture)
                 .map_err(|error| error.within(format!("{} on {}", place.material, place.scene)))?;
             measured.rows.push(row(place, &metrics, &rendering));

@@ -114,7 +114,7 @@ impl CasesArguments {
 
     pub fn open_device(&self) -> Result<Arc<Device>> {
         let instance = Instance::new(false).map_err(Error::from)?;
-        Ok(Device::new(&instance, self.device.as_deref()).map_err(Error::from)?)
+        Device::new(&instance, self.device.as_deref()).map_err(Error::from)
     }
 }
 
