@@ -24,9 +24,9 @@ pub struct Report {
     pub reference_error: Option<f64>,
     /// Times.
     pub timings: Timings,
-    /// Methods by counts: see [`comparison_sheets`](super::gallery::comparison_sheets).
+    /// Methods by counts, with captions: see [`comparison_sheets`](super::gallery::comparison_sheets).
     pub comparisons: Vec<Named>,
-    /// See [`material_sheets`](super::gallery::material_sheets).
+    /// Contact sheets, with captions: see [`material_sheets`](super::gallery::material_sheets).
     pub materials: Vec<Named>,
 }
 
@@ -37,6 +37,7 @@ body { font: 15px/1.5 system-ui, sans-serif; color: var(--ink); background: var(
 h1 { font-size: 1.6rem; margin: 0 0 1rem; }
 h2 { font-size: 1.2rem; margin: 2.6rem 0 .6rem; padding-bottom: .2rem; border-bottom: 1px solid var(--rule); }
 h3 { font-size: 1rem; margin: 1.4rem 0 .4rem; }
+h2, h3 { break-after: avoid; }
 p { margin: .4rem 0; }
 .tables { display: flex; flex-wrap: wrap; gap: 0 2.5rem; }
 .tables > div { overflow-x: auto; max-width: 100%; }
@@ -50,7 +51,7 @@ figure { margin: 1rem 0 1.6rem; break-inside: avoid; }
 figure img, figure svg { display: block; max-width: min(100%, 50rem); height: auto; background: #fff; border: 1px solid var(--rule); }
 figcaption { color: var(--faint); font-size: .9rem; margin-top: .35rem; }
 summary { cursor: pointer; }
-@media print { body { margin: 0; max-width: none; font-size: 11px; } details:not([open]) { display: none; } .tables > div { overflow: visible; } }
+@media print { body { margin: 0; max-width: none; font-size: 11px; } .folded { display: none; } .tables > div { overflow: visible; } }
 ";
 
 impl Report {
@@ -113,8 +114,10 @@ impl Report {
                         @for sheet in &materials { (sheet) }
                     }
                     @if !self.rows.is_empty() {
-                        h2 { "All measurements" }
-                        (all_rows(&self.rows))
+                        div.folded {
+                            h2 { "All measurements" }
+                            (all_rows(&self.rows))
+                        }
                     }
                 }
             }
@@ -180,6 +183,5 @@ fn figure(picture: &RgbImage, caption: &str) -> Result<Markup> {
         .write_to(&mut png, ImageFormat::Png)
         .map_err(|cause| Error::input(caption, format!("cannot be encoded ({cause})"), "use a smaller --size"))?;
     let source = format!("data:image/png;base64,{}", BASE64_STANDARD.encode(png.into_inner()));
-    let caption = caption.replace('_', ", ");
     Ok(html! { figure { img src=(source) alt=(caption) width=(picture.width()); figcaption { (caption) } } })
 }

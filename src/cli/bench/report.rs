@@ -85,9 +85,14 @@ impl BenchReport {
         progress.restart("times");
         speed::run(&speed, &device, &progress, &mut report.timings)?;
         progress.restart("materials");
-        report.materials = gallery::material_sheets(&shown, estimator, &device, &progress)?;
+        let sheets = gallery::material_sheets(&shown, estimator, &device, &progress)?;
         progress.finish();
-        report.comparisons = gallery::comparison_sheets(&measured);
+        let light = format!("{}, {}", shown.environments[0].0, shown.scenes[0].0);
+        let caption = format!("{light}; method {}, {highest} threads or samples", estimator.method.name());
+        report.materials = sheets.into_iter().map(|(_, picture)| (caption.clone(), picture)).collect();
+        let captions = measured.references.iter().map(|(place, _)| place.join(", "));
+        let pictures = gallery::comparison_sheets(&measured).into_iter().map(|(_, picture)| picture);
+        report.comparisons = captions.zip(pictures).collect();
         report.reference_error = earlier.is_none().then_some(measured.reference_error);
         report.rows = earlier.unwrap_or(measured.rows);
 
