@@ -127,12 +127,7 @@ impl Renderer {
         let mut passes: Vec<Vec<PassTime>> = Vec::new();
         for _ in 0..repeat.max(1) {
             let start = std::time::Instant::now();
-            passes.push(if self.device.times_passes() {
-                executable.execute(&mut frames)?;
-                frames.pass_times()?
-            } else {
-                executable.execute_pass_by_pass(&mut frames)?
-            });
+            passes.push(executable.execute_timed(&self.device, &mut frames)?);
             frame_ms.push(start.elapsed().as_secs_f64() * 1e3);
         }
         let pass_median = |index: usize| PassTime {
@@ -150,6 +145,20 @@ impl Renderer {
             device_memory_bytes: self.device.allocated_bytes(),
             plan: executable.plan.to_string(),
         })
+    }
+}
+
+impl Rendering {
+    /// Time on the GPU of all passes but those that copy results back, in milliseconds.
+    pub fn gpu_ms(&self) -> f64 {
+        self.passes.iter().filter(|pass| !pass.is_readback()).map(|pass| pass.gpu_ms).sum()
+    }
+}
+
+impl PassTime {
+    /// Whether the pass only copies results into memory that the CPU reads.
+    pub fn is_readback(&self) -> bool {
+        self.name.starts_with("read_")
     }
 }
 
@@ -187,6 +196,23 @@ pub fn render_geometry(
     executable.execute(&mut frames)?;
     frames.wait()?;
     Ok(texels(target.as_deref()))
+}
+
+/// The floor of shading: milliseconds on the GPU that `bare` takes, and the sums of its lookups, rgb.
+///
+/// # Errors
+/// Whatever Vulkan refuses.
+pub fn time_bare_lookups(device: &Arc<Device>, bare: &BareLookups) -> Result<(f64, Vec<[f32; 4]>)> {
+    let mut graph = FrameGraph::new();
+    let sums = bare_lookups(&mut graph, bare);
+    let mut readbacks = Readbacks { graph, device, imports: Vec::new() };
+    let target = readbacks.buffer("read_sums", sums, bare.sums_bytes())?;
+    let Readbacks { graph, imports, .. } = readbacks;
+    let executable = Executable::new(device, graph, &imports)?;
+    let mut frames = Frames::new(device, "bare lookups", 1)?;
+    let passes = executable.execute_timed(device, &mut frames)?;
+    let gpu_ms = passes.iter().filter(|pass| !pass.is_readback()).map(|pass| pass.gpu_ms).sum();
+    Ok((gpu_ms, texels(Some(&target))))
 }
 
 /// Adds copies into host memory to a graph.
@@ -239,7 +265,7 @@ fn texels<T: bytemuck::Pod>(buffer: Option<&vulkan::Buffer>) -> Vec<T> {
 }
 
 /// The middle value; of an even number, the mean of the two in the middle.
-fn median(mut values: Vec<f64>) -> f64 {
+pub(crate) fn median(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     let middle = values.len() / 2;
     if values.len() % 2 == 1 { values[middle] } else { (values[middle - 1] + values[middle]) / 2.0 }

@@ -65,6 +65,23 @@ pub fn load_material(source: &MaterialSource) -> Result<Brdf> {
     }
 }
 
+/// The threads that `method` shades `brdf` by, so many and from this seed, as [`threads::load_or_generate`] has them; none for a
+/// method that draws samples instead.
+///
+/// # Errors
+/// A number of threads that is out of range, or a cancelled generation.
+pub fn load_threads(
+    method: Method,
+    brdf: &Brdf,
+    [count, seed]: [u64; 2],
+    cache: Option<&Path>,
+    observer: &dyn Observer,
+) -> Result<Option<(Threads, CacheState, Duration)>> {
+    let Some(kind) = method.threads() else { return Ok(None) };
+    let settings = threads::Settings { kind, count: count as usize, seed, ..Default::default() };
+    threads::load_or_generate(brdf, &settings, cache, observer).map(Some)
+}
+
 /// Loads and makes everything; thread generation reports to `observer` and is cached in `cache` if that is a folder.
 ///
 /// # Errors
@@ -135,10 +152,8 @@ pub fn prepare(scene: &Scene, cache: Option<&Path>, observer: &dyn Observer) -> 
             _ => error,
         })?;
         let mut material = PreparedMaterial { name: name.to_owned(), brdf, threads: None };
-        if let Some(kind) = method.threads() {
-            let count = scene.shading.threads as usize;
-            let settings = threads::Settings { kind, count, seed: scene.shading.seed, ..Default::default() };
-            let (threads, state, time) = threads::load_or_generate(&material.brdf, &settings, cache, observer)?;
+        let of = [scene.shading.threads.into(), scene.shading.seed];
+        if let Some((threads, state, time)) = load_threads(method, &material.brdf, of, cache, observer)? {
             thread_time += time;
             if state == CacheState::Miss {
                 thread_cache = CacheState::Miss;

@@ -403,3 +403,47 @@ fn sweeps_that_cannot_be_measured_are_refused() {
         refuses(&folder, &format!("bench error {arguments}"), names);
     }
 }
+
+#[test]
+fn measurements_of_time_that_cannot_be_made_are_refused() {
+    let folder = pictures();
+    for (arguments, names) in [
+        ("--threads 0", &["--threads", "1..=1024"][..]),
+        ("--repeat 0", &["--repeat", "1.."]),
+        ("--counts 16,16", &["--counts", "16 twice"]),
+        ("--methods reference", &["--methods reference"]),
+        ("--scene missing.obj", &["missing.obj"]),
+        ("--environments mars", &["mars", "studio"]),
+        ("--materials clay,unobtainium", &["unobtainium", "gold"]),
+        ("--json absent/speed.json", &["absent/speed.json"]),
+        ("--plot small.png", &["small.png"]),
+        ("--device unheard-of", &["unheard-of"]),
+    ] {
+        refuses(&folder, &format!("bench speed {arguments}"), names);
+    }
+}
+
+#[test]
+fn galleries_and_reports_that_cannot_be_made_are_refused() {
+    let folder = pictures();
+    fs::write(folder.path().join("empty.json"), "[]").unwrap();
+    fs::write(folder.path().join("other.json"), "{\"rows\": 3}").unwrap();
+    for (arguments, names) in [
+        ("gallery", &["--plot"][..]),
+        ("gallery --plot small.png", &["small.png"]),
+        ("gallery --plot out --compare unobtainium --materials clay --size 16x12", &["unobtainium"]),
+        ("gallery --plot out --compare gold,gold", &["--compare", "twice"]),
+        ("gallery --plot out --materials missing.binary", &["missing.binary"]),
+        ("report", &["<DIR>"]),
+        ("report small.png", &["small.png"]),
+        ("report absent/report", &["absent/report"]),
+        ("report out --from missing.json", &["missing.json"]),
+        ("report out --from small.png", &["small.png", "bench error --json"]),
+        ("report out --from empty.json", &["empty.json", "no measurements"]),
+        ("report out --from other.json", &["other.json", "no measurements"]),
+        ("report out --environments mars", &["mars"]),
+        ("report out --size 10x", &["--size"]),
+    ] {
+        refuses(&folder, &format!("bench {arguments}"), names);
+    }
+}

@@ -5,7 +5,7 @@ use common::{Validated, model, ready, sphere};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use tempfile::TempDir;
 use threadlight::evaluate::sweep::{self, Measured};
-use threadlight::evaluate::{ReferencePicture, Sweep};
+use threadlight::evaluate::{Cases, ReferencePicture, Sweep, gallery};
 use threadlight::method::Method;
 use threadlight::output::{ExrHeader, write_exr};
 use threadlight::pipeline::Wanted;
@@ -28,17 +28,16 @@ fn sweep(folder: &TempDir) -> Sweep {
     (scene.image.width, scene.image.height) = (40, 30);
     let metal =
         model("model = 'conductor'\ndistribution = 'ggx'\nalpha = 0.3\neta = [0.2, 0.9, 1.1]\nk = [3.9, 2.4, 2.1]");
-    Sweep {
+    let cases = Cases {
         methods: vec![Method::Paper],
         counts: vec![4, 16],
         materials: vec![("grey".into(), grey()), ("metal".into(), metal)],
         environments: vec![("white".into(), Source::Builtin("white".into())), ("map".into(), Source::File(map))],
         scenes: vec![("sphere".into(), scene)],
         seed: 0,
-        repeat: 1,
-        whole_picture: false,
         cache: None,
-    }
+    };
+    Sweep { cases, repeat: 1, whole_picture: false, keep_pictures: false }
 }
 
 /// The picture with 16 threads of `paper`, as if it were the truth.
@@ -97,8 +96,9 @@ fn background_pixels_thin_the_error_out() {
     let gpu = Validated::new();
     let folder = tempfile::tempdir().unwrap();
     let rms = |whole_picture| {
-        let mut sweep = Sweep { counts: vec![4], whole_picture, ..sweep(&folder) };
-        sweep.environments.remove(0);
+        let mut sweep = Sweep { whole_picture, ..sweep(&folder) };
+        sweep.cases.counts = vec![4];
+        sweep.cases.environments.remove(0);
         let mut measured = Measured::default();
         let reference = |prepared: &Prepared| sixteen_threads(&gpu, prepared);
         sweep::run(&sweep, &gpu.device, &reference, &(), &mut measured).unwrap();
@@ -106,6 +106,26 @@ fn background_pixels_thin_the_error_out() {
     };
     let (surface, whole) = (rms(false), rms(true));
     assert!(0.4 * surface < whole && whole < 0.8 * surface, "{surface} {whole}");
+    gpu.finish();
+}
+
+#[test]
+fn methods_with_and_without_threads_are_measured_side_by_side_and_shown() {
+    let gpu = Validated::new();
+    let folder = tempfile::tempdir().unwrap();
+    let mut sweep = Sweep { keep_pictures: true, ..sweep(&folder) };
+    sweep.cases.methods = vec![Method::Paper, Method::Importance, Method::Paper];
+    sweep.cases.materials.truncate(1);
+    let mut measured = Measured::default();
+    sweep::run(&sweep, &gpu.device, &|prepared| sixteen_threads(&gpu, prepared), &(), &mut measured).unwrap();
+    let [paper, importance, again] = [0, 1, 2].map(|method| measured.rows[2 * method + 1].clone());
+    assert_eq!((&*paper.method, &*importance.method), ("paper", "importance"));
+    assert!(paper.rms == 0.0 && again.rms == 0.0 && importance.rms > 0.0, "{paper:?} {importance:?} {again:?}");
+
+    assert_eq!((measured.pictures.len(), measured.references.len()), (12, 2));
+    assert!(measured.pictures[1] == measured.references[0].1, "the picture is the reference");
+    let sheets = gallery::comparison_sheets(&measured);
+    assert_eq!(sheets.iter().map(|(name, _)| &**name).collect::<Vec<_>>(), ["grey_white_sphere", "grey_map_sphere"]);
     gpu.finish();
 }
 

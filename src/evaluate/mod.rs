@@ -5,19 +5,28 @@
 //! | what the truth is | [`reference`](mod@reference) |
 //! | how much two pictures differ | [`metrics`], [`ssim`] |
 //! | where they differ | [`difference`] |
-//! | error and time of every method, count, material and environment | [`sweep`] |
-//! | the paper's tables 2 to 4 | [`tables`] |
-//! | the paper's figure 12, and error over time | [`plots`] |
+//! | what is measured: materials, environments, scenes, methods, counts | [`cases`] |
+//! | error and time of all of these: tables 2 to 4, figures 10 to 12 | [`sweep`] |
+//! | time of a frame beside its floor, and as things double: table 1 | [`speed`] |
+//! | pictures side by side: figures 10, 11 and 13 | [`gallery`] |
+//! | how it looks | [`tables`], [`plots`], [`sheet`] |
+//! | all of it on one page | [`report`](mod@report) |
 
+pub mod cases;
 pub mod difference;
+pub mod gallery;
 pub mod metrics;
 pub mod plots;
 pub mod reference;
 mod reference_picture;
+pub mod report;
+pub mod sheet;
+pub mod speed;
 pub mod ssim;
 pub mod sweep;
 pub mod tables;
 
+pub use cases::{Cases, Estimator, Place};
 pub use difference::difference_picture;
 pub use metrics::{Comparable, Display, Metrics, compare};
 pub use reference_picture::{ReferencePicture, reference_picture};

@@ -1,16 +1,22 @@
-//! Measurements as curves, one a method: the paper's figure 12 (error over the number of samples) and error over time.
+//! Measurements as curves: error over the number of samples (the paper's figure 12) and over time, time over the number of
+//! threads beside its floor, and time as other things grow.
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
+use plotters::coord::Shift;
 use plotters::coord::combinators::IntoLogRange;
 use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::Row;
+use super::speed::{Frame, Growth, Timings};
 use super::tables::{in_order, mean};
 use crate::error::{Error, Result};
 use crate::output::write_whole;
 
-const SIZE_PX: (u32, u32) = (900, 620);
+const SIZE_PX: (u32, u32) = (960, 600);
+/// At the right, for names: the longest is about "environment, floor".
+const LEGEND_PX: u32 = 190;
 const TEXT: RGBColor = RGBColor(40, 42, 48);
 const GRID: RGBColor = RGBColor(222, 223, 226);
 /// Distinguishable with any kind of colour vision (Okabe and Ito 2008), with grey for their yellow, which is too pale for lines.
@@ -24,31 +30,55 @@ const COLOURS: [RGBColor; 8] = [
     RGBColor(0, 0, 0),
     RGBColor(128, 130, 136),
 ];
+/// Place of grey among them.
+const GREY: usize = 7;
+/// Outlines in pixels around the point. As many as colours, but for one: so curves with one colour differ in their markers.
+const MARKERS: [&[(i32, i32)]; 7] = [
+    &[(-2, -5), (2, -5), (5, -2), (5, 2), (2, 5), (-2, 5), (-5, 2), (-5, -2)],
+    &[(-4, -4), (4, -4), (4, 4), (-4, 4)],
+    &[(0, -6), (6, 5), (-6, 5)],
+    &[(0, -7), (6, 0), (0, 7), (-6, 0)],
+    &[(0, 6), (6, -5), (-6, -5)],
+    &[(-2, -6), (2, -6), (2, -2), (6, -2), (6, 2), (2, 2), (2, 6), (-2, 6), (-2, 2), (-6, 2), (-6, -2), (-2, -2)],
+    &[(-6, -3), (0, -6), (6, -3), (6, 3), (0, 6), (-6, 3)],
+];
 
-/// One method's curve.
-struct Curve {
-    method: String,
-    points: Vec<(f64, f64)>,
+/// Curves over logarithmic axes.
+#[derive(Clone, Debug)]
+pub struct Chart {
+    /// Name of its file, without extension.
+    pub name: String,
+    title: String,
+    x: Axis,
+    y: Axis,
+    curves: Vec<Curve>,
 }
 
-/// The axis from left to right.
+/// An axis.
+#[derive(Clone, Debug)]
 struct Axis {
-    label: &'static str,
+    label: String,
     /// Values to label; empty for round ones.
     ticks: Vec<f64>,
-    value: fn(&Row) -> f64,
 }
 
-/// Draws into `folder`, which is made if it is not there, as SVG: `rms_over_threads.svg` and `rms_over_gpu_ms.svg` for the
-/// mean over all rows, and where there are several materials, the same for each, its name in front. Axes are logarithmic; what is
-/// 0 is not drawn. Returns what it wrote.
-///
-/// # Errors
-/// A file cannot be written.
-pub fn draw(rows: &[Row], folder: &Path) -> Result<Vec<PathBuf>> {
-    std::fs::create_dir_all(folder).map_err(|cause| Error::unwritable(folder, cause))?;
+#[derive(Clone, Debug, PartialEq)]
+struct Curve {
+    name: String,
+    /// What is not above 0 is not drawn.
+    points: Vec<(f64, f64)>,
+    /// Which colour and marker.
+    style: usize,
+    /// Drawn dashed and without markers: a bound rather than a measurement of the method.
+    dashed: bool,
+}
+
+/// RMS over the number of threads, `rms_over_threads`, and over time on the GPU, `rms_over_gpu_ms`: a line a method, means over
+/// all rows; and where there are several materials, the same for each, its name in front.
+pub fn error_charts(rows: &[Row]) -> Vec<Chart> {
     let materials = in_order(rows.iter().map(|row| &row.material));
-    let mut subjects = vec![(String::new(), "all materials".to_owned(), rows.iter().collect::<Vec<_>>())];
+    let all = format!("mean of {} materials", materials.len());
+    let mut subjects = vec![(String::new(), all, rows.iter().collect::<Vec<_>>())];
     if let [only] = materials.as_slice() {
         subjects[0].1 = (*only).clone();
     } else {
@@ -57,98 +87,210 @@ pub fn draw(rows: &[Row], folder: &Path) -> Result<Vec<PathBuf>> {
             subjects.push((format!("{material}_"), material.clone(), rows));
         }
     }
-    let mut counts = in_order(rows.iter().map(|row| f64::from(row.threads)));
-    counts.sort_by(f64::total_cmp);
-    let axes = [
-        ("rms_over_threads", Axis { label: "threads or samples", ticks: counts, value: |row| f64::from(row.threads) }),
-        ("rms_over_gpu_ms", Axis { label: "time on the GPU, ms", ticks: Vec::new(), value: |row| row.gpu_ms }),
-    ];
-    let mut written = Vec::new();
+    let threads = Axis { label: "threads or samples".to_owned(), ticks: counts(rows.iter().map(|row| row.threads)) };
+    let time = Axis { label: "time on the GPU, ms".to_owned(), ticks: Vec::new() };
+    let over_threads: fn(&Row) -> f64 = |row| f64::from(row.threads);
+    let over_time: fn(&Row) -> f64 = |row| row.gpu_ms;
+    let axes = [("rms_over_threads", threads, over_threads), ("rms_over_gpu_ms", time, over_time)];
+    let mut charts = Vec::new();
     for (prefix, subject, rows) in subjects {
-        for (name, axis) in &axes {
-            let path = folder.join(format!("{prefix}{name}.svg"));
-            let svg =
-                chart(&subject, axis, &curves(&rows, axis.value)).map_err(|cause| Error::unwritable(&path, cause))?;
-            write_whole(&path, svg.as_bytes())?;
-            written.push(path);
+        for (name, axis, value) in &axes {
+            charts.push(Chart {
+                name: format!("{prefix}{name}"),
+                title: format!("RMS of display values, {subject}"),
+                x: axis.clone(),
+                y: Axis { label: "RMS".to_owned(), ticks: Vec::new() },
+                curves: error_curves(&rows, *value),
+            });
         }
     }
-    Ok(written)
+    charts
 }
 
 /// Mean RMS over mean `x` of each method, a point for each count.
-fn curves(rows: &[&Row], x: fn(&Row) -> f64) -> Vec<Curve> {
-    let curve = |method: &String| {
+fn error_curves(rows: &[&Row], x: fn(&Row) -> f64) -> Vec<Curve> {
+    let curve = |(style, method): (usize, &String)| {
         let rows: Vec<_> = rows.iter().filter(|row| row.method == *method).collect();
-        let mut counts = in_order(rows.iter().map(|row| row.threads));
-        counts.sort_unstable();
-        let point = |count: &u32| {
-            let here = || rows.iter().filter(|row| row.threads == *count);
-            let mean = |value: fn(&Row) -> f64| mean(&here().map(|row| value(row)).collect::<Vec<_>>());
-            (mean(x), mean(|row| row.rms))
+        let point = |count: f64| {
+            let mean_of = |value: fn(&Row) -> f64| {
+                let here = rows.iter().filter(|row| f64::from(row.threads) == count);
+                mean(&here.map(|row| value(row)).collect::<Vec<_>>())
+            };
+            (mean_of(x), mean_of(|row| row.rms))
         };
-        let points = counts.iter().map(point).filter(|(x, y)| *x > 0.0 && *y > 0.0);
-        Curve { method: method.clone(), points: points.collect() }
+        let points = counts(rows.iter().map(|row| row.threads)).into_iter().map(point).collect();
+        Curve { name: method.clone(), points, style, dashed: false }
     };
-    in_order(rows.iter().map(|row| &row.method)).into_iter().map(curve).collect()
+    in_order(rows.iter().map(|row| &row.method)).into_iter().enumerate().map(curve).collect()
 }
 
-/// The chart as SVG; the error is the reason why not.
-fn chart(subject: &str, axis: &Axis, curves: &[Curve]) -> Result<String, String> {
-    let mut svg = String::new();
-    {
-        let area = SVGBackend::with_string(&mut svg, SIZE_PX).into_drawing_area();
-        draw_chart(&area, subject, axis, curves).map_err(|cause| cause.to_string())?;
+/// Time over the number of threads with the floor of each method dashed, `frame_over_threads`, and for each method the cost as
+/// other things grow, `METHOD_cost_over_growth`: means over materials, environments and scenes.
+pub fn speed_charts(timings: &Timings) -> Vec<Chart> {
+    let mut curves = Vec::new();
+    for (style, method) in in_order(timings.frames.iter().map(|frame| &frame.method)).into_iter().enumerate() {
+        let frames: Vec<_> = timings.frames.iter().filter(|frame| frame.method == *method).collect();
+        let points = |value: fn(&Frame) -> f64| {
+            let point = |count: f64| {
+                let here = frames.iter().filter(|frame| f64::from(frame.threads) == count);
+                (count, mean(&here.map(|frame| value(frame)).collect::<Vec<_>>()))
+            };
+            counts(frames.iter().map(|frame| frame.threads)).into_iter().map(point).collect()
+        };
+        let (all, floor) = (points(|frame| frame.gpu_ms), points(|frame| frame.floor_ms));
+        curves.push(Curve { name: method.clone(), points: all, style, dashed: false });
+        curves.push(Curve { name: format!("{method}, floor"), points: floor, style, dashed: true });
     }
-    Ok(svg)
+    let mut charts = vec![Chart {
+        name: "frame_over_threads".to_owned(),
+        title: "Time of a frame, and of its lookups alone".to_owned(),
+        x: Axis {
+            label: "threads or samples".to_owned(),
+            ticks: counts(timings.frames.iter().map(|frame| frame.threads)),
+        },
+        y: Axis { label: "time on the GPU, ms".to_owned(), ticks: Vec::new() },
+        curves,
+    }];
+    let times = |label: &str| Axis { label: label.to_owned(), ticks: (0..8).map(|power| 2_f64.powi(power)).collect() };
+    for method in in_order(timings.growths.iter().map(|growth| &growth.frame.method)) {
+        let growths: Vec<_> = timings.growths.iter().filter(|growth| growth.frame.method == *method).collect();
+        charts.push(Chart {
+            name: format!("{method}_cost_over_growth"),
+            title: format!("Cost of a frame as one thing grows, {method}"),
+            x: times("how many times as much"),
+            y: times("how many times the time"),
+            curves: growth_curves(&growths),
+        });
+    }
+    charts
 }
 
-type Area<'a> = DrawingArea<SVGBackend<'a>, plotters::coord::Shift>;
+/// Relative time over relative quantity, a curve for each thing that grows, and what would be in proportion.
+fn growth_curves(growths: &[&Growth]) -> Vec<Curve> {
+    let mut curves = Vec::new();
+    for (style, what) in in_order(growths.iter().map(|growth| &growth.what)).into_iter().enumerate() {
+        let series: Vec<_> = growths.iter().filter(|growth| growth.what == *what).collect();
+        let quantities = in_order(series.iter().map(|growth| growth.quantity));
+        let ms = |quantity: u64| {
+            let here = series.iter().filter(|growth| growth.quantity == quantity);
+            mean(&here.map(|growth| growth.frame.gpu_ms).collect::<Vec<_>>())
+        };
+        let first = quantities[0];
+        let point = |&quantity: &u64| (quantity as f64 / first as f64, ms(quantity) / ms(first));
+        curves.push(Curve { name: what.clone(), points: quantities.iter().map(point).collect(), style, dashed: false });
+    }
+    let last = curves.iter().flat_map(|curve| &curve.points).map(|point| point.0).fold(1.0, f64::max);
+    let points = vec![(1.0, 1.0), (last, last)];
+    curves.push(Curve { name: "in proportion".to_owned(), points, style: GREY, dashed: true });
+    curves
+}
 
-fn draw_chart(area: &Area, subject: &str, axis: &Axis, curves: &[Curve]) -> Result<(), Box<dyn std::error::Error>> {
-    let font = |size: u32| ("sans-serif", size).into_font().color(&TEXT);
-    let points = || curves.iter().flat_map(|curve| &curve.points);
-    let (x, y) = (around(points().map(|point| point.0)), around(points().map(|point| point.1)));
-    let x_ticks = if axis.ticks.is_empty() { ticks(&x) } else { axis.ticks.clone() };
-    let y_ticks = ticks(&y);
-    area.fill(&WHITE)?;
-    let mut chart = ChartBuilder::on(area)
-        .caption(format!("RMS of display values, {subject}"), font(22))
-        .margin(16)
-        .x_label_area_size(52)
-        .y_label_area_size(76)
-        .build_cartesian_2d(x.log_scale().with_key_points(x_ticks), y.log_scale().with_key_points(y_ticks))?;
-    chart
-        .configure_mesh()
-        .max_light_lines(0)
-        .bold_line_style(GRID)
-        .axis_style(TEXT)
-        .label_style(font(16))
-        .axis_desc_style(font(17))
-        .x_desc(axis.label)
-        .y_desc("RMS")
-        .x_label_formatter(&|value| short(*value))
-        .y_label_formatter(&|value| short(*value))
-        .draw()?;
-    for (Curve { method, points }, colour) in curves.iter().zip(COLOURS.iter().cycle()) {
-        let line = colour.stroke_width(2);
+/// Each number once, in rising order.
+fn counts(all: impl Iterator<Item = u32>) -> Vec<f64> {
+    let mut counts = in_order(all.map(f64::from));
+    counts.sort_by(f64::total_cmp);
+    counts
+}
+
+/// Writes each of `charts` as SVG into `folder`, which is made if it is not there. Returns what it wrote.
+///
+/// # Errors
+/// A file cannot be written.
+pub fn write(charts: &[Chart], folder: &Path) -> Result<Vec<PathBuf>> {
+    std::fs::create_dir_all(folder).map_err(|cause| Error::unwritable(folder, cause))?;
+    let write = |chart: &Chart| {
+        let path = folder.join(format!("{}.svg", chart.name));
+        let svg = chart.svg().map_err(|cause| Error::unwritable(&path, cause))?;
+        write_whole(&path, svg.as_bytes())?;
+        Ok(path)
+    };
+    charts.iter().map(write).collect()
+}
+
+type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+
+impl Chart {
+    /// The chart as SVG.
+    ///
+    /// # Errors
+    /// Why it cannot be drawn.
+    pub fn svg(&self) -> Result<String, String> {
+        let mut svg = String::new();
+        {
+            let area = SVGBackend::with_string(&mut svg, SIZE_PX).into_drawing_area();
+            self.draw(&area).map_err(|cause| cause.to_string())?;
+        }
+        Ok(svg)
+    }
+
+    fn draw(&self, area: &Area) -> Result<(), Box<dyn std::error::Error>> {
+        let font = |size: u32| ("sans-serif", size).into_font().color(&TEXT);
+        let drawn = |curve: &Curve| -> Vec<(f64, f64)> {
+            curve.points.iter().copied().filter(|(x, y)| *x > 0.0 && *y > 0.0).collect()
+        };
+        let points: Vec<_> = self.curves.iter().flat_map(drawn).collect();
+        let (x, y) = (around(points.iter().map(|point| point.0)), around(points.iter().map(|point| point.1)));
+        let ticks_of = |axis: &Axis, range: &Range<f64>| match axis.ticks.as_slice() {
+            [] => ticks(range),
+            ticks => apart(ticks, range),
+        };
+        let (x_ticks, y_ticks) = (ticks_of(&self.x, &x), ticks_of(&self.y, &y));
+        area.fill(&WHITE)?;
+        let (plot, legend) = area.split_horizontally(SIZE_PX.0 - LEGEND_PX);
+        let mut chart = ChartBuilder::on(&plot)
+            .caption(&self.title, font(22))
+            .margin(16)
+            .x_label_area_size(52)
+            .y_label_area_size(76)
+            .build_cartesian_2d(x.log_scale().with_key_points(x_ticks), y.log_scale().with_key_points(y_ticks))?;
         chart
-            .draw_series(LineSeries::new(points.iter().copied(), line))?
-            .label(method)
-            .legend(move |(x, y)| PathElement::new([(x, y), (x + 24, y)], line));
-        chart.draw_series(points.iter().map(|point| Circle::new(*point, 4, colour.filled())))?;
+            .configure_mesh()
+            .max_light_lines(0)
+            .bold_line_style(GRID)
+            .axis_style(TEXT)
+            .label_style(font(16))
+            .axis_desc_style(font(17))
+            .x_desc(&self.x.label)
+            .y_desc(&self.y.label)
+            .x_label_formatter(&|value| short(*value))
+            .y_label_formatter(&|value| short(*value))
+            .draw()?;
+        for (index, curve) in self.curves.iter().enumerate() {
+            let marker = MARKERS[curve.style % MARKERS.len()].to_vec();
+            let colour = COLOURS[curve.style % COLOURS.len()];
+            let line = colour.stroke_width(2);
+            let points = drawn(curve);
+            let legend_y = 60 + 26 * index as i32;
+            let legend_line = [(4, legend_y), (36, legend_y)];
+            if curve.dashed {
+                chart.draw_series(DashedLineSeries::new(points, 6, 5, line))?;
+                legend.draw(&plotters::element::DashedPathElement::new(legend_line, 6, 5, line))?;
+            } else {
+                chart.draw_series(LineSeries::new(points.iter().copied(), line))?;
+                let at = |point| EmptyElement::at(point) + Polygon::new(marker.clone(), colour.filled());
+                chart.draw_series(points.iter().map(|point| at(*point)))?;
+                legend.draw(&PathElement::new(legend_line, line))?;
+                legend.draw(&(EmptyElement::at((20, legend_y)) + Polygon::new(marker.clone(), colour.filled())))?;
+            }
+            let style = font(16).pos(Pos::new(HPos::Left, VPos::Center));
+            legend.draw(&Text::new(curve.name.clone(), (44, legend_y), style))?;
+        }
+        area.present()?;
+        Ok(())
     }
-    chart
-        .configure_series_labels()
-        .position(SeriesLabelPosition::LowerLeft)
-        .legend_area_size(34)
-        .margin(12)
-        .label_font(font(16))
-        .background_style(WHITE)
-        .border_style(GRID)
-        .draw()?;
-    area.present()?;
-    Ok(())
+}
+
+/// Those of `ticks` in `range` that are far enough from the one before for both to be labelled.
+fn apart(ticks: &[f64], range: &Range<f64>) -> Vec<f64> {
+    // About the width of four digits.
+    let least = (range.end / range.start).powf(0.05);
+    let mut kept: Vec<f64> = Vec::new();
+    for &tick in ticks.iter().filter(|tick| range.contains(tick)) {
+        if kept.last().is_none_or(|last| tick / last >= least) {
+            kept.push(tick);
+        }
+    }
+    kept
 }
 
 /// A range around positive `values` with a little room on both sides.
@@ -180,8 +322,8 @@ mod tests {
     #[test]
     fn curves_are_means_by_count_in_rising_order() {
         let rows = rows();
-        let curves = curves(&rows.iter().rev().collect::<Vec<_>>(), |row| row.gpu_ms);
-        let paper = curves.iter().find(|curve| curve.method == "paper").unwrap();
+        let curves = error_curves(&rows.iter().rev().collect::<Vec<_>>(), |row| row.gpu_ms);
+        let paper = curves.iter().find(|curve| curve.name == "paper").unwrap();
         let expected = [(0.61, 0.3), (2.26, 0.3 * 16_f64.powf(-0.7)), (11.5, 0.3 * 100_f64.powf(-0.7))];
         for ((x, y), (expected_x, expected_y)) in paper.points.iter().zip(expected) {
             assert!((x - expected_x).abs() < 1e-9 && (y - expected_y).abs() < 1e-9, "{:?}", paper.points);
@@ -192,7 +334,7 @@ mod tests {
     fn a_chart_for_all_and_one_for_each_material_name_their_methods() {
         let folder = tempfile::tempdir().unwrap();
         let folder = folder.path().join("made/on/demand");
-        let written = draw(&rows(), &folder).unwrap();
+        let written = write(&error_charts(&rows()), &folder).unwrap();
         assert_eq!(written.len(), 6);
         for path in written {
             let svg = std::fs::read_to_string(&path).unwrap();
@@ -210,8 +352,49 @@ mod tests {
         let one = rows().remove(0);
         let zero = Row { rms: 0.0, gpu_ms: 0.0, ..one.clone() };
         for rows in [vec![], vec![one], vec![zero]] {
-            draw(&rows, folder.path()).unwrap();
+            write(&error_charts(&rows), folder.path()).unwrap();
         }
+    }
+
+    #[test]
+    fn labels_keep_a_distance() {
+        assert_eq!(apart(&[16.0, 32.0, 64.0, 100.0, 104.0, 512.0], &(10.0..600.0)), [16.0, 32.0, 64.0, 100.0, 512.0]);
+        assert_eq!(apart(&[1.0, 50.0], &(10.0..600.0)), [50.0]);
+    }
+
+    #[test]
+    fn speed_has_a_floor_for_each_method_and_a_chart_of_growth() {
+        let frame = |threads: u32| Frame {
+            method: "paper".into(),
+            threads,
+            material: "m".into(),
+            environment: "e".into(),
+            scene: "s".into(),
+            width: 40,
+            height: 30,
+            subpixels: 2,
+            triangles: 12,
+            lookups: 1000,
+            passes: Vec::new(),
+            gpu_ms: f64::from(threads),
+            frame_ms: f64::from(threads),
+            floor_ms: 0.5 * f64::from(threads),
+            ns_per_lookup: 1.0,
+        };
+        let growth = |threads: u32, ratio| Growth {
+            what: "threads".into(),
+            quantity: threads.into(),
+            ratio,
+            frame: frame(threads),
+        };
+        let timings =
+            Timings { frames: vec![frame(16), frame(64)], growths: vec![growth(10, None), growth(20, Some(2.0))] };
+        let charts = speed_charts(&timings);
+        assert_eq!(charts[0].curves[1].points, [(16.0, 8.0), (64.0, 32.0)]);
+        assert!(charts[0].curves[1].dashed && charts[0].curves[1].style == charts[0].curves[0].style);
+        assert_eq!(charts[1].curves[0].points, [(1.0, 1.0), (2.0, 2.0)]);
+        assert!(charts.iter().all(|chart| chart.svg().is_ok()));
+        assert!(speed_charts(&Timings::default()).iter().all(|chart| chart.svg().is_ok()));
     }
 
     #[test]

@@ -1,66 +1,175 @@
-//! Measurements as text, in the layout of the paper's tables 2 to 4: a row for each method, a column for each count.
+//! Measurements as tables, in the layout of the paper's: errors with a row for each method and a column for each count (tables 2
+//! to 4), times with a row for each frame (table 1).
 use std::collections::BTreeSet;
-use std::fmt::Write;
+use std::fmt;
 
 use super::Row;
+use super::speed::{Frame, Timings};
 
-/// A table for each material where there are several (the paper's tables 2 and 3), and one over all of them (table 4).
+/// Tables under one heading.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Section {
+    /// What they are of.
+    pub title: String,
+    /// One below the other.
+    pub tables: Vec<Table>,
+}
+
+/// Text in rows and columns.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Table {
+    /// What is in it; or, above the first column, what the rows are.
+    pub title: String,
+    /// Above the other columns.
+    pub head: Vec<String>,
+    /// Label and cells of each row.
+    pub rows: Vec<(String, Vec<String>)>,
+}
+
+impl fmt::Display for Section {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        writeln!(f, "{}", self.title)?;
+        self.tables.iter().try_for_each(|table| table.fmt(f))
+    }
+}
+
+impl fmt::Display for Table {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let width = |index: usize| {
+            let cells = self.rows.iter().filter_map(|(_, cells)| cells.get(index));
+            cells.chain(self.head.get(index)).map(|cell| cell.chars().count() + 2).max().unwrap_or(0).max(10)
+        };
+        let mut line = |label: &str, cells: &[String]| {
+            write!(f, "  {label:<14}")?;
+            cells.iter().enumerate().try_for_each(|(index, cell)| write!(f, "{cell:>0$}", width(index)))?;
+            writeln!(f)
+        };
+        line(&self.title, &self.head)?;
+        self.rows.iter().try_for_each(|(label, cells)| line(label, cells))
+    }
+}
+
+/// Sections as text, an empty line between them.
+pub fn text(sections: &[Section]) -> String {
+    sections.iter().map(Section::to_string).collect::<Vec<_>>().join("\n")
+}
+
+/// Tables for each material where there are several (the paper's tables 2 and 3), and over all of them (table 4).
 ///
 /// Each has the mean RMS and SSIM over its environments and scenes; the last also FLIP, the largest RMS of any material,
 /// environment and scene, and the mean time on the GPU.
-pub fn tables(rows: &[Row]) -> String {
+pub fn error_tables(rows: &[Row]) -> Vec<Section> {
     let materials = in_order(rows.iter().map(|row| &row.material));
     let places = in_order(rows.iter().map(|row| (&row.environment, &row.scene))).len();
     let over_places = if places == 1 { String::new() } else { format!(", mean over {places} lights and scenes") };
-    let rms_and_ssim =
-        |rows: &[&Row]| table("RMS", rows, mean, |row| row.rms, 5) + &table("SSIM", rows, mean, |row| row.ssim, 5);
-    let mut text = String::new();
+    let rms_and_ssim = |rows: &[&Row]| {
+        vec![error_table("RMS", rows, mean, |row| row.rms, 5), error_table("SSIM", rows, mean, |row| row.ssim, 5)]
+    };
+    let mut sections = Vec::new();
     let title = match materials.as_slice() {
-        [] => return text,
+        [] => return sections,
         [only] => (*only).clone(),
         several => {
             for material in several {
                 let rows: Vec<_> = rows.iter().filter(|row| row.material == **material).collect();
-                text += &format!("{material}{over_places}\n{}\n", rms_and_ssim(&rows));
+                sections.push(Section { title: format!("{material}{over_places}"), tables: rms_and_ssim(&rows) });
             }
             format!("mean of {} materials", several.len())
         }
     };
     let rows: Vec<_> = rows.iter().collect();
-    text += &format!("{title}{over_places}\n{}", rms_and_ssim(&rows));
-    text += &table("FLIP", &rows, mean, |row| row.flip, 5);
-    text += &table("RMS, worst", &rows, largest, |row| row.rms, 5);
-    text += &table("GPU ms", &rows, mean, |row| row.gpu_ms, 3);
-    text
+    let mut tables = rms_and_ssim(&rows);
+    tables.push(error_table("FLIP", &rows, mean, |row| row.flip, 5));
+    tables.push(error_table("RMS, worst", &rows, largest, |row| row.rms, 5));
+    tables.push(error_table("GPU ms", &rows, mean, |row| row.gpu_ms, 3));
+    sections.push(Section { title: format!("{title}{over_places}"), tables });
+    sections
 }
 
 /// A line for each method and a column for each count of `summary` of `value`.
-fn table(
+fn error_table(
     title: &str,
     rows: &[&Row],
     summary: impl Fn(&[f64]) -> f64,
     value: impl Fn(&Row) -> f64,
     decimals: usize,
-) -> String {
+) -> Table {
     let counts: BTreeSet<u32> = rows.iter().map(|row| row.threads).collect();
-    let mut text = format!("  {title:<14}");
-    for count in &counts {
-        let _ = write!(text, "{count:>10}");
+    let cell = |method: &str, count: u32| {
+        let here = rows.iter().filter(|row| row.method == *method && row.threads == count);
+        let values: Vec<f64> = here.map(|row| value(row)).collect();
+        if values.is_empty() { "-".to_owned() } else { format!("{:.decimals$}", summary(&values)) }
+    };
+    let row = |method: &String| (method.clone(), counts.iter().map(|&count| cell(method, count)).collect());
+    Table {
+        title: title.to_owned(),
+        head: counts.iter().map(u32::to_string).collect(),
+        rows: in_order(rows.iter().map(|row| &row.method)).into_iter().map(row).collect(),
     }
-    text.push('\n');
-    for method in in_order(rows.iter().map(|row| &row.method)) {
-        let _ = write!(text, "  {method:<14}");
-        for count in &counts {
-            let here = rows.iter().filter(|row| row.method == *method && row.threads == *count);
-            let values: Vec<f64> = here.map(|row| value(row)).collect();
-            let _ = match values.is_empty() {
-                true => write!(text, "{:>10}", "-"),
-                false => write!(text, "{:>10.decimals$}", summary(&values)),
+}
+
+/// The paper's table 1 for each method in each place, with the floor: times in milliseconds.
+pub fn frame_tables(timings: &Timings) -> Vec<Section> {
+    let places = in_order(timings.frames.iter().map(place));
+    let section = |of: (&String, String)| {
+        let frames: Vec<_> = timings.frames.iter().filter(|frame| place(frame) == of).collect();
+        let row = |frame: &&Frame| {
+            let floor = [format!("{:.2}", frame.floor_ms), format!("{:.2}", frame.pass_ms("shade") / frame.floor_ms)];
+            (frame.threads.to_string(), costs(frame).into_iter().chain(floor).collect())
+        };
+        let head = cost_heads(&frames).into_iter().chain(["floor", "shade/floor"].map(str::to_owned)).collect();
+        let table = Table { title: "threads".to_owned(), head, rows: frames.iter().map(row).collect() };
+        let Frame { width, height, subpixels, triangles, .. } = frames[0];
+        let size = format!("{width} x {height} pixels, {subpixels} x {subpixels} sub-pixels, {triangles} triangles");
+        Section { title: format!("{}, {}: {size}; times in ms", of.0, of.1), tables: vec![table] }
+    };
+    places.into_iter().map(section).collect()
+}
+
+/// What growing numbers of pixels, sub-pixels, threads and triangles cost, for each method in each place.
+pub fn growth_tables(timings: &Timings) -> Vec<Section> {
+    let places = in_order(timings.growths.iter().map(|growth| place(&growth.frame)));
+    let section = |of: (&String, String)| {
+        let here: Vec<_> = timings.growths.iter().filter(|growth| place(&growth.frame) == of).collect();
+        let frames: Vec<_> = here.iter().map(|growth| &growth.frame).collect();
+        let table = |what: &String| {
+            let row = |growth: &&&super::speed::Growth| {
+                let ratio = growth.ratio.map_or("-".to_owned(), |ratio| format!("{ratio:.2}"));
+                (growth.quantity.to_string(), costs(&growth.frame).into_iter().chain([ratio]).collect())
             };
-        }
-        text.push('\n');
-    }
-    text
+            Table {
+                title: what.clone(),
+                head: cost_heads(&frames).into_iter().chain(["ratio".to_owned()]).collect(),
+                rows: here.iter().filter(|growth| growth.what == *what).map(|growth| row(&growth)).collect(),
+            }
+        };
+        let tables = in_order(here.iter().map(|growth| &growth.what)).into_iter().map(table).collect();
+        Section { title: format!("{}, {}: cost as one thing grows; times in ms", of.0, of.1), tables }
+    };
+    places.into_iter().map(section).collect()
+}
+
+/// Method; material, environment and scene.
+fn place(frame: &Frame) -> (&String, String) {
+    (&frame.method, format!("{}, {}, {}", frame.material, frame.environment, frame.scene))
+}
+
+/// Passes that are worth a column: not those that only set counters to zero.
+fn pass_names<'a>(frames: &[&'a Frame]) -> Vec<&'a str> {
+    let all = in_order(frames.iter().flat_map(|frame| frame.passes.iter().map(|pass| pass.name.as_str())));
+    all.into_iter().filter(|name| !name.starts_with("clear_")).collect()
+}
+
+fn cost_heads(frames: &[&Frame]) -> Vec<String> {
+    ["ns/lookup"].into_iter().chain(pass_names(frames)).chain(["all passes"]).map(str::to_owned).collect()
+}
+
+/// A cell for each of `cost_heads`.
+fn costs(frame: &Frame) -> Vec<String> {
+    let mut cells = vec![format!("{:.2}", frame.ns_per_lookup)];
+    cells.extend(pass_names(&[frame]).into_iter().map(|name| format!("{:.2}", frame.pass_ms(name))));
+    cells.push(format!("{:.2}", frame.gpu_ms));
+    cells
 }
 
 /// Arithmetic mean.
@@ -120,7 +229,7 @@ pub(super) mod tests {
 
     #[test]
     fn tables_have_the_means_by_method_and_count() {
-        let text = tables(&rows());
+        let text = text(&error_tables(&rows()));
         let expected = "\
 matt, mean over 2 lights and scenes
   RMS                    1        16       100
@@ -153,15 +262,15 @@ mean of 2 materials, mean over 2 lights and scenes
     #[test]
     fn what_was_not_measured_is_a_dash() {
         let rows: Vec<_> = rows().into_iter().filter(|row| row.method != "paper" || row.threads != 16).collect();
-        assert!(tables(&rows).contains("  paper            0.15000         -   0.00597\n"));
-        assert_eq!(tables(&[]), "");
+        assert!(text(&error_tables(&rows)).contains("  paper            0.15000         -   0.00597\n"));
+        assert_eq!(text(&error_tables(&[])), "");
     }
 
     #[test]
     fn a_single_material_has_one_table() {
         let rows: Vec<_> =
             rows().into_iter().filter(|row| row.material == "shiny" && row.environment == "sun").collect();
-        let text = tables(&rows);
+        let text = text(&error_tables(&rows));
         assert!(text.starts_with("shiny\n  RMS  ") && text.matches("  RMS  ").count() == 1, "{text}");
     }
 

@@ -118,12 +118,26 @@ impl<'a> Executable<'a> {
         Ok(())
     }
 
+    /// Runs one frame until the GPU is done with it; gives the time of each pass, by timestamps where those of `device` tell
+    /// passes apart.
+    ///
+    /// # Errors
+    /// Whatever Vulkan refuses.
+    pub fn execute_timed(&self, device: &Device, frames: &mut Frames) -> Result<Vec<PassTime>> {
+        if device.times_passes() {
+            self.execute(frames)?;
+            Ok(frames.pass_times()?)
+        } else {
+            self.execute_pass_by_pass(frames)
+        }
+    }
+
     /// Submits one frame pass by pass, waiting for each, and times them from outside: for devices whose timestamps do
     /// not tell.
     ///
     /// # Errors
     /// Whatever Vulkan refuses.
-    pub fn execute_pass_by_pass(&self, frames: &mut Frames) -> Result<Vec<PassTime>> {
+    fn execute_pass_by_pass(&self, frames: &mut Frames) -> Result<Vec<PassTime>> {
         let mut times = Vec::new();
         for pass in &self.plan.passes {
             let start = Instant::now();

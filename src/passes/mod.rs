@@ -3,6 +3,7 @@
 //! What a pass needs besides its handles (pipeline, meshes, tables) is made once, in a struct beside the function.
 
 mod background;
+mod bare_lookups;
 mod classify;
 mod clear;
 mod geometry_cache;
@@ -13,6 +14,7 @@ mod view;
 mod vmf_pyramid;
 
 pub use background::{Background, background};
+pub use bare_lookups::{BareLookups, bare_lookups};
 pub use classify::{Classify, Counters, SMOOTH_DEG, Tiles, classify};
 pub use clear::clear;
 pub use geometry_cache::{DeviceMesh, GeometryCache, Object, geometry_cache};

@@ -179,9 +179,9 @@ pub struct DeviceLight {
 }
 
 /// The environment's pyramid on the device.
-struct DevicePyramid {
-    image: vulkan::Image,
-    sampler: Sampler,
+pub(super) struct DevicePyramid {
+    pub(super) image: vulkan::Image,
+    pub(super) sampler: Sampler,
     face_size: u32,
     /// Radiance of a texel of value 1: what keeps suns within half floats.
     scale: f32,
@@ -230,7 +230,7 @@ impl DeviceLight {
 
 impl DevicePyramid {
     /// Uploads `pyramid`, as half floats of radiance over `scale` where they hold it.
-    fn new(device: &Arc<Device>, name: &str, pyramid: &Pyramid, scale: f32) -> Result<Self> {
+    pub(super) fn new(device: &Arc<Device>, name: &str, pyramid: &Pyramid, scale: f32) -> Result<Self> {
         let single = vk::Format::R32G32B32A32_SFLOAT;
         let use_single = !pyramid.fits_half() && device.filters_linearly(single);
         let level = |level| -> Vec<u8> {

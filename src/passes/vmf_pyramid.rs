@@ -63,9 +63,8 @@ pub fn vmf_pyramid(device: &Arc<Device>, cache: &PipelineCache, source: &Pyramid
     }
     let executable = Executable::new(device, graph, &imports)?;
     let mut frames = Frames::new(device, "vmf_pyramid", 1)?;
-    for time in executable.execute_pass_by_pass(&mut frames)? {
-        eprintln!("{} {:.1} ms", time.name, time.gpu_ms);
-    }
+    executable.execute(&mut frames)?;
+    frames.wait()?;
     let level = |target: &Arc<Buffer>| bytemuck::pod_collect_to_vec(target.contents().unwrap_or_default());
     Ok(VmfPyramid::from_maps(source.face_size, targets.iter().map(level).collect()))
 }

@@ -63,6 +63,27 @@ impl Mesh {
         Ok(mesh)
     }
 
+    /// The same surface with each triangle split into four at the middles of its edges; normals are interpolated.
+    pub fn subdivided(&self) -> Self {
+        let mut mesh = Self { indices: Vec::with_capacity(4 * self.indices.len()), ..self.clone() };
+        let mut middles = HashMap::new();
+        for &[a, b, c] in self.indices.as_chunks::<3>().0 {
+            let [ab, bc, ca] = [[a, b], [b, c], [c, a]].map(|[from, to]| {
+                // Both triangles at an edge get the same vertex.
+                *middles.entry([from.min(to), from.max(to)]).or_insert_with(|| {
+                    let [from, to] = [from as usize, to as usize];
+                    let normal = self.normals[from] + self.normals[to];
+                    mesh.positions.push(self.positions[from].midpoint(self.positions[to]));
+                    // Opposite normals have no middle.
+                    mesh.normals.push(normal.try_normalize().unwrap_or(self.normals[from]));
+                    mesh.positions.len() as u32 - 1
+                })
+            });
+            mesh.indices.extend([a, ab, ca, ab, b, bc, ca, bc, c, ab, bc, ca]);
+        }
+        mesh
+    }
+
     /// The smallest and largest coordinates.
     pub fn bounds(&self) -> (Vec3, Vec3) {
         self.positions.iter().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), &position| {
@@ -272,6 +293,26 @@ mod tests {
         assert_eq!(octagon.indices.len(), 18);
         assert!((area(&octagon) - 8f32.sqrt()).abs() < 1e-5);
         assert!(octagon.normals.iter().all(|normal| normal.distance(Vec3::Z) < 1e-6));
+    }
+
+    #[test]
+    fn subdividing_leaves_the_surface_as_it_is_and_shares_vertices() {
+        let cube = load(CUBE).unwrap();
+        let fine = cube.subdivided();
+        assert_eq!(fine.indices.len(), 4 * cube.indices.len());
+        // A closed surface of genus 0 has 3 E = 2 F edges each with one new vertex: V + 18.
+        assert_eq!(fine.positions.len(), cube.positions.len() + 18);
+        assert_eq!(fine.bounds(), cube.bounds());
+        let area_vector = |mesh: &Mesh, t: &[u32]| {
+            let [a, b, c] = [t[0], t[1], t[2]].map(|corner| mesh.positions[corner as usize]);
+            (b - a).cross(c - a)
+        };
+        for (coarse, quarters) in cube.indices.chunks_exact(3).zip(fine.indices.chunks_exact(12)) {
+            for quarter in quarters.chunks_exact(3) {
+                assert!(area_vector(&fine, quarter).distance(area_vector(&cube, coarse) / 4.0) < 1e-6);
+            }
+        }
+        assert!(fine.normals.iter().all(|normal| normal.is_normalized()));
     }
 
     #[test]

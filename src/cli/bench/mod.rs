@@ -1,9 +1,13 @@
 //! `threadlight bench`: measurements, one file each.
+mod arguments;
 mod error;
+mod gallery;
+mod report;
+mod speed;
 
 use clap::Subcommand;
 
-/// Measures: how wrong pictures are, and what they cost.
+/// Measures: how wrong pictures are, what they cost, and how they look.
 #[derive(clap::Args)]
 pub struct Bench {
     #[command(subcommand)]
@@ -13,12 +17,18 @@ pub struct Bench {
 #[derive(Subcommand)]
 enum What {
     Error(Box<error::BenchError>),
+    Speed(Box<speed::BenchSpeed>),
+    Gallery(Box<gallery::BenchGallery>),
+    Report(Box<report::BenchReport>),
 }
 
 impl Bench {
     pub fn run(self) -> anyhow::Result<()> {
         match self.what {
             What::Error(bench) => bench.run(),
+            What::Speed(bench) => bench.run(),
+            What::Gallery(bench) => bench.run(),
+            What::Report(bench) => bench.run(),
         }
     }
 }

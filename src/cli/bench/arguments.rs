@@ -1,0 +1,192 @@
+//! What the measurements have in common on the command line: what to measure, on which device, and where to write it.
+use crate::cli::render::parse_size;
+use crate::cli::{cache_folder, material_of, number, stem};
+use anyhow::Context;
+use clap::value_parser;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use threadlight::evaluate::reference::ReferenceSettings;
+use threadlight::evaluate::sweep::Measured;
+use threadlight::evaluate::{Cases, Sweep, cases::OnlyCancels, reference_picture, sweep};
+use threadlight::method::Method;
+use threadlight::output;
+use threadlight::scene::{MAX_SUBPIXELS, ObjectSettings, Scene, Source, mesh};
+use threadlight::threads::{MAX_COUNT, Observer};
+use threadlight::vulkan::{Device, Instance};
+use threadlight::{Error, Result, environment};
+
+/// What to measure. Where a flag is left out, the command says what is taken: see [`Defaults`].
+#[derive(clap::Args)]
+pub struct CasesArguments {
+    /// Materials: built-in names, MERL .binary files, or .toml files with a model and its parameters.
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    materials: Vec<String>,
+    /// Environments: built-in names, or latitude-longitude .hdr or .exr files.
+    #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "studio")]
+    environments: Vec<String>,
+    /// Shading methods.
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    methods: Vec<String>,
+    /// Numbers of threads, or of samples of the other estimators, each 1 to 1024.
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = value_parser!(u32).range(1..=MAX_COUNT as i64))]
+    counts: Vec<u32>,
+    /// Scenes: built-in meshes, .obj files, or .toml scene files, whose camera and objects are used.
+    #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "sphere")]
+    scene: Vec<String>,
+    /// Size of the pictures in pixels, each side 11 to 16384.
+    #[arg(long, value_name = "WxH", value_parser = parse_size)]
+    size: Option<(u32, u32)>,
+    /// Sub-pixels per axis, 1 to 4; without it, the scene's.
+    #[arg(long, value_name = "S", value_parser = value_parser!(u32).range(1..=i64::from(MAX_SUBPIXELS)))]
+    subpixels: Option<u32>,
+    /// Seed of everything random.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    seed: u64,
+    /// Vulkan device: its index or part of its name, as `threadlight devices` lists them.
+    #[arg(long, value_name = "NAME|INDEX")]
+    device: Option<String>,
+    /// Neither read nor write cached threads and pipelines.
+    #[arg(long)]
+    no_cache: bool,
+}
+
+/// What a command measures where it is not told.
+pub struct Defaults {
+    pub materials: Vec<&'static str>,
+    pub methods: Vec<Method>,
+    pub counts: &'static [u32],
+    /// None: the scene's.
+    pub size: Option<(u32, u32)>,
+}
+
+impl CasesArguments {
+    pub fn cases(&self, defaults: &Defaults) -> Result<Cases> {
+        let methods = match self.methods.as_slice() {
+            [] => defaults.methods.clone(),
+            names => names.iter().map(|name| Method::from_name(name)).collect::<Result<Vec<_>>>()?,
+        };
+        if methods.contains(&Method::Reference) {
+            let remedy = "name others; where errors are measured, it is what they are measured against";
+            return Err(Error::input("--methods reference", "is the truth, not a method to measure", remedy));
+        }
+        let counts = if self.counts.is_empty() { defaults.counts.to_vec() } else { self.counts.clone() };
+        let by_default: Vec<_> = defaults.materials.iter().map(|name| (*name).to_owned()).collect();
+        let materials = if self.materials.is_empty() { &by_default } else { &self.materials };
+        let scenes = named("--scene", &self.scene)?;
+        let size = self.size.or(defaults.size);
+        Ok(Cases {
+            methods: once("--methods", methods)?,
+            counts: once("--counts", counts)?,
+            materials: named("--materials", materials)?
+                .into_iter()
+                .map(|(name, text)| (name, material_of(text)))
+                .collect(),
+            environments: named("--environments", &self.environments)?
+                .into_iter()
+                .map(|(name, text)| (name, Source::named(text, environment::builtin_names())))
+                .collect(),
+            scenes: scenes
+                .into_iter()
+                .map(|(name, text)| Ok((name, self.scene_of(text, size)?)))
+                .collect::<Result<_>>()?,
+            seed: self.seed,
+            cache: cache_folder(self.no_cache),
+        })
+    }
+
+    /// The scene that `text` names: a scene file, or a mesh in the built-in scene.
+    fn scene_of(&self, text: &str, size: Option<(u32, u32)>) -> Result<Scene> {
+        let path = Path::new(text);
+        let mut scene = if path.extension().is_some_and(|extension| extension == "toml") {
+            Scene::load(path)?
+        } else {
+            let mut scene = Scene::default();
+            let material = scene.objects.first().map(|object| object.material.clone()).unwrap_or_default();
+            scene.objects = vec![ObjectSettings::new(Source::named(text, mesh::builtin_names()), &material)];
+            scene
+        };
+        if let Some((width, height)) = size {
+            (scene.image.width, scene.image.height) = (width, height);
+        }
+        scene.image.subpixels = self.subpixels.unwrap_or(scene.image.subpixels);
+        Ok(scene)
+    }
+
+    pub fn open_device(&self) -> Result<Arc<Device>> {
+        let instance = Instance::new(false).map_err(Error::from)?;
+        Device::new(&instance, self.device.as_deref()).map_err(Error::from)
+    }
+}
+
+/// Each of `texts` with the name that it has in tables: without folder and extension.
+pub fn named<'a>(flag: &str, texts: &'a [String]) -> Result<Vec<(String, &'a str)>> {
+    let names = once(flag, texts.iter().map(|text| stem(Path::new(text))).collect())?;
+    Ok(names.into_iter().zip(texts.iter().map(String::as_str)).collect())
+}
+
+/// `values`, if none is there twice: rows could not be told apart.
+fn once<T: PartialEq + std::fmt::Debug>(flag: &str, values: Vec<T>) -> Result<Vec<T>> {
+    match values.iter().enumerate().find(|(i, value)| values[..*i].contains(value)) {
+        Some((_, twice)) => {
+            Err(Error::input(flag, format!("names {twice:?} twice"), "name each once, and files by names that differ"))
+        }
+        None => Ok(values),
+    }
+}
+
+/// Against what errors are measured.
+#[derive(clap::Args)]
+pub struct TruthArguments {
+    /// Error of the reference pictures, in display values, that is good enough.
+    #[arg(long, value_name = "X", default_value_t = 2e-4, value_parser = number(f64::MIN_POSITIVE..=1.0, "a number above 0, at most 1"))]
+    reference_tolerance: f64,
+}
+
+impl TruthArguments {
+    /// Runs `sweep` against reference pictures.
+    pub fn sweep(
+        &self,
+        sweep: &Sweep,
+        device: &Arc<Device>,
+        observer: &dyn Observer,
+        measured: &mut Measured,
+    ) -> Result<()> {
+        let inner = OnlyCancels(observer);
+        let settings = ReferenceSettings { tolerance: self.reference_tolerance, cache: sweep.cases.cache.clone() };
+        let reference = |prepared: &_| reference_picture(prepared, device, &settings, &inner);
+        sweep::run(sweep, device, &reference, observer, measured)
+    }
+}
+
+/// Where measurements are written, besides the terminal.
+#[derive(clap::Args)]
+pub struct OutputArguments {
+    /// Write all measurements as JSON.
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Folder for plots or pictures; made if it is not there.
+    #[arg(long, value_name = "DIR")]
+    pub plot: Option<PathBuf>,
+}
+
+impl OutputArguments {
+    /// Says what cannot be written before the work begins.
+    pub fn check(&self) -> Result<()> {
+        self.json.as_deref().map_or(Ok(()), output::check_writable)?;
+        self.plot.as_deref().map_or(Ok(()), check_folder)
+    }
+
+    pub fn write_json(&self, measurements: &impl serde::Serialize) -> anyhow::Result<()> {
+        if let Some(path) = &self.json {
+            let text = serde_json::to_string_pretty(measurements).context("--json")? + "\n";
+            output::write_whole(path, text.as_bytes())?;
+        }
+        Ok(())
+    }
+}
+
+/// An error if `folder` is none, or cannot be made or written to.
+pub fn check_folder(folder: &Path) -> Result<()> {
+    // A folder that is not there yet has to be made.
+    output::check_writable(&if folder.exists() { folder.join("plot.svg") } else { folder.to_owned() })
+}

@@ -1,0 +1,100 @@
+//! `threadlight bench gallery`: pictures beside each other, of materials and of methods.
+use super::arguments::{CasesArguments, Defaults, OutputArguments, TruthArguments, named};
+use crate::cli::material_of;
+use crate::cli::progress::Progress;
+use clap::value_parser;
+use std::io::Write;
+use std::path::Path;
+use threadlight::brdf::Brdf;
+use threadlight::evaluate::gallery::{self, Named};
+use threadlight::evaluate::sweep::Measured;
+use threadlight::evaluate::{Cases, Estimator, Sweep, tables};
+use threadlight::method::Method;
+use threadlight::output;
+use threadlight::threads::MAX_COUNT;
+use threadlight::{Error, Result};
+
+const EXAMPLES: &str = "\
+Without --materials, all built-in ones are shown; without --methods, paper, importance and filtered; without --counts,
+1,4,16,64,100; without --size, pictures are 160x120.
+
+Examples:
+  threadlight bench gallery --plot gallery
+  threadlight bench gallery --materials gold,nickel.binary --compare nickel.binary --environments lebombo.hdr --plot gallery
+  threadlight bench gallery --scene dragon.obj --size 320x240 --methods paper,filtered --counts 16,64 --plot gallery
+
+PNG pictures are written into the folder that --plot names:
+  materials.png                         all materials, by the first of the methods (the paper's figure 13); with several
+                                        environments or scenes, materials_ENVIRONMENT_SCENE.png
+  MATERIAL_ENVIRONMENT_SCENE.png        a material of --compare by methods and counts, with RMS, and the reference as the last
+                                        row (the paper's figures 10 and 11)
+
+The table and the JSON have the errors of the latter, as `threadlight bench error` has them.";
+
+/// Draws pictures beside each other: materials, and methods by their number of samples. Lists are separated by commas.
+#[derive(clap::Args)]
+#[command(after_help = EXAMPLES, allow_negative_numbers = true)]
+pub struct BenchGallery {
+    #[command(flatten)]
+    cases: CasesArguments,
+    /// Materials to compare methods on, named as those of --materials.
+    #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "gold")]
+    compare: Vec<String>,
+    /// Threads or samples of the pictures of all materials, 1 to 1024.
+    #[arg(long, value_name = "N", default_value_t = 100, value_parser = value_parser!(u32).range(1..=MAX_COUNT as i64))]
+    threads: u32,
+    #[command(flatten)]
+    truth: TruthArguments,
+    #[command(flatten)]
+    output: OutputArguments,
+}
+
+impl BenchGallery {
+    pub fn run(self) -> anyhow::Result<()> {
+        let Some(folder) = &self.output.plot else {
+            return Err(
+                Error::input("bench gallery", "has nowhere to put pictures", "name a folder with --plot DIR").into()
+            );
+        };
+        self.output.check()?;
+        let materials = self.cases.cases(&Defaults {
+            materials: Brdf::builtin_names().collect(),
+            methods: vec![Method::Paper, Method::Importance, Method::Filtered],
+            counts: &[1, 4, 16, 64, 100],
+            size: Some((160, 120)),
+        })?;
+        let estimator = Estimator { method: materials.methods[0], count: self.threads };
+        let compared = named("--compare", &self.compare)?;
+        let compared = compared.into_iter().map(|(name, text)| (name, material_of(text))).collect();
+        let sweep = Sweep {
+            cases: Cases { materials: compared, ..materials.clone() },
+            repeat: 3,
+            whole_picture: false,
+            keep_pictures: true,
+        };
+
+        sweep.cases.check_materials()?;
+        let device = self.cases.open_device()?;
+        let progress = Progress::of("materials", "pictures")?;
+        let mut sheets = gallery::material_sheets(&materials, estimator, &device, &progress)?;
+        progress.restart("methods");
+        let mut measured = Measured::default();
+        self.truth.sweep(&sweep, &device, &progress, &mut measured)?;
+        progress.finish();
+        sheets.extend(gallery::comparison_sheets(&measured));
+        write_pictures(&sheets, folder)?;
+        self.output.write_json(&measured.rows)?;
+        write!(std::io::stdout().lock(), "{}", tables::text(&tables::error_tables(&measured.rows)))?;
+        Ok(())
+    }
+}
+
+/// Writes each picture as PNG into `folder`, which is made if it is not there.
+fn write_pictures(pictures: &[Named], folder: &Path) -> Result<()> {
+    std::fs::create_dir_all(folder).map_err(|cause| Error::unwritable(folder, cause))?;
+    for (name, picture) in pictures {
+        let rgba: Vec<u8> = picture.pixels().flat_map(|pixel| [pixel[0], pixel[1], pixel[2], 255]).collect();
+        output::write_png(&folder.join(format!("{name}.png")), picture.width(), picture.height(), &rgba, false)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,163 @@
+//! `threadlight bench report`: everything measured, on one HTML page.
+use super::arguments::{CasesArguments, Defaults, TruthArguments, check_folder};
+use crate::cli::progress::Progress;
+use clap::value_parser;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use threadlight::brdf::Brdf;
+use threadlight::evaluate::report::Report;
+use threadlight::evaluate::speed::{self, Speed};
+use threadlight::evaluate::sweep::Measured;
+use threadlight::evaluate::{Cases, Estimator, Row, Sweep, gallery};
+use threadlight::method::Method;
+use threadlight::output;
+use threadlight::scene::MaterialSource;
+use threadlight::threads::MAX_COUNT;
+use threadlight::vulkan::Device;
+use threadlight::{Error, Result};
+
+const EXAMPLES: &str = "\
+Without --materials, gold and red-plastic are measured; without --methods, paper, importance and filtered; without --counts,
+1,4,16,64; without --size, pictures are 160x120.
+
+Examples:
+  threadlight bench report report
+  threadlight bench report report --materials alumina-oxide.binary,nickel.binary --environments lebombo.hdr --size 320x240
+  threadlight bench report report --from rows.json
+
+Writes DIR/report.html, which needs no other file: machine, device, versions and command; time by threads with the floor and as
+things double (the paper's table 1); errors (tables 2 to 4) over samples and over time (figure 12); methods side by side (figures
+10 and 11); all materials, built-in ones too, by the first of the methods at the highest of the counts (figure 13); and every row.
+Times are of the first material, environment and scene.
+
+With --from, errors are those of an earlier `bench error --json`, and methods are shown side by side for the first material,
+environment and scene only.";
+
+/// Measures everything and writes it as one HTML page. Lists are separated by commas.
+#[derive(clap::Args)]
+#[command(after_help = EXAMPLES, allow_negative_numbers = true)]
+pub struct BenchReport {
+    /// Folder for report.html; made if it is not there.
+    #[arg(value_name = "DIR")]
+    folder: PathBuf,
+    /// Errors as `bench error --json` wrote them, in place of measuring them.
+    #[arg(long, value_name = "FILE")]
+    from: Option<PathBuf>,
+    #[command(flatten)]
+    cases: CasesArguments,
+    /// Threads or samples while other things double, 1 to 1024.
+    #[arg(long, value_name = "N", default_value_t = 64, value_parser = value_parser!(u32).range(1..=MAX_COUNT as i64))]
+    threads: u32,
+    #[command(flatten)]
+    truth: TruthArguments,
+    /// Render this often; times are medians.
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = value_parser!(u32).range(1..))]
+    repeat: u32,
+}
+
+impl BenchReport {
+    pub fn run(self) -> anyhow::Result<()> {
+        check_folder(&self.folder)?;
+        let earlier = self.from.as_deref().map(read_rows).transpose()?;
+        let cases = self.cases.cases(&Defaults {
+            materials: vec!["gold", "red-plastic"],
+            methods: vec![Method::Paper, Method::Importance, Method::Filtered],
+            counts: &[1, 4, 16, 64],
+            size: Some((160, 120)),
+        })?;
+        let only_first = first_place(&cases);
+        let sweep = Sweep {
+            cases: if earlier.is_some() { only_first.clone() } else { cases.clone() },
+            repeat: self.repeat,
+            whole_picture: false,
+            keep_pictures: true,
+        };
+        let speed = Speed { cases: only_first.clone(), threads: self.threads, repeat: self.repeat };
+        let shown = Cases { materials: with_builtin(&cases.materials), ..only_first };
+        let highest = cases.counts.iter().copied().max().unwrap_or(self.threads);
+        let estimator = Estimator { method: cases.methods[0], count: highest };
+
+        let device = self.cases.open_device()?;
+        let progress = Progress::of("errors", "done")?;
+        let mut measured = Measured::default();
+        self.truth.sweep(&sweep, &device, &progress, &mut measured)?;
+        let mut report = Report { facts: facts(&device), ..Report::default() };
+        progress.restart("times");
+        speed::run(&speed, &device, &progress, &mut report.timings)?;
+        progress.restart("materials");
+        let sheets = gallery::material_sheets(&shown, estimator, &device, &progress)?;
+        progress.finish();
+        let light = format!("{}, {}", shown.environments[0].0, shown.scenes[0].0);
+        let caption = format!("{light}; method {}, {highest} threads or samples", estimator.method.name());
+        report.materials = sheets.into_iter().map(|(_, picture)| (caption.clone(), picture)).collect();
+        let captions = measured.references.iter().map(|(place, _)| place.join(", "));
+        let pictures = gallery::comparison_sheets(&measured).into_iter().map(|(_, picture)| picture);
+        report.comparisons = captions.zip(pictures).collect();
+        report.reference_error = earlier.is_none().then_some(measured.reference_error);
+        report.rows = earlier.unwrap_or(measured.rows);
+
+        let html = report.html()?;
+        std::fs::create_dir_all(&self.folder).map_err(|cause| Error::unwritable(&self.folder, cause))?;
+        let path = self.folder.join("report.html");
+        output::write_whole(&path, html.as_bytes())?;
+        writeln!(std::io::stdout(), "{}", path.display())?;
+        Ok(())
+    }
+}
+
+/// Rows that `bench error --json` wrote.
+fn read_rows(path: &Path) -> Result<Vec<Row>> {
+    let bytes = std::fs::read(path).map_err(|cause| Error::unreadable(path, cause))?;
+    let remedy = "give a file that `threadlight bench error --json` wrote";
+    let rows: Vec<Row> = serde_json::from_slice(&bytes)
+        .map_err(|cause| Error::in_file(path, format!("holds no measurements ({cause})"), remedy))?;
+    if rows.is_empty() {
+        return Err(Error::in_file(path, "holds no measurements", remedy));
+    }
+    Ok(rows)
+}
+
+/// The first material in the first environment in the first scene.
+fn first_place(cases: &Cases) -> Cases {
+    Cases {
+        materials: cases.materials.iter().take(1).cloned().collect(),
+        environments: cases.environments.iter().take(1).cloned().collect(),
+        scenes: cases.scenes.iter().take(1).cloned().collect(),
+        ..cases.clone()
+    }
+}
+
+/// `materials`, and the built-in ones of other names.
+fn with_builtin(materials: &[(String, MaterialSource)]) -> Vec<(String, MaterialSource)> {
+    let builtin = Brdf::builtin_names().map(|name| (name.to_owned(), MaterialSource::Builtin(name.to_owned())));
+    let others = builtin.filter(|(name, _)| materials.iter().all(|(known, _)| known != name));
+    materials.iter().cloned().chain(others).collect()
+}
+
+/// What is to be known of the measurements.
+fn facts(device: &Device) -> Vec<(String, String)> {
+    let system = sysinfo::System::new_with_specifics(
+        sysinfo::RefreshKind::nothing()
+            .with_cpu(sysinfo::CpuRefreshKind::nothing())
+            .with_memory(sysinfo::MemoryRefreshKind::nothing().with_ram()),
+    );
+    let processor = system.cpus().first().map(|cpu| cpu.brand().trim()).filter(|brand| !brand.is_empty());
+    let processor = format!("{}, {} logical cores", processor.unwrap_or("unknown"), system.cpus().len());
+    let memory = format!("{:.0} GiB", system.total_memory() as f64 / f64::from(1 << 30));
+    let description = device.description();
+    let arguments = std::env::args()
+        .skip(1)
+        .map(|argument| if argument.contains(char::is_whitespace) { format!("'{argument}'") } else { argument });
+    let command = ["threadlight".to_owned()].into_iter().chain(arguments).collect::<Vec<_>>().join(" ");
+    [
+        ("system", sysinfo::System::long_os_version().unwrap_or_else(|| std::env::consts::OS.to_owned())),
+        ("processor", processor),
+        ("memory", memory),
+        ("device", description.name.clone()),
+        ("driver", format!("{}, Vulkan {}", description.driver, description.api_version)),
+        ("Threadlight", env!("CARGO_PKG_VERSION").to_owned()),
+        ("command", command),
+    ]
+    .map(|(name, value)| (name.to_owned(), value))
+    .to_vec()
+}

@@ -1,0 +1,77 @@
+//! The floor of shading: as many trilinear lookups as a method makes, and nothing else.
+use super::FrameGraph;
+use super::shade::DevicePyramid;
+use crate::Result;
+use crate::environment::Environment;
+use crate::graph::{Access, Buffer, BufferDesc};
+use crate::vulkan::{Bindings, ComputePipeline, Device, Groups, PipelineCache, compiled};
+use bytemuck::{Pod, Zeroable};
+use std::f64::consts::TAU;
+use std::sync::Arc;
+
+/// Pixels of a workgroup.
+const GROUP_SIZE: u32 = 64;
+/// Workgroups along an axis that every device can dispatch.
+const MAX_GROUPS: u32 = 65535;
+
+/// What the pass is made of.
+pub struct BareLookups {
+    pipeline: ComputePipeline,
+    pyramid: DevicePyramid,
+    push: Push,
+}
+
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct Push {
+    pixel_count: u32,
+    lookup_count: u32,
+    level: f32,
+}
+
+impl BareLookups {
+    /// `lookup_count` lookups in the pyramid of `environment` for each of `pixel_count` pixels (at least 1).
+    ///
+    /// # Errors
+    /// No device memory left, or a driver that cannot compile the shader.
+    pub fn new(
+        device: &Arc<Device>,
+        cache: &PipelineCache,
+        environment: &Environment,
+        pixel_count: u32,
+        lookup_count: u32,
+    ) -> Result<Self> {
+        let pyramid = environment.box_filtered();
+        // Where texels are as large as a lookup's share of the hemisphere, and between two levels, so that both are fetched.
+        let texel_sr = 2.0 * TAU / (6.0 * (pyramid.face_size * pyramid.face_size) as f64);
+        let level = 0.5 * (TAU / f64::from(lookup_count) / texel_sr).log2();
+        let level = level.clamp(0.0, (pyramid.levels.len() - 1) as f64 - 0.5).floor() + 0.5;
+        Ok(Self {
+            pipeline: ComputePipeline::new(device, cache, &compiled::BARE_LOOKUPS, &[])?,
+            pyramid: DevicePyramid::new(device, "environment pyramid", pyramid, pyramid.radiance_scale())?,
+            push: Push { pixel_count, lookup_count, level: level as f32 },
+        })
+    }
+
+    /// Size of what the pass leaves.
+    pub fn sums_bytes(&self) -> u64 {
+        u64::from(self.push.pixel_count) * size_of::<[f32; 4]>() as u64
+    }
+}
+
+/// Looks up; leaves for each pixel the sum of what it saw, RGB in units of the pyramid's texels, and 1.
+pub fn bare_lookups<'a>(graph: &mut FrameGraph<'a>, bare: &'a BareLookups) -> Buffer {
+    let sums = graph.buffer("sums", BufferDesc { size_bytes: bare.sums_bytes() });
+    let mut pass = graph.pass("bare_lookups");
+    let sums = pass.write(sums, Access::StorageWriteCompute);
+    pass.record(Box::new(move |commands, resources| {
+        let BareLookups { pipeline, pyramid, push } = bare;
+        let bindings = Bindings::new()
+            .sampled("environment_pyramid", &pyramid.image, &pyramid.sampler)
+            .buffer("Sums", resources.buffer(sums));
+        let groups = push.pixel_count.div_ceil(GROUP_SIZE);
+        let groups = Groups::Direct([groups.min(MAX_GROUPS), groups.div_ceil(MAX_GROUPS), 1]);
+        commands.dispatch(pipeline, &bindings, bytemuck::bytes_of(push), groups)
+    }));
+    sums
+}

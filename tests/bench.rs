@@ -1,0 +1,119 @@
+//! `threadlight bench` as its user meets it: what it prints and writes.
+//!
+//! Runs on the device that THREADLIGHT_TEST_DEVICE names, or else on the one that the program prefers.
+use assert_cmd::Command;
+use serde_json::Value;
+use std::fs;
+use tempfile::TempDir;
+
+/// What makes measurements quick.
+const SMALL: &str = "--environments white --counts 1,4 --size 24x18";
+const QUICK_TRUTH: &str = "--reference-tolerance 1e-2";
+
+/// What `threadlight bench` prints in `folder`; it must succeed and have nothing to complain about.
+fn bench(folder: &TempDir, arguments: &str) -> String {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_threadlight"));
+    command.current_dir(folder).env("THREADLIGHT_CACHE", folder.path().join("cache")).env_remove("RUST_LOG");
+    command.arg("bench").args(arguments.split(' '));
+    if let Some(device) = std::env::var_os("THREADLIGHT_TEST_DEVICE") {
+        command.arg("--device").arg(device);
+    }
+    let output = command.output().unwrap();
+    let complaints = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success() && complaints.is_empty(), "{complaints}");
+    String::from_utf8(output.stdout).unwrap()
+}
+
+fn json(folder: &TempDir, name: &str) -> Value {
+    serde_json::from_slice(&fs::read(folder.path().join(name)).unwrap()).unwrap()
+}
+
+/// Names of the files in a folder, sorted.
+fn files(folder: &TempDir, name: &str) -> Vec<String> {
+    let entries = fs::read_dir(folder.path().join(name)).unwrap();
+    let mut names: Vec<_> = entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    names
+}
+
+fn keys(object: &Value) -> Vec<&str> {
+    object.as_object().unwrap().keys().map(String::as_str).collect()
+}
+
+#[test]
+fn speed_prints_tables_and_writes_json_and_plots() {
+    let folder = tempfile::tempdir().unwrap();
+    let arguments =
+        format!("speed --materials clay {SMALL} --methods paper --threads 4 --repeat 1 --json speed.json --plot plots");
+    let said = bench(&folder, &arguments);
+    for text in
+        ["paper, clay, white, sphere: 24 x 18 pixels", "floor", "ns/lookup", "geometry_cache", "triangles", "ratio"]
+    {
+        assert!(said.contains(text), "{said}");
+    }
+    let timings = json(&folder, "speed.json");
+    assert_eq!(keys(&timings), ["frames", "growths"]);
+    let (frames, growths) = (timings["frames"].as_array().unwrap(), timings["growths"].as_array().unwrap());
+    assert_eq!((frames.len(), growths.len()), (2, 12));
+    let documented = [
+        "floor_ms",
+        "frame_ms",
+        "gpu_ms",
+        "height",
+        "lookups",
+        "material",
+        "method",
+        "ns_per_lookup",
+        "passes",
+        "scene",
+        "environment",
+        "subpixels",
+        "threads",
+        "triangles",
+        "width",
+    ];
+    assert_eq!(keys(&frames[0]).len(), documented.len());
+    assert!(documented.iter().all(|key| frames[0].get(key).is_some() && growths[0].get(key).is_some()));
+    assert!(growths[0]["ratio"].is_null() && growths[1]["ratio"].as_f64().unwrap() > 0.0);
+    let plots = ["frame_over_threads.svg", "paper_cost_over_growth.svg"];
+    assert_eq!(files(&folder, "plots"), plots);
+}
+
+#[test]
+fn a_gallery_has_all_materials_and_the_methods_on_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let arguments = format!(
+        "gallery --materials clay --threads 4 --compare clay {SMALL} --methods paper,uniform {QUICK_TRUTH} --plot out --json rows.json"
+    );
+    let said = bench(&folder, &arguments);
+    assert!(said.starts_with("clay\n  RMS"), "{said}");
+    assert_eq!(files(&folder, "out"), ["clay_white_sphere.png", "materials.png"]);
+    let rows = json(&folder, "rows.json");
+    assert_eq!(rows.as_array().unwrap().len(), 4);
+    let methods = image::open(folder.path().join("out/clay_white_sphere.png")).unwrap();
+    // Three rows of pictures, each 24 x 18, and text.
+    assert!(methods.width() > 2 * 24 && methods.height() > 3 * 18, "{} x {}", methods.width(), methods.height());
+}
+
+#[test]
+fn a_report_is_one_page_that_needs_no_other_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let small = format!("{SMALL} --methods uniform {QUICK_TRUTH}");
+    bench(&folder, &format!("error --materials clay,white-plastic {small} --json rows.json --plot plots"));
+    assert_eq!(files(&folder, "plots").len(), 6);
+    for from in ["", " --from rows.json"] {
+        let said = bench(&folder, &format!("report now --materials clay {small} --threads 4 --repeat 1{from}"));
+        assert_eq!(said, "now/report.html\n");
+        assert_eq!(files(&folder, "now"), ["report.html"]);
+        let page = fs::read_to_string(folder.path().join("now/report.html")).unwrap();
+        for text in
+            ["(table 1)", "(tables 2 to 4)", "(figure 12)", "(figures 10 and 11)", "(figure 13)", "processor", "driver"]
+        {
+            assert!(page.contains(text), "no {text}");
+        }
+        assert_eq!(page.contains("white-plastic</summary>"), !from.is_empty());
+        assert_eq!(page.matches("<img").count(), page.matches("src=\"data:image/png;base64,").count());
+        assert!(page.matches("<img").count() == 2 && page.matches("<svg").count() >= 4);
+        assert!(!page.contains("href=") && !page.contains("<script") && !page.contains("NaN"), "the page needs others");
+    }
+}
