@@ -1,12 +1,12 @@
 //! `threadlight bench error`: error and time of methods and thread counts over materials, environments and scenes.
 use crate::cli::progress::Progress;
-use crate::cli::render::parse_size;
+use crate::cli::render::{parse_size, processor};
 use crate::cli::{cache_folder, material_of, number, stem};
 use anyhow::Context;
 use clap::value_parser;
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use threadlight::evaluate::reference::ReferenceSettings;
+use threadlight::evaluate::reference::{Processor, ReferenceSettings};
 use threadlight::evaluate::sweep::{self, Measured, OnlyCancels, Sweep};
 use threadlight::evaluate::{plots, reference_picture, tables};
 use threadlight::method::Method;
@@ -62,9 +62,12 @@ pub struct BenchError {
     /// Sub-pixels per axis, 1 to 4; without it, the scene's.
     #[arg(long, value_name = "S", value_parser = value_parser!(u32).range(1..=i64::from(MAX_SUBPIXELS)))]
     subpixels: Option<u32>,
-    /// Error of the reference pictures, in display values, that is good enough.
-    #[arg(long, value_name = "X", default_value_t = 2e-4, value_parser = number(f64::MIN_POSITIVE..=1.0, "a number above 0, at most 1"))]
-    reference_tolerance: f64,
+    /// Error of the reference pictures, in display values, that is good enough (default 2e-4, on the GPU 1e-3).
+    #[arg(long, value_name = "X", value_parser = number(f64::MIN_POSITIVE..=1.0, "a number above 0, at most 1"))]
+    reference_tolerance: Option<f64>,
+    /// Where the reference pictures are made, as `threadlight render --help` explains.
+    #[arg(long, value_name = "cpu|gpu", default_value = "cpu", value_parser = processor(), hide_possible_values = true)]
+    reference_on: Processor,
     /// Count background pixels too; they are equal in all pictures.
     #[arg(long)]
     whole_picture: bool,
@@ -104,7 +107,11 @@ impl BenchError {
         let device = Device::new(&instance, self.device.as_deref()).map_err(Error::from)?;
         let progress = Progress::of("bench error", "pictures")?;
         let inner = OnlyCancels(&progress);
-        let settings = ReferenceSettings { tolerance: self.reference_tolerance, cache: sweep.cache.clone() };
+        let settings = ReferenceSettings {
+            tolerance: self.reference_tolerance.unwrap_or(self.reference_on.default_tolerance()),
+            processor: self.reference_on,
+            cache: sweep.cache.clone(),
+        };
         let reference = |prepared: &_| reference_picture(prepared, &device, &settings, &inner);
         let mut measured = Measured::default();
         let result = sweep::run(&sweep, &device, &reference, &progress, &mut measured);
