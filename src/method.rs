@@ -25,6 +25,8 @@ pub enum Method {
     Environment,
     /// Resampled importance sampling of the whole product (Talbot et al. 2005).
     Resampled,
+    /// Multiple importance sampling of lobe and light (Veach and Guibas 1995) at Sobol's points: the reference's form on the GPU.
+    Combined,
     /// Quadrature on the CPU: the truth.
     Reference,
 }
@@ -40,6 +42,7 @@ impl Method {
         Self::Filtered,
         Self::Environment,
         Self::Resampled,
+        Self::Combined,
         Self::Reference,
     ];
 
@@ -54,6 +57,7 @@ impl Method {
             Self::Filtered => "filtered",
             Self::Environment => "environment",
             Self::Resampled => "resampled",
+            Self::Combined => "combined",
             Self::Reference => "reference",
         }
     }
@@ -83,6 +87,7 @@ impl Method {
             Self::Filtered => Ok(&compiled::SHADE_FILTERED),
             Self::Environment => Ok(&compiled::SHADE_ENVIRONMENT),
             Self::Resampled => Ok(&compiled::SHADE_RESAMPLED),
+            Self::Combined => Ok(&compiled::SHADE_COMBINED),
             Self::Reference => Err(Error::input("method \"reference\"", "does not run on the GPU", "use another here")),
         }
     }

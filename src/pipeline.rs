@@ -1,5 +1,6 @@
 //! The method on one screen: the frame as a graph of passes, and the renderer that runs it.
 use crate::graph::{Access, Buffer, BufferDesc, Executable, Image};
+use crate::method::Method;
 use crate::passes::*;
 use crate::prepare::Prepared;
 use crate::vulkan::{self, BufferUse, Device, Frames, PassTime, PipelineCache};
@@ -82,19 +83,37 @@ impl Renderer {
     /// # Errors
     /// No device memory left, or a limit of the device exceeded.
     pub fn new(device: &Arc<Device>, cache_folder: Option<&Path>, prepared: &Prepared) -> Result<Self> {
-        let Prepared { view, method, intensity, environment, sampling, .. } = prepared;
+        let mut renderer = Self::of_objects(device, cache_folder, prepared, prepared.method, prepared.sampling)?;
+        if prepared.show_environment {
+            let cache = PipelineCache::new(device, cache_folder)?;
+            renderer.background = Some(Background::new(device, &cache, &prepared.environment, prepared.intensity)?);
+        }
+        Ok(renderer)
+    }
+
+    /// The same for only the objects of `prepared`, by `method`, for which it may not have been prepared if that needs no threads.
+    ///
+    /// # Errors
+    /// No device memory left, or a limit of the device exceeded.
+    pub fn of_objects(
+        device: &Arc<Device>,
+        cache_folder: Option<&Path>,
+        prepared: &Prepared,
+        method: Method,
+        sampling: Sampling,
+    ) -> Result<Self> {
+        let Prepared { view, intensity, environment, .. } = prepared;
         let cache = PipelineCache::new(device, cache_folder)?;
         let geometry_cache = upload_geometry(device, &cache, prepared)?;
         let brdfs = prepared.materials.iter().map(|material| (&material.brdf, material.threads.as_ref()));
-        let materials = DeviceMaterials::new(device, *method, brdfs)?;
-        let light = DeviceLight::new(device, &cache, *method, environment, *intensity)?;
-        let background = prepared.show_environment.then(|| Background::new(device, &cache, environment, *intensity));
+        let materials = DeviceMaterials::new(device, method, brdfs)?;
+        let light = DeviceLight::new(device, &cache, method, environment, *intensity)?;
         Ok(Self {
             view: view.clone(),
             geometry_cache,
             classify: Classify::new(device, &cache, view.subpixels)?,
-            shade: Shade::new(device, &cache, *method, *sampling, view.subpixels, materials, light)?,
-            background: background.transpose()?,
+            shade: Shade::new(device, &cache, method, sampling, view.subpixels, materials, light)?,
+            background: None,
             tone_map: ToneMap::new(device, &cache)?,
             device: device.clone(),
         })

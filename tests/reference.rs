@@ -4,7 +4,7 @@ mod common;
 use common::{Validated, model, ready, sphere};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
-use threadlight::evaluate::reference::{Display, Integrator, TOLERANCE};
+use threadlight::evaluate::reference::{Display, Integrator, Processor, ReferenceSettings, TOLERANCE, reference};
 use threadlight::output::read_image;
 use threadlight::pipeline::{Wanted, render_geometry};
 use threadlight::prepare::Prepared;
@@ -118,6 +118,45 @@ fn the_papers_threads_come_near_to_mitsuba() {
         let rms = rms_inside(&rendering.radiance, &reference.rgba, 640);
         println!("{name}: RMS {rms:.4} at 100 threads");
         assert!(rms < limit, "{name}: RMS {rms}");
+    }
+    gpu.finish();
+}
+
+#[test]
+fn the_reference_on_the_gpu_converges_on_that_of_the_cpu() {
+    let gpu = Validated::new();
+    for (name, material, environment) in [("diffuse", diffuse(), "sky"), ("conductor 0.2", conductor(0.2), "studio")] {
+        let mut scene = sphere(material, environment, 1, (32, 24));
+        scene.image.background = Background::None;
+        scene.shading.method = "reference".to_owned();
+        let prepared = ready(&scene);
+        let picture = |processor, tolerance| {
+            let settings = ReferenceSettings { tolerance, processor, cache: None };
+            reference(&prepared, &gpu.device, &settings, &()).expect("a reference")
+        };
+        let truth = picture(Processor::Cpu, 5e-5);
+        for tolerance in [1e-2, 1e-3] {
+            let image = picture(Processor::Gpu, tolerance);
+            let covered = truth.radiance.iter().zip(&image.radiance).filter(|(truth, _)| truth[3] > 0.0);
+            let (mut sum, mut count) = (0.0, 0);
+            for (truth, found) in covered {
+                assert_eq!(truth[3], found[3], "coverage");
+                for channel in 0..3 {
+                    sum += f64::from(display_value(truth[channel], 1.0, 2.2) - display_value(found[channel], 1.0, 2.2))
+                        .powi(2);
+                    count += 1;
+                }
+            }
+            let (rms, estimate) = ((sum / f64::from(count)).sqrt(), image.error_estimate);
+            println!(
+                "{name}: RMS {rms:.1e}, by its own estimate {estimate:.1e}, with {} evaluations",
+                image.evaluations
+            );
+            assert!(estimate <= tolerance, "{name}: {estimate}");
+            // Of four frames or more and hundreds of pixels the estimate is good to a few percent; neighbours in the
+            // sequences are not independent, and single precision is not exact.
+            assert!((0.7..1.4).contains(&(rms / estimate)), "{name}: RMS {rms}, estimate {estimate}");
+        }
     }
     gpu.finish();
 }

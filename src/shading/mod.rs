@@ -12,6 +12,7 @@ use crate::threads::SliceTable;
 use glam::{Mat3, UVec2, Vec2, Vec3, Vec4};
 use random::random_bits;
 
+mod combined;
 mod cosine;
 mod environment;
 mod filtered;
@@ -19,6 +20,7 @@ mod fitted;
 mod importance;
 mod importance_sampling;
 mod light_sampling;
+mod low_discrepancy;
 mod paper;
 mod random;
 mod resampled;
@@ -193,6 +195,7 @@ impl Point<'_> {
             Method::Filtered => filtered::estimate(self),
             Method::Environment => environment::estimate(self),
             Method::Resampled => resampled::estimate(self),
+            Method::Combined => combined::estimate(self),
             Method::Reference => unreachable!("a twin is made for methods that have a shader"),
         }
     }

@@ -1,11 +1,11 @@
 //! What the measurements have in common on the command line: what to measure, on which device, and where to write it.
-use crate::cli::render::parse_size;
+use crate::cli::render::{parse_size, processor};
 use crate::cli::{cache_folder, material_of, number, stem};
 use anyhow::Context;
 use clap::value_parser;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use threadlight::evaluate::reference::ReferenceSettings;
+use threadlight::evaluate::reference::{Processor, ReferenceSettings};
 use threadlight::evaluate::sweep::Measured;
 use threadlight::evaluate::{Cases, Sweep, cases::OnlyCancels, reference_picture, sweep};
 use threadlight::method::Method;
@@ -137,9 +137,12 @@ fn once<T: PartialEq + std::fmt::Debug>(flag: &str, values: Vec<T>) -> Result<Ve
 /// Against what errors are measured.
 #[derive(clap::Args)]
 pub struct TruthArguments {
-    /// Error of the reference pictures, in display values, that is good enough.
-    #[arg(long, value_name = "X", default_value_t = 2e-4, value_parser = number(f64::MIN_POSITIVE..=1.0, "a number above 0, at most 1"))]
-    reference_tolerance: f64,
+    /// Error of the reference pictures, in display values, that is good enough (default 2e-4, on the GPU 1e-3).
+    #[arg(long, value_name = "X", value_parser = number(f64::MIN_POSITIVE..=1.0, "a number above 0, at most 1"))]
+    reference_tolerance: Option<f64>,
+    /// Where the reference pictures are made, as `threadlight render --help` explains.
+    #[arg(long, value_name = "cpu|gpu", default_value = "cpu", value_parser = processor(), hide_possible_values = true)]
+    reference_on: Processor,
 }
 
 impl TruthArguments {
@@ -152,7 +155,11 @@ impl TruthArguments {
         measured: &mut Measured,
     ) -> Result<()> {
         let inner = OnlyCancels(observer);
-        let settings = ReferenceSettings { tolerance: self.reference_tolerance, cache: sweep.cases.cache.clone() };
+        let settings = ReferenceSettings {
+            tolerance: self.reference_tolerance.unwrap_or(self.reference_on.default_tolerance()),
+            processor: self.reference_on,
+            cache: sweep.cases.cache.clone(),
+        };
         let reference = |prepared: &_| reference_picture(prepared, device, &settings, &inner);
         sweep::run(sweep, device, &reference, observer, measured)
     }
