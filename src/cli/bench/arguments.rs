@@ -134,25 +134,32 @@ fn once<T: PartialEq + std::fmt::Debug>(flag: &str, values: Vec<T>) -> Result<Ve
     }
 }
 
+/// Reference pictures that a reader does not wait long for: far nearer to the truth than what is compared with them.
+pub const QUICK_TOLERANCE: f64 = 1e-3;
+
 /// Against what errors are measured.
 #[derive(clap::Args)]
 pub struct TruthArguments {
     /// Error of the reference pictures, in display values, that is good enough.
-    #[arg(long, value_name = "X", default_value_t = 2e-4, value_parser = number(f64::MIN_POSITIVE..=1.0, "a number above 0, at most 1"))]
-    reference_tolerance: f64,
+    #[arg(long, value_name = "X", value_parser = number(f64::MIN_POSITIVE..=1.0, "a number above 0, at most 1"))]
+    reference_tolerance: Option<f64>,
 }
 
 impl TruthArguments {
-    /// Runs `sweep` against reference pictures.
+    /// Runs `sweep` against reference pictures, which are within `tolerance` unless the flag says otherwise.
     pub fn sweep(
         &self,
+        tolerance: f64,
         sweep: &Sweep,
         device: &Arc<Device>,
         observer: &dyn Observer,
         measured: &mut Measured,
     ) -> Result<()> {
         let inner = OnlyCancels(observer);
-        let settings = ReferenceSettings { tolerance: self.reference_tolerance, cache: sweep.cases.cache.clone() };
+        let settings = ReferenceSettings {
+            tolerance: self.reference_tolerance.unwrap_or(tolerance),
+            cache: sweep.cases.cache.clone(),
+        };
         let reference = |prepared: &_| reference_picture(prepared, device, &settings, &inner);
         sweep::run(sweep, device, &reference, observer, measured)
     }
