@@ -134,6 +134,9 @@ fn once<T: PartialEq + std::fmt::Debug>(flag: &str, values: Vec<T>) -> Result<Ve
     }
 }
 
+/// Reference pictures that a reader does not wait long for: far nearer to the truth than what is compared with them.
+pub const QUICK_TOLERANCE: f64 = 1e-3;
+
 /// Against what errors are measured.
 #[derive(clap::Args)]
 pub struct TruthArguments {
@@ -146,9 +149,10 @@ pub struct TruthArguments {
 }
 
 impl TruthArguments {
-    /// Runs `sweep` against reference pictures.
+    /// Runs `sweep` against reference pictures, which are within `tolerance` unless the flag says otherwise.
     pub fn sweep(
         &self,
+        tolerance: f64,
         sweep: &Sweep,
         device: &Arc<Device>,
         observer: &dyn Observer,
@@ -156,7 +160,7 @@ impl TruthArguments {
     ) -> Result<()> {
         let inner = OnlyCancels(observer);
         let settings = ReferenceSettings {
-            tolerance: self.reference_tolerance.unwrap_or(self.reference_on.default_tolerance()),
+            tolerance: self.reference_tolerance.unwrap_or(tolerance.max(self.reference_on.default_tolerance())),
             processor: self.reference_on,
             cache: sweep.cases.cache.clone(),
         };

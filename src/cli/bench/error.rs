@@ -5,12 +5,12 @@ use clap::value_parser;
 use std::io::Write;
 use threadlight::Error;
 use threadlight::evaluate::sweep::Measured;
-use threadlight::evaluate::{Sweep, plots, tables};
+use threadlight::evaluate::{Sweep, plots, reference, tables};
 use threadlight::method::Method;
 
 const EXAMPLES: &str = "\
 Without --materials, gold is measured; without --methods, all of them; without --counts, 1,4,16,32,64,100,512; without
---size, pictures have the scene's size.
+--size, pictures have the scene's size; without --reference-tolerance, it is 2e-4.
 
 Examples:
   threadlight bench error
@@ -63,7 +63,7 @@ impl BenchError {
         let device = self.cases.open_device()?;
         let progress = Progress::of("bench error", "pictures")?;
         let mut measured = Measured::default();
-        let result = self.truth.sweep(&sweep, &device, &progress, &mut measured);
+        let result = self.truth.sweep(reference::TOLERANCE, &sweep, &device, &progress, &mut measured);
         progress.finish();
         // What took hours is not thrown away because it was interrupted; bad input leaves no files behind.
         if !matches!(result, Err(Error::Input { .. })) && !measured.rows.is_empty() {

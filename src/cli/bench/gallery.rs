@@ -1,5 +1,5 @@
 //! `threadlight bench gallery`: pictures beside each other, of materials and of methods.
-use super::arguments::{CasesArguments, Defaults, OutputArguments, TruthArguments, named};
+use super::arguments::{CasesArguments, Defaults, OutputArguments, QUICK_TOLERANCE, TruthArguments, named};
 use crate::cli::material_of;
 use crate::cli::progress::Progress;
 use clap::value_parser;
@@ -16,7 +16,7 @@ use threadlight::{Error, Result};
 
 const EXAMPLES: &str = "\
 Without --materials, all built-in ones are shown; without --methods, paper, importance and filtered; without --counts,
-1,4,16,64,100; without --size, pictures are 160x120.
+1,4,16,64,100; without --size, pictures are 160x120; without --reference-tolerance, it is 1e-3.
 
 Examples:
   threadlight bench gallery --plot gallery
@@ -79,7 +79,7 @@ impl BenchGallery {
         let mut sheets = gallery::material_sheets(&materials, estimator, &device, &progress)?;
         progress.restart("methods");
         let mut measured = Measured::default();
-        self.truth.sweep(&sweep, &device, &progress, &mut measured)?;
+        self.truth.sweep(QUICK_TOLERANCE, &sweep, &device, &progress, &mut measured)?;
         progress.finish();
         sheets.extend(gallery::comparison_sheets(&measured));
         write_pictures(&sheets, folder)?;

@@ -1,5 +1,5 @@
 //! `threadlight bench report`: everything measured, on one HTML page.
-use super::arguments::{CasesArguments, Defaults, TruthArguments, check_folder};
+use super::arguments::{CasesArguments, Defaults, QUICK_TOLERANCE, TruthArguments, check_folder};
 use crate::cli::progress::Progress;
 use clap::value_parser;
 use std::io::Write;
@@ -18,7 +18,7 @@ use threadlight::{Error, Result};
 
 const EXAMPLES: &str = "\
 Without --materials, gold and red-plastic are measured; without --methods, paper, importance and filtered; without --counts,
-1,4,16,64; without --size, pictures are 160x120.
+1,4,16,64; without --size, pictures are 160x120; without --reference-tolerance, it is 1e-3.
 
 Examples:
   threadlight bench report report
@@ -80,7 +80,7 @@ impl BenchReport {
         let device = self.cases.open_device()?;
         let progress = Progress::of("errors", "done")?;
         let mut measured = Measured::default();
-        self.truth.sweep(&sweep, &device, &progress, &mut measured)?;
+        self.truth.sweep(QUICK_TOLERANCE, &sweep, &device, &progress, &mut measured)?;
         let mut report = Report { facts: facts(&device), ..Report::default() };
         progress.restart("times");
         speed::run(&speed, &device, &progress, &mut report.timings)?;
