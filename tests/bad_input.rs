@@ -101,6 +101,8 @@ fn unknown_names_are_told_with_the_known_ones() {
     refuses(&folder, &render("--mesh cube"), &["cube", "sphere", ".obj"]);
     refuses(&folder, &render("--method magic"), &["magic", "paper"]);
     refuses(&folder, &render("--tolerance 1e-3"), &["--tolerance", "paper"]);
+    refuses(&folder, &render("--reference-on gpu"), &["--reference-on", "paper"]);
+    refuses(&folder, &render("--method reference --reference-on tpu"), &["--reference-on", "tpu", "cpu, gpu"]);
     refuses(&folder, &render("--method reference --print-plan"), &["--print-plan", "reference"]);
     refuses(&folder, &render("--device abacus"), &["--device abacus", "name one of"]);
     refuses(&folder, &render("--background black"), &["--background", "black", "environment, none"]);

@@ -428,6 +428,7 @@ fn every_subcommand_has_help() {
         "--environment",
         "--method",
         "--tolerance",
+        "--reference-on",
         "--threads",
         "--subpixels",
         "--size",
