@@ -11,12 +11,14 @@ mod light_map;
 mod load;
 mod procedural;
 pub mod pyramid;
+mod sources;
 mod vmf_pyramid;
 
 pub use light_map::{Alias, LightMap};
 pub use load::RepairCounts;
 pub use procedural::builtin_names;
 pub use pyramid::Pyramid;
+pub use sources::{MAX_SOURCES, Source, sources};
 pub use vmf_pyramid::{Step, VmfPyramid};
 
 /// Radiance from every direction, as a lat-long picture: linear, Rec. 709.

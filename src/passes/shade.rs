@@ -2,7 +2,7 @@
 use super::background::check_map_size;
 use super::{CameraRays, Counters, FrameGraph, Tiles, View, clear, vmf_pyramid};
 use crate::brdf::Brdf;
-use crate::environment::{Environment, LightMap, Pyramid, VmfPyramid};
+use crate::environment::{Environment, LightMap, Pyramid, Source, VmfPyramid, sources};
 use crate::graph::{self, Access, BufferDesc, Image};
 use crate::method::Method;
 use crate::threads::{Sample, SliceTable, Threads};
@@ -173,9 +173,26 @@ impl<'a> TableAtlas<'a> {
 pub struct DeviceLight {
     pyramid: Option<DevicePyramid>,
     irradiance: Option<DevicePyramid>,
+    sources: Option<Buffer>,
     map: Option<vulkan::Image>,
     aliases: Option<Buffer>,
     intensity: f32,
+}
+
+/// Uploads the sources of `environment`, their power over `scale`: `Sources` in glsl/methods/fitted.glsl.
+fn source_buffer(device: &Arc<Device>, environment: &Environment, scale: f32) -> Result<Buffer> {
+    let sources = sources(environment);
+    // The count, and what aligns the structures to 16 bytes.
+    let mut words = vec![sources.len() as u32, 0, 0, 0];
+    for Source { direction, width_rad, power } in &sources {
+        let power = power.as_vec3() / scale;
+        words.extend(direction.as_vec3().extend(*width_rad as f32).to_array().map(f32::to_bits));
+        words.extend(power.extend(0.0).to_array().map(f32::to_bits));
+    }
+    // A buffer cannot be empty, nor its array.
+    words.resize(words.len().max(12), 0);
+    let storage = vk::BufferUsageFlags::STORAGE_BUFFER;
+    Ok(Buffer::with_contents(device, "light sources", storage, bytemuck::cast_slice(&words))?)
 }
 
 /// The environment's pyramid on the device.
@@ -200,13 +217,14 @@ impl DeviceLight {
         intensity: f64,
     ) -> Result<Self> {
         let shader = method.shader()?;
-        let mut light = Self { pyramid: None, irradiance: None, map: None, aliases: None, intensity: intensity as f32 };
+        let mut light = Self { pyramid: None, irradiance: None, sources: None, map: None, aliases: None, intensity: intensity as f32 };
         if shader.declares("irradiance_map")? {
             let VmfPyramid { levels, irradiance } =
                 environment.vmf_filtered(|source| vmf_pyramid(device, cache, source))?;
             let scale = levels.radiance_scale();
             light.pyramid = Some(DevicePyramid::new(device, "environment pyramid", levels, scale)?);
             light.irradiance = Some(DevicePyramid::new(device, "irradiance map", irradiance, scale)?);
+            light.sources = Some(source_buffer(device, environment, light.pyramid.as_ref().map_or(1.0, |p| p.scale))?);
         } else if shader.declares("environment_pyramid")? {
             let pyramid = environment.box_filtered();
             let scale = pyramid.radiance_scale();
@@ -359,7 +377,7 @@ pub fn shade<'a>(
             bindings = bindings.image("environment_map", map);
         }
         let buffers =
-            [("LightAliases", &light.aliases), ("Threads", &materials.threads), ("Slices", &materials.slices)];
+            [("LightAliases", &light.aliases), ("Sources", &light.sources), ("Threads", &materials.threads), ("Slices", &materials.slices)];
         for (name, buffer) in buffers {
             if let Some(buffer) = buffer {
                 bindings = bindings.buffer(name, buffer);

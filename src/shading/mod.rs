@@ -3,7 +3,7 @@
 //! It starts from the texels of the geometry cache, so that the two can be compared pixel by pixel. BRDFs are evaluated
 //! in double precision; everything else follows the shader line by line.
 use crate::Result;
-use crate::environment::{Alias, LightMap, Pyramid, VmfPyramid};
+use crate::environment::{Alias, LightMap, Pyramid, Source, VmfPyramid, sources};
 use crate::method::Method;
 use crate::packing::{octahedral_decode, unpack_snorm_2x16};
 use crate::passes::SMOOTH_DEG;
@@ -96,6 +96,8 @@ pub struct Twin<'a> {
     prepared: &'a Prepared,
     pyramid: Option<&'a Pyramid>,
     vmf_pyramid: Option<&'a VmfPyramid>,
+    /// Where the method corrects its answer to them.
+    sources: Vec<Source>,
     map: Option<LightMap>,
     aliases: Vec<Alias>,
     /// One for each material, for methods that draw by them.
@@ -120,6 +122,7 @@ impl<'a> Twin<'a> {
             prepared,
             pyramid,
             vmf_pyramid,
+            sources: if blurred { sources(environment) } else { Vec::new() },
             aliases: aliases.map(LightMap::aliases).unwrap_or_default(),
             map,
             slices: vec![],

@@ -5,6 +5,7 @@ use std::sync::OnceLock;
 use glam::{DVec3, dvec3};
 
 use super::kernel::{vmf, vmf_direction};
+use crate::brdf::luminance;
 use crate::threads::slice::{Slice, fibonacci_lattice};
 
 /// Widths of the lights: so many, evenly spaced in their logarithm from a third of a degree, a pixel of a map of 1024 columns, to
@@ -15,7 +16,11 @@ const WIDEST_RAD: f64 = 1.0;
 
 /// Lights of a width are weighted by this power of it. Light in the world has an amplitude spectrum of about 1 / frequency; a mixture of
 /// lights of unit power, evenly spread over the logarithm of width, has that with an exponent of 1.
-const WIDTH_EXPONENT: f64 = 1.2;
+const WIDTH_EXPONENT: f64 = 0.8;
+
+/// Residuals count relative to the response, down to this part of the mean radiance: displays show dim things well, and in the tails of
+/// lobes a bright lamp is all that there is.
+const DIM_RESPONSE: f64 = 0.1;
 
 /// A light: radiance vMF(w; direction, kappa), so of unit power.
 #[derive(Clone, Copy, Debug)]
@@ -74,13 +79,13 @@ impl TestLights {
         let points = SlicePoints::new(slice);
         let response: Vec<_> = lights.iter().map(|light| points.response(slice, light)).collect();
         let cosine: Vec<_> = lights.iter().map(|light| cosine_response(light)).collect();
-        let typical = crate::brdf::luminance(slice.albedo()).max(f64::MIN_POSITIVE) / (2.0 * PI);
+        let typical = luminance(slice.albedo()).max(f64::MIN_POSITIVE) / (2.0 * PI);
         let weight = lights
             .iter()
             .zip(&response)
             .map(|(light, response)| {
-                let _ = response;
-                light_width(light.scale).powf(WIDTH_EXPONENT) / typical
+                let relative = luminance(*response) / typical;
+                light_width(light.scale).powf(WIDTH_EXPONENT) / (typical * (relative + DIM_RESPONSE))
             })
             .collect();
         Self { lights, weight, cosine, response }
