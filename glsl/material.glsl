@@ -8,6 +8,7 @@ struct Material {
     uint thread_count;
     uint row_count;
     uint first_slice;  // where its CDFs start in the buffer of slices
+    float lobe_width;  // half_vector_width in src/brdf/lobe.rs, in radians
 };
 
 layout(set = 0, binding = 5, std430) readonly buffer Materials {

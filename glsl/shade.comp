@@ -16,6 +16,10 @@ layout(constant_id = 0) const uint SUBPIXELS = 2; // per axis
 const float FACING_DEG = 3.0;
 const float TURNING_DEG = 15.0;
 
+// Pixels within which normals vary more, along each axis in rad^2, are a sum for each sub-pixel where methods share surfaces: normals
+// 0.6 degrees from their mean, as at the rim of a sphere, where the view angle changes by more than a row of threads.
+const float SHARED_VARIANCE = 1e-4;
+
 layout(set = 0, binding = 0) uniform utexture2D geometry;
 layout(set = 0, binding = 1, std430) readonly buffer Counters {
     TileClass classes[2];
@@ -96,7 +100,7 @@ void main() {
         // With R the length of the mean normal, 1 - R is the variance along each of two axes.
         vec3 normals = interior ? normal_sum(pixel) : vec3(0.0);
         float normal_variance = interior ? max(1.0 - length(normals) / float(subpixel_count), 0.0) : 0.0;
-        bool shares_surface = interior && SHARES_SURFACE;
+        bool shares_surface = interior && SHARES_SURFACE && normal_variance < SHARED_VARIANCE;
         uint stride = interior && !SHARES_SURFACE ? subpixel_count : 1;
         vec3 sum = vec3(0.0);
         uint covered = 0;
@@ -110,13 +114,12 @@ void main() {
                 vec3 w_o = -normalize(camera_ray(push.camera, position));
                 vec3 normal = shares_surface ? normalize(normals) : geometry_normal(texel);
                 Surface surface = make_surface(to_environment(normal), to_environment(w_o));
-                surface.normal_variance = normal_variance;
+                surface.normal_variance = shares_surface || stride > 1 ? normal_variance : 0.0;
                 sum += estimate(surface, materials[geometry_material(texel)], stride > 1 ? j : 0, stride);
             }
         }
-        if (interior) {
-            covered = subpixel_count;
-        } else {
+        covered = interior ? subpixel_count : covered;
+        if (!shares_surface && stride == 1) {
             sum /= float(subpixel_count);
         }
         float coverage = float(covered) / float(subpixel_count);

@@ -10,9 +10,11 @@ use glam::{DVec2, DVec3, dvec3};
 use crate::error::{Error, Result};
 
 mod builtin;
+mod lobe;
 mod microfacet;
 mod parameters;
 
+pub use lobe::half_vector_width;
 pub use microfacet::{Distribution, fresnel_conductor, fresnel_dielectric};
 pub use parameters::Parameters;
 

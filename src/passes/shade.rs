@@ -1,7 +1,7 @@
 //! Pass 2 of the paper (section 4.2): the radiance of every listed pixel, by its partition of the sample threads.
 use super::background::check_map_size;
 use super::{CameraRays, Counters, FrameGraph, Tiles, View, clear, vmf_pyramid};
-use crate::brdf::Brdf;
+use crate::brdf::{Brdf, half_vector_width};
 use crate::environment::{Environment, LightMap, Pyramid, Source, VmfPyramid, sources};
 use crate::graph::{self, Access, BufferDesc, Image};
 use crate::method::Method;
@@ -24,7 +24,8 @@ struct MaterialRecord {
     thread_count: u32,
     row_count: u32,
     first_slice: u32,
-    padding: [u32; 3],
+    lobe_width: f32,
+    padding: [u32; 2],
 }
 
 /// Materials, their threads or CDFs, and their tables on the device.
@@ -69,7 +70,8 @@ impl DeviceMaterials {
                 thread_count: thread_count as u32,
                 row_count: row_count as u32,
                 first_slice: slices.len() as u32,
-                padding: [0; 3],
+                lobe_width: half_vector_width(brdf) as f32,
+                padding: [0; 2],
             });
             if let Some(table) = thread_table {
                 append_threads(&mut threads, table);
@@ -217,7 +219,14 @@ impl DeviceLight {
         intensity: f64,
     ) -> Result<Self> {
         let shader = method.shader()?;
-        let mut light = Self { pyramid: None, irradiance: None, sources: None, map: None, aliases: None, intensity: intensity as f32 };
+        let mut light = Self {
+            pyramid: None,
+            irradiance: None,
+            sources: None,
+            map: None,
+            aliases: None,
+            intensity: intensity as f32,
+        };
         if shader.declares("irradiance_map")? {
             let VmfPyramid { levels, irradiance } =
                 environment.vmf_filtered(|source| vmf_pyramid(device, cache, source))?;
@@ -376,8 +385,12 @@ pub fn shade<'a>(
         if let Some(map) = &light.map {
             bindings = bindings.image("environment_map", map);
         }
-        let buffers =
-            [("LightAliases", &light.aliases), ("Sources", &light.sources), ("Threads", &materials.threads), ("Slices", &materials.slices)];
+        let buffers = [
+            ("LightAliases", &light.aliases),
+            ("Sources", &light.sources),
+            ("Threads", &materials.threads),
+            ("Slices", &materials.slices),
+        ];
         for (name, buffer) in buffers {
             if let Some(buffer) = buffer {
                 bindings = bindings.buffer(name, buffer);

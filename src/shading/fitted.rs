@@ -4,6 +4,7 @@ use std::f32::consts::{FRAC_1_PI, FRAC_PI_2, SQRT_2, TAU};
 use glam::{Mat3, Vec3};
 
 use super::{Point, any_tangent};
+use crate::brdf::half_vector_width;
 use crate::environment::Source;
 use crate::threads::Threads;
 use crate::threads::fitted::kernel::FINEST_WIDTH_RAD;
@@ -51,9 +52,10 @@ fn f_cos_of_source(point: &Point, to_source: Vec3, source_width: f32, w_o: Vec3)
 }
 
 /// Twin of `replaced`.
-fn replaced(to_source: Vec3, source_width: f32, w_o: Vec3) -> f32 {
+fn replaced(lobe_width: f32, to_source: Vec3, source_width: f32, w_o: Vec3) -> f32 {
     let mirror = Vec3::new(-w_o.x, -w_o.y, w_o.z);
-    let x = ((to_source.distance(mirror) / (2.0 * source_width) - 1.5) / 1.5).clamp(0.0, 1.0);
+    let lobe = 2.6 * lobe_width;
+    let x = (((to_source.distance(mirror) + 4.0 * lobe) / (2.0 * source_width) - 1.5) / 1.5).clamp(0.0, 1.0);
     x * x * (3.0 - 2.0 * x)
 }
 
@@ -71,12 +73,13 @@ pub(super) fn estimate(point: &Point) -> Vec3 {
     let [a, b] = [below, above].map(|row| Vec3::from(threads.cosine_part[row]));
     let cosine_part = a.lerp(b, t);
     let w_o = surface.view_direction();
+    let lobe_width = half_vector_width(&point.material().brdf) as f32;
     let to_frame: Mat3 = surface.frame.transpose();
     let mut sum = Vec3::ZERO;
     let mut sources = Vec::new();
     for &Source { direction, width_rad, power } in &point.twin.sources {
         let (to_source, width, power) = (to_frame * direction.as_vec3(), width_rad as f32, power.as_vec3());
-        let part = replaced(to_source, width, w_o);
+        let part = replaced(lobe_width, to_source, width, w_o);
         let of_cosine = cosine_part * (to_source.z.max(0.0) * FRAC_1_PI);
         sum += part * power * (f_cos_of_source(point, to_source, width, w_o) - of_cosine);
         sources.push((to_source, width, part * power));

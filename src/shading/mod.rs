@@ -91,6 +91,9 @@ fn normal_sum(texels: &[UVec2]) -> Vec3 {
     texels.iter().filter_map(|texel| unpack_geometry(*texel)).map(|(normal, _)| normal).sum()
 }
 
+/// Variance of the normal above which a pixel is a sum for each sub-pixel; why, says the shader.
+const SHARED_VARIANCE: f32 = 1e-4;
+
 /// The CPU twin of pass 2 for one scene.
 pub struct Twin<'a> {
     prepared: &'a Prepared,
@@ -144,6 +147,10 @@ impl<'a> Twin<'a> {
         let interior = is_interior(texels);
         let normals = normal_sum(texels);
         let normal_variance = if interior { (1.0 - normals.length() / texels.len() as f32).max(0.0) } else { 0.0 };
+        let may_share = self.prepared.method.shares_surface();
+        let shares_surface = interior && may_share && normal_variance < SHARED_VARIANCE;
+        let partitioned = interior && !may_share;
+        let normal_variance = if shares_surface || partitioned { normal_variance } else { 0.0 };
         let surface_at = |position: Vec2, normal: Vec3| {
             let w_o = -rays.ray(position).normalize();
             Surface { normal_variance, ..Surface::new(to_environment(normal), to_environment(w_o)) }
@@ -155,7 +162,7 @@ impl<'a> Twin<'a> {
             covered += 1;
             let subpixel = pixel * view.subpixels + UVec2::new(j as u32 % view.subpixels, j as u32 / view.subpixels);
             let axis = to_environment(rays.right());
-            if interior && self.prepared.method.shares_surface() {
+            if shares_surface {
                 if j == 0 {
                     let position = (pixel.as_vec2() + 0.5) / UVec2::new(view.width, view.height).as_vec2();
                     let surface = surface_at(position, normals.normalize());
@@ -164,10 +171,10 @@ impl<'a> Twin<'a> {
                 continue;
             }
             let surface = surface_at((subpixel.as_vec2() + 0.5) / size.as_vec2(), normal);
-            let (first, stride) = if interior { (j as u32, texels.len()) } else { (0, 1) };
+            let (first, stride) = if partitioned { (j as u32, texels.len()) } else { (0, 1) };
             sum += Point { twin: self, surface, axis, material, subpixel, first, stride }.estimate();
         }
-        if !interior {
+        if !shares_surface && !partitioned {
             sum /= texels.len() as f32;
         }
         (sum * self.prepared.intensity as f32).extend(covered as f32 / texels.len() as f32)

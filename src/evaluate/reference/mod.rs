@@ -14,7 +14,7 @@ use std::time::Instant;
 use glam::{DMat3, DVec3, UVec2, dvec3};
 use rayon::prelude::*;
 
-use crate::brdf::Brdf;
+use crate::brdf::{Brdf, half_vector_width};
 use crate::environment::Environment;
 use crate::passes::View;
 use crate::pipeline::render_geometry;
@@ -28,13 +28,11 @@ mod cache;
 mod cubature;
 mod gpu;
 mod light;
-mod lobe;
 #[cfg(test)]
 mod tests;
 
 use cubature::Cubature;
 use light::{CellPlace, Light};
-use lobe::half_vector_width;
 
 /// Tolerance where none is given: a twentieth of a step of an 8-bit display value.
 pub const TOLERANCE: f64 = 2e-4;

@@ -1,9 +1,9 @@
-//! Where a BRDF's lobe is too narrow to be found by chance.
+//! How narrow a BRDF's lobe is.
 use std::f64::consts::FRAC_PI_2;
 
 use glam::{DVec3, dvec3};
 
-use crate::brdf::Brdf;
+use super::Brdf;
 
 /// Half vectors closer to the normal than this count as one: a tenth of the narrowest lobe that a model may have.
 const NARROWEST_RAD: f64 = 1e-4;
