@@ -78,7 +78,7 @@ impl TestLights {
         }
         let points = SlicePoints::new(slice);
         let response: Vec<_> = lights.iter().map(|light| points.response(slice, light)).collect();
-        let cosine: Vec<_> = lights.iter().map(|light| cosine_response(light)).collect();
+        let cosine: Vec<_> = lights.iter().map(cosine_response).collect();
         let typical = luminance(slice.albedo()).max(f64::MIN_POSITIVE) / (2.0 * PI);
         let weight = lights
             .iter()
