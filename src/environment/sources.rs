@@ -105,7 +105,8 @@ fn divide(environment: &Environment, pixels: Vec<usize>, found: &mut Vec<Source>
     for _ in 0..30 {
         axis = (covariance * axis).normalize_or(DVec3::X);
     }
-    let (one, other): (Vec<_>, Vec<_>) = pixels.into_iter().partition(|&pixel| (light(pixel).0 - centre).dot(axis) > 0.0);
+    let (one, other): (Vec<_>, Vec<_>) =
+        pixels.into_iter().partition(|&pixel| (light(pixel).0 - centre).dot(axis) > 0.0);
     for part in [one, other].into_iter().filter(|part| !part.is_empty()) {
         divide(environment, part, found);
     }

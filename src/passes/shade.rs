@@ -217,7 +217,14 @@ impl DeviceLight {
         intensity: f64,
     ) -> Result<Self> {
         let shader = method.shader()?;
-        let mut light = Self { pyramid: None, irradiance: None, sources: None, map: None, aliases: None, intensity: intensity as f32 };
+        let mut light = Self {
+            pyramid: None,
+            irradiance: None,
+            sources: None,
+            map: None,
+            aliases: None,
+            intensity: intensity as f32,
+        };
         if shader.declares("irradiance_map")? {
             let VmfPyramid { levels, irradiance } =
                 environment.vmf_filtered(|source| vmf_pyramid(device, cache, source))?;
@@ -376,8 +383,12 @@ pub fn shade<'a>(
         if let Some(map) = &light.map {
             bindings = bindings.image("environment_map", map);
         }
-        let buffers =
-            [("LightAliases", &light.aliases), ("Sources", &light.sources), ("Threads", &materials.threads), ("Slices", &materials.slices)];
+        let buffers = [
+            ("LightAliases", &light.aliases),
+            ("Sources", &light.sources),
+            ("Threads", &materials.threads),
+            ("Slices", &materials.slices),
+        ];
         for (name, buffer) in buffers {
             if let Some(buffer) = buffer {
                 bindings = bindings.buffer(name, buffer);
