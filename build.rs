@@ -23,7 +23,7 @@ fn main() {
     let generated = out.join("glsl");
     write(&generated.join("brdf_models.glsl"), &brdf_switch());
 
-    let mut table = String::new();
+    let (mut table, mut names) = (String::new(), Vec::new());
     for source in files(glsl) {
         let (stem, extension) = (text(source.file_stem()), text(source.extension()));
         let stage = match extension.as_str() {
@@ -38,13 +38,17 @@ fn main() {
                 let method = text(method.file_stem());
                 let folder = out.join(format!("method_{method}"));
                 write(&folder.join("method.glsl"), &format!("#include \"methods/{method}.glsl\"\n"));
-                compile(&mut table, &source, &format!("{stem}_{method}"), stage, &[glsl, &generated, &folder], &out);
+                let name = format!("{stem}_{method}");
+                compile(&mut table, &source, &name, stage, &[glsl, &generated, &folder], &out);
+                names.push(name.to_uppercase());
             }
         } else {
             let name = if stage == "Compute" { stem } else { format!("{stem}_{extension}") };
             compile(&mut table, &source, &name, stage, &[glsl, &generated], &out);
+            names.push(name.to_uppercase());
         }
     }
+    let _ = writeln!(table, "/// All of them.\npub const ALL: &[Shader] = &[{}];", names.join(", "));
     write(&out.join("shaders.rs"), &table);
 }
 

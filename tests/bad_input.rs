@@ -83,8 +83,17 @@ fn numbers_out_of_range_name_the_flag_and_the_range() {
     ] {
         refuses(&folder, &format!("render -o out/image.png {flag} {value}"), &[flag, value, range]);
     }
-    refuses(&folder, "threads gold --count 0 -o out/gold.threads", &["--count", "1..=1024"]);
-    refuses(&folder, "threads gold --count 1025 -o out/gold.threads", &["--count", "1..=1024"]);
+    for (method, count, range) in [
+        ("fitted", "0", "1 to 128"),
+        ("fitted", "129", "1 to 128"),
+        ("paper", "0", "1 to 1024"),
+        ("paper", "1025", "1 to 1024"),
+    ] {
+        let flags = format!("threads gold --method {method} --count {count} -o out/gold.threads");
+        refuses(&folder, &flags, &["--count", count, method, range]);
+    }
+    refuses(&folder, "threads gold --count many -o out/gold.threads", &["--count", "many"]);
+    refuses(&folder, "threads gold --method uniform -o out/gold.threads", &["uniform", "fitted", "paper"]);
     // More than a method can have.
     refuses(&folder, "render --threads 1025 -o out/image.png", &["threads", "1025", "1024", "paper"]);
     let many = "render --method uniform --threads 9000 --subpixels 4 -o out/image.png";

@@ -7,6 +7,7 @@ use std::fs;
 use std::path::Path;
 use tempfile::TempDir;
 use threadlight::output::{Picture, read_image};
+use threadlight::threads::Threads;
 
 /// What makes a render quick: few pixels, few threads, and an environment that takes no time.
 const SMALL: &str = "--size 96x72 --threads 8 --environment map.hdr";
@@ -395,12 +396,19 @@ fn a_machine_without_a_driver_is_told_what_to_install() {
 #[test]
 fn threads_are_written_and_read_back_the_same() {
     let folder = workplace();
-    for name in ["a.threads", "b.threads"] {
-        threadlight(&folder, &format!("threads gold --count 4 --seed 3 --no-cache -o {name}")).assert().success();
+    for method in ["fitted", "paper"] {
+        for name in ["a.threads", "b.threads"] {
+            let flags = format!("threads gold --method {method} --count 4 --seed 3 --no-cache -o {name}");
+            threadlight(&folder, &flags).assert().success();
+        }
+        assert!(bytes(&folder, "a.threads") == bytes(&folder, "b.threads"), "{method}");
+        let threads = threadlight::threads::read(&folder.path().join("a.threads")).unwrap();
+        assert_eq!((threads.kind().name(), threads.size()), (method, [90, 4]));
+        match threads {
+            Threads::Fitted(table) => assert_eq!(table.material, "gold"),
+            Threads::Paper(table) => assert_eq!((table.material.as_str(), table.seed), ("gold", 3)),
+        }
     }
-    assert!(bytes(&folder, "a.threads") == bytes(&folder, "b.threads"));
-    let table = threadlight::threads::read(&folder.path().join("a.threads")).unwrap();
-    assert_eq!((table.count, table.rows, table.seed, table.material.as_str()), (4, 90, 3, "gold"));
 }
 
 #[test]

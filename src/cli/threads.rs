@@ -1,19 +1,18 @@
 //! `threadlight threads`: makes, writes and draws the sample threads of a material.
 use super::progress::Progress;
 use super::{cache_folder, material_of, stem};
-use clap::value_parser;
 use std::path::PathBuf;
 use threadlight::Error;
 use threadlight::method::Method;
 use threadlight::output;
 use threadlight::prepare::load_material;
 use threadlight::scene::MaterialSource;
-use threadlight::threads::{self, CacheState, MAX_COUNT, Settings};
+use threadlight::threads::{self, CacheState, Kind, Settings};
 
 const EXAMPLES: &str = "\
 Examples:
-  threadlight threads gold --count 100 -o gold.threads
-  threadlight threads alumina-oxide.binary --count 16 --plot curves.png";
+  threadlight threads gold --count 32 -o gold.threads
+  threadlight threads alumina-oxide.binary --method paper --plot curves.png";
 
 /// Makes the sample threads of a material; writes them to a file, or draws them on the hemisphere.
 #[derive(clap::Args)]
@@ -21,11 +20,11 @@ Examples:
 pub struct Threads {
     /// A built-in name, a MERL .binary, or a .toml with a model and its parameters.
     material: String,
-    /// Number of threads, 1 to 1024.
-    #[arg(long, value_name = "N", default_value_t = 100, value_parser = value_parser!(u32).range(1..=MAX_COUNT as i64))]
-    count: u32,
+    /// Number of threads: 1 to 128 (fitted; 16 by default) or 1 to 1024 (paper; 100 by default).
+    #[arg(long, value_name = "N")]
+    count: Option<u32>,
     /// Whose threads: fitted or paper.
-    #[arg(long, value_name = "METHOD", default_value = "fitted")]
+    #[arg(long, value_name = "METHOD", default_value = Kind::default().name())]
     method: String,
     /// Seed of everything random; the same seed gives the same bytes.
     #[arg(long, value_name = "N", default_value_t = 0)]
@@ -47,6 +46,14 @@ impl Threads {
             let remedy = "name a thread file with -o FILE, or a picture with --plot FILE.png";
             return Err(Error::input("threads", "has nothing to write", remedy).into());
         }
+        let kind = Method::from_name(&self.method)?.threads().ok_or_else(|| {
+            Error::input(format!("method \"{}\"", self.method), "has no threads", "use fitted or paper")
+        })?;
+        let count = self.count.map_or(kind.default_count(), |count| count as usize);
+        if !(1..=kind.max_count()).contains(&count) {
+            let remedy = format!("method \"{}\" has 1 to {}", kind.name(), kind.max_count());
+            return Err(Error::input("--count", format!("{count} is out of range"), remedy).into());
+        }
         for path in self.output.iter().chain(&self.plot) {
             output::check_writable(path)?;
         }
@@ -56,10 +63,7 @@ impl Threads {
             _ => self.material.clone(),
         };
         let brdf = load_material(&source)?;
-        let kind = Method::from_name(&self.method)?.threads().ok_or_else(|| {
-            Error::input(format!("method \"{}\"", self.method), "has no threads", "use fitted or paper")
-        })?;
-        let settings = Settings { kind, count: self.count as usize, seed: self.seed, ..Default::default() };
+        let settings = Settings { kind, count, seed: self.seed, ..Default::default() };
         let progress = Progress::new("threads")?;
         let cache = cache_folder(self.no_cache);
         let (threads, state, time) = threads::load_or_generate(&brdf, &settings, cache.as_deref(), &progress)?;

@@ -19,7 +19,7 @@ pub use load::RepairCounts;
 pub use procedural::builtin_names;
 pub use pyramid::Pyramid;
 pub use sources::{MAX_SOURCES, Source, sources};
-pub use vmf_pyramid::{Step, VmfPyramid};
+pub use vmf_pyramid::{Kernel, Step, VmfPyramid};
 
 /// Radiance from every direction, as a lat-long picture: linear, Rec. 709.
 ///

@@ -128,7 +128,7 @@ mod tests {
     use std::sync::atomic::AtomicBool;
 
     use super::*;
-    use crate::threads::test_materials;
+    use crate::threads::{MAX_COUNT, test_materials};
 
     fn small(count: usize, rows: usize) -> Settings {
         Settings { count, rows, seed: 7, ..Settings::default() }

@@ -63,6 +63,14 @@ impl Kind {
         }
     }
 
+    /// The number of threads where nobody asks for another: the paper's; fitted ones do with fewer.
+    pub fn default_count(self) -> usize {
+        match self {
+            Self::Fitted => 16,
+            Self::Paper => 100,
+        }
+    }
+
     /// Most threads that a table can have.
     pub fn max_count(self) -> usize {
         match self {
@@ -119,7 +127,7 @@ impl Threads {
 /// The threads of `brdf`. `observer` hears of rows and may cancel.
 ///
 /// # Errors
-/// [`Error::Cancelled`](crate::Error::Cancelled); settings that ask for no threads, no rows or too many.
+/// [`Error::Cancelled`]; settings that ask for no threads, no rows or too many.
 pub fn generate(brdf: &Brdf, settings: &Settings, observer: &dyn Observer) -> Result<Threads> {
     Ok(match settings.kind {
         Kind::Fitted => Threads::Fitted(fitted::generate(brdf, settings, observer)?),
@@ -132,7 +140,7 @@ pub fn generate(brdf: &Brdf, settings: &Settings, observer: &dyn Observer) -> Re
 pub struct Settings {
     /// Which they are.
     pub kind: Kind,
-    /// Number of threads m, 1 to [`MAX_COUNT`].
+    /// Number of threads m, 1 to [`Kind::max_count`].
     pub count: usize,
     /// Number of view angles, evenly spaced from 0 to just below 90 degrees; at least 1, the paper's is 90.
     pub rows: usize,
@@ -165,7 +173,7 @@ impl Settings {
 pub trait Observer: Sync {
     /// `done` of `total` rows are finished.
     fn progress(&self, done: usize, total: usize);
-    /// True ends the computation with [`Error::Cancelled`](crate::Error::Cancelled).
+    /// True ends the computation with [`Error::Cancelled`].
     fn cancelled(&self) -> bool;
 }
 

@@ -87,6 +87,7 @@ impl Pipeline {
                     return Err(shader.refuse(format!("{binding_name} is declared differently by another stage")));
                 }
             }
+            shader.check_bindings(&bindings)?;
         }
         let set_bindings: Vec<_> = bindings
             .values()

@@ -110,7 +110,46 @@ impl Shader {
                 _ => {}
             }
         }
+        self.check_bindings(&interface.bindings)?;
         Ok(interface)
+    }
+
+    /// An error where two names have one binding: the shader would silently read one as the other.
+    pub(super) fn check_bindings(&self, bindings: &BTreeMap<String, Binding>) -> Result<()> {
+        let mut taken = BTreeMap::new();
+        for (name, binding) in bindings {
+            if let Some(other) = taken.insert(binding.index, name) {
+                return Err(self.refuse(format!("{other} and {name} have the same binding, {}", binding.index)));
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_shader_can_be_read_and_has_each_binding_once() {
+        assert!(compiled::ALL.len() > 10);
+        for shader in compiled::ALL {
+            shader.reflect().unwrap();
+        }
+    }
+
+    #[test]
+    fn two_resources_on_one_binding_are_refused() {
+        // Moves every binding of a shader to 0: OpDecorate (71, four words) with the decoration Binding (33).
+        let mut words = compiled::TONE_MAP.words();
+        for at in 5..words.len() - 3 {
+            if words[at] == 4 << 16 | 71 && words[at + 2] == 33 {
+                words[at + 3] = 0;
+            }
+        }
+        let spirv = words.iter().flat_map(|word| word.to_le_bytes()).collect::<Vec<_>>().leak();
+        let problem = Shader { spirv, ..compiled::TONE_MAP }.reflect().unwrap_err().to_string();
+        assert!(problem.contains("have the same binding, 0"), "{problem}");
     }
 }
 

@@ -78,8 +78,10 @@ impl TestLights {
         }
         let points = SlicePoints::new(slice);
         let response: Vec<_> = lights.iter().map(|light| points.response(slice, light)).collect();
-        let cosine: Vec<_> = lights.iter().map(|light| cosine_response(light)).collect();
-        let typical = luminance(slice.albedo()).max(f64::MIN_POSITIVE) / (2.0 * PI);
+        let cosine: Vec<_> = lights.iter().map(cosine_response).collect();
+        // Where nothing is reflected any weight will do.
+        let albedo = luminance(slice.albedo());
+        let typical = if albedo > 0.0 { albedo } else { 1.0 } / (2.0 * PI);
         let weight = lights
             .iter()
             .zip(&response)

@@ -5,6 +5,8 @@ pub mod kernel;
 pub mod lights;
 pub mod solve;
 mod table;
+#[cfg(test)]
+mod tests;
 
 pub use generate::generate;
 pub use table::{FittedTable, PackedKernel, UnpackedKernel};
