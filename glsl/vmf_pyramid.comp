@@ -17,8 +17,7 @@ layout(set = 0, binding = 1, std430) writeonly buffer Destination {
 // How wide the kernels are that texels were convolved with, in `mean_cos_deficit`.
 const uint BOX = 0;    // the texel itself
 const uint VMF = 1;    // of a level of the pyramid
-const uint COSINE = 2; // max(cos, 0) / pi, as a destination only
-const uint MEAN = 3;   // of the level of twice this size, and then means of 2 x 2 texels
+const uint MEAN = 2;  // of the level of twice this size, and then means of 2 x 2 texels
 
 layout(push_constant) uniform Push {
     uint from_size; // of a face
@@ -104,16 +103,10 @@ void main() {
         return;
     }
     vec3 centre = normalize(cube_point(id.z, (vec2(id.xy) + 0.5) / float(push.size)));
-    float kappa = 1.0;
-    float extent = 2.0; // 1 - cos of the cone that the kernel fills
-    if (push.kernel == COSINE) {
-        extent = 1.0;
-    } else {
-        float from = texel_deficit(push.from_kernel, float(push.from_size), centre);
-        float wanted = texel_deficit(push.kernel, float(push.size), centre);
-        kappa = kappa_of_deficit((wanted - from) / (1.0 - from));
-        extent = min(KERNEL_EXTENT / kappa, 2.0);
-    }
+    float from = texel_deficit(push.from_kernel, float(push.from_size), centre);
+    float wanted = texel_deficit(push.kernel, float(push.size), centre);
+    float kappa = kappa_of_deficit((wanted - from) / (1.0 - from));
+    float extent = min(KERNEL_EXTENT / kappa, 2.0); // 1 - cos of the cone that the kernel fills
     float sin_cone = extent < 1.0 ? sqrt(extent * (2.0 - extent)) : 1.0;
     vec4 sum = vec4(0.0);
     float step_size = 2.0 / float(push.from_size);
@@ -130,7 +123,7 @@ void main() {
                 // 1 - cos as half the squared distance: exact for neighbours too.
                 vec3 difference = vec3(st, 1.0) * cos_face - axes;
                 float away = 0.5 * dot(difference, difference);
-                float weight = push.kernel == COSINE ? 1.0 - away : exp(-kappa * away);
+                float weight = exp(-kappa * away);
                 // The solid angle of a texel is as the cube of the cosine.
                 weight *= away < extent ? cos_face * cos_face * cos_face : 0.0;
                 sum += weight * vec4(source[at], source[at + 1], source[at + 2], 1.0);

@@ -66,19 +66,25 @@ float kernel_at(vec3 direction, float level, vec3 to_source, float source_width)
     return mix(finer, coarser, level - whole);
 }
 
-// f (n . w_i) of a source: the mean of four points with its variance.
-vec3 f_cos_of_source(Material material, vec3 to_source, float source_width, vec3 w_o) {
+// What is to be integrated over a source: the mean of four points with its variance.
+struct AtSource {
+    vec3 f_cos;
+    float cosine;
+};
+
+AtSource at_source(Material material, vec3 to_source, float source_width, vec3 w_o) {
     vec3 x = any_tangent(to_source);
     vec3 y = cross(to_source, x);
-    vec3 sum = vec3(0.0);
+    AtSource mean = AtSource(vec3(0.0), 0.0);
     for (int i = 0; i < 4; ++i) {
         float sign = i < 2 ? 1.0 : -1.0;
         vec3 w_i = normalize(to_source + sign * sqrt(2.0) * source_width * ((i & 1) == 0 ? x : y));
         if (w_i.z > 0.0) {
-            sum += brdf(material, w_i, w_o) * w_i.z;
+            mean.f_cos += 0.25 * brdf(material, w_i, w_o) * w_i.z;
+            mean.cosine += 0.25 * w_i.z;
         }
     }
-    return 0.25 * sum;
+    return mean;
 }
 
 // How much of a source's answer is replaced. Where it is mirrored towards the eye, four points are too few to tell what a lobe makes
@@ -105,9 +111,10 @@ vec3 estimate(Surface surface, Material material, uint first, uint stride) {
     for (uint s = 0; s < source_count; ++s) {
         to_source[s] = sources[s].direction * surface.frame;
         part[s] = replaced(material, to_source[s], sources[s].width, w_o);
-        vec3 f_cos = f_cos_of_source(material, to_source[s], sources[s].width, w_o);
-        vec3 of_cosine = cosine_part * (max(to_source[s].z, 0.0) / radians(180.0));
-        sum += part[s] * sources[s].power * (f_cos - of_cosine);
+        AtSource mean = at_source(material, to_source[s], sources[s].width, w_o);
+        // The irradiance map has no sources.
+        vec3 of_cosine = cosine_part * (mean.cosine / radians(180.0));
+        sum += sources[s].power * mix(of_cosine, mean.f_cos, part[s]);
     }
     for (uint k = first; k < material.thread_count; k += stride) {
         Kernel a = unpack_kernel(below + 3 * (k + 1));

@@ -7,6 +7,7 @@ use glam::DVec3;
 use crate::error::Result;
 
 pub mod cube;
+mod irradiance;
 mod light_map;
 mod load;
 mod procedural;
@@ -14,11 +15,12 @@ pub mod pyramid;
 mod sources;
 mod vmf_pyramid;
 
+pub use irradiance::irradiance_map;
 pub use light_map::{Alias, LightMap};
 pub use load::RepairCounts;
 pub use procedural::builtin_names;
 pub use pyramid::Pyramid;
-pub use sources::{MAX_SOURCES, Source, sources};
+pub use sources::{MAX_SOURCES, SmallSources, Source};
 pub use vmf_pyramid::{Kernel, Step, VmfPyramid};
 
 /// Radiance from every direction, as a lat-long picture: linear, Rec. 709.
@@ -42,6 +44,10 @@ pub struct Environment {
     box_filtered: OnceLock<Pyramid>,
     /// Made when first asked for.
     vmf_filtered: OnceLock<VmfPyramid>,
+    /// Made when first asked for.
+    small_sources: OnceLock<SmallSources>,
+    /// Made when first asked for.
+    irradiance: OnceLock<Pyramid>,
 }
 
 impl Environment {
@@ -53,12 +59,32 @@ impl Environment {
         texels: Vec<[f32; 3]>,
         repaired: RepairCounts,
     ) -> Self {
-        Self { name, width, height, texels, repaired, box_filtered: OnceLock::new(), vmf_filtered: OnceLock::new() }
+        Self {
+            name,
+            width,
+            height,
+            texels,
+            repaired,
+            box_filtered: OnceLock::new(),
+            vmf_filtered: OnceLock::new(),
+            small_sources: OnceLock::new(),
+            irradiance: OnceLock::new(),
+        }
     }
 
     /// The box-filtered pyramid of this environment, made once for all renderers.
     pub fn box_filtered(&self) -> &Pyramid {
         self.box_filtered.get_or_init(|| Pyramid::box_filtered(self))
+    }
+
+    /// Its small bright sources.
+    pub fn small_sources(&self) -> &SmallSources {
+        self.small_sources.get_or_init(|| SmallSources::of(self))
+    }
+
+    /// Irradiance over pi, without those.
+    pub fn irradiance(&self) -> &Pyramid {
+        self.irradiance.get_or_init(|| irradiance_map(self, self.small_sources()))
     }
 
     /// The pyramid of vMF kernels of this environment: by `make` from the box-filtered one, once for all renderers.

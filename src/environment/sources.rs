@@ -1,7 +1,7 @@
 //! Small bright sources: suns and lamps, in which most of an environment's light may be.
 //!
 //! The tails of a lobe matter most under these, and tails are what few kernels fit worst. So for them shading adds what the fit
-//! lacks: power times (BRDF less fit). Nothing is cut out of the pyramid; without the correction the source is still there.
+//! lacks: power times (BRDF less fit). They stay in the pyramid, but are left out of the irradiance map.
 use glam::{DMat3, DVec3};
 
 use super::Environment;
@@ -30,18 +30,31 @@ pub struct Source {
     pub power: DVec3,
 }
 
-/// The sources of `environment`, the most powerful first.
-pub fn sources(environment: &Environment) -> Vec<Source> {
-    let total = luminance(environment.mean_radiance()) * 4.0 * std::f64::consts::PI;
-    let threshold = BRIGHTNESS * luminance(environment.mean_radiance());
-    let mut found = Vec::new();
-    for pixels in bright_regions(environment, threshold) {
-        divide(environment, pixels, &mut found);
+/// The sources of an environment.
+#[derive(Clone, Debug)]
+pub struct SmallSources {
+    /// The most powerful first, at most [`MAX_SOURCES`].
+    pub list: Vec<Source>,
+    /// Whether each pixel is of one of them.
+    pub pixels: Vec<bool>,
+}
+
+impl SmallSources {
+    /// Those of `environment`.
+    pub fn of(environment: &Environment) -> Self {
+        let mean = luminance(environment.mean_radiance());
+        let total = 4.0 * std::f64::consts::PI * mean;
+        let mut found = Vec::new();
+        for pixels in bright_regions(environment, BRIGHTNESS * mean) {
+            divide(environment, pixels, &mut found);
+        }
+        found.retain(|(source, _)| luminance(source.power) >= LEAST_SHARE * total);
+        found.sort_by(|(a, _), (b, _)| luminance(b.power).total_cmp(&luminance(a.power)));
+        found.truncate(MAX_SOURCES);
+        let mut pixels = vec![false; environment.texels.len()];
+        found.iter().flat_map(|(_, own)| own).for_each(|&pixel| pixels[pixel] = true);
+        Self { list: found.into_iter().map(|(source, _)| source).collect(), pixels }
     }
-    found.retain(|source: &Source| luminance(source.power) >= LEAST_SHARE * total);
-    found.sort_by(|a, b| luminance(b.power).total_cmp(&luminance(a.power)));
-    found.truncate(MAX_SOURCES);
-    found
 }
 
 /// Connected pixels above `threshold`, with the first column next to the last.
@@ -73,8 +86,8 @@ fn bright_regions(environment: &Environment, threshold: f64) -> Vec<Vec<usize>> 
     regions
 }
 
-/// Adds the source of these pixels, or of parts of them that are small enough.
-fn divide(environment: &Environment, pixels: Vec<usize>, found: &mut Vec<Source>) {
+/// Adds the source of these pixels with them, or those of parts that are small enough.
+fn divide(environment: &Environment, pixels: Vec<usize>, found: &mut Vec<(Source, Vec<usize>)>) {
     let light = |pixel: usize| {
         let (column, row) = (pixel % environment.width, pixel / environment.width);
         let power = environment.weight_solid_angle(row) * super::to_dvec3(&environment.texels[pixel]);
@@ -97,7 +110,7 @@ fn divide(environment: &Environment, pixels: Vec<usize>, found: &mut Vec<Source>
     let trace = covariance.x_axis.x + covariance.y_axis.y + covariance.z_axis.z;
     let width_rad = (0.5 * trace + pixel_variance).sqrt();
     if width_rad <= WIDEST_RAD || pixels.len() < 2 {
-        found.push(Source { direction: centre, width_rad, power });
+        found.push((Source { direction: centre, width_rad, power }, pixels));
         return;
     }
     // Across the longest axis, which powers of the matrix converge to.
@@ -121,7 +134,7 @@ mod tests {
     fn a_sun_is_found_where_it_is_with_all_its_power() {
         for (column, row) in [(0, 20), (127, 33), (64, 0), (30, 63)] {
             let map = environment(128, 64, |x, y| [if (x, y) == (column, row) { 1e6 } else { 1.0 }; 3]);
-            let found = sources(&map);
+            let found = SmallSources::of(&map).list;
             assert_eq!(found.len(), 1, "{column} {row}");
             assert!(found[0].direction.dot(map.direction(column as f64, row as f64)) > 1.0 - 1e-9);
             let power = 1e6 * map.weight_solid_angle(row);
@@ -132,10 +145,10 @@ mod tests {
 
     #[test]
     fn soft_light_has_no_sources_and_a_bright_strip_has_several() {
-        assert!(sources(&environment(64, 32, |x, y| [(x % 5 + y % 7) as f32; 3])).is_empty());
-        assert!(sources(&environment(8, 4, |_, _| [0.0; 3])).is_empty());
+        assert!(SmallSources::of(&environment(64, 32, |x, y| [(x % 5 + y % 7) as f32; 3])).list.is_empty());
+        assert!(SmallSources::of(&environment(8, 4, |_, _| [0.0; 3])).list.is_empty());
         let strip = environment(256, 128, |x, y| [if y == 64 && (100..120).contains(&x) { 5e3 } else { 0.1 }; 3]);
-        let found = sources(&strip);
+        let found = SmallSources::of(&strip).list;
         assert!((2..=MAX_SOURCES).contains(&found.len()), "{found:?}");
         assert!(found.iter().all(|source| source.width_rad <= WIDEST_RAD));
     }

@@ -1,5 +1,5 @@
-//! The pyramid of known kernels: the environment convolved with von Mises-Fisher kernels, level by level twice as wide, and its
-//! irradiance. Fitted threads look these up. Twin: glsl/vmf_pyramid.comp, which makes it at load.
+//! The pyramid of known kernels: the environment convolved with von Mises-Fisher kernels, level by level twice as wide.
+//! Fitted threads look these up. Twin: glsl/vmf_pyramid.comp, which makes it at load.
 use std::f64::consts::FRAC_PI_4;
 use std::ops::Range;
 
@@ -16,9 +16,6 @@ const TEXELS_A_WIDTH: f64 = 2.0;
 /// Texels along the edge of a face of the level whose kernel has a width of one radian; there are no wider ones.
 const WIDEST_FACE_SIZE: usize = (2.0 * TEXELS_A_WIDTH) as usize;
 
-/// Texels along the edge of a face of the irradiance map: bilinear between them it is good to 1e-4 of its largest value.
-const IRRADIANCE_FACE_SIZE: usize = 64;
-
 /// Kernels end where they have fallen to exp(-8), and beyond is 3.4e-4 of their mass; the rest is scaled to have it all.
 const KERNEL_EXTENT: f64 = 8.0;
 
@@ -27,8 +24,6 @@ const KERNEL_EXTENT: f64 = 8.0;
 pub struct VmfPyramid {
     /// Level l holds the convolution with the kernel of width [`Self::finest_width_rad`] 2^l, as a bilinear lookup returns it.
     pub levels: Pyramid,
-    /// Irradiance over pi: the convolution with max(cos, 0) / pi. One level.
-    pub irradiance: Pyramid,
 }
 
 /// What texels were convolved with.
@@ -39,10 +34,8 @@ pub enum Kernel {
     Box = 0,
     /// The kernel that, with the blur of a bilinear lookup, makes the level's vMF kernel.
     Vmf = 1,
-    /// max(cos, 0) / pi.
-    Cosine = 2,
     /// As the level of twice the size, and then means of 2 x 2 texels.
-    Mean = 3,
+    Mean = 2,
 }
 
 /// How to make one map.
@@ -61,8 +54,8 @@ pub struct Step {
 }
 
 impl VmfPyramid {
-    /// How its maps are made for faces of `finest` texels: levels (kernel [`Kernel::Vmf`]) from fine to coarse, means of 2 x 2 texels of
-    /// them, and the irradiance ([`Kernel::Cosine`]) last.
+    /// How its maps are made for faces of `finest` texels: levels (kernel [`Kernel::Vmf`]) from fine to coarse, and means of 2 x 2
+    /// texels of them.
     ///
     /// Level 0 is made from the box-filtered one, and each other from means of a finer level of its own: that is so smooth that nothing is
     /// lost by sampling it there, while box-filtered texels as large would no longer tell where in them a light was.
@@ -86,12 +79,6 @@ impl VmfPyramid {
             steps.push(vmf(Some(from), Kernel::Mean, from_size, size));
             size /= 2;
         }
-        // From a map much finer than the cosine's own width.
-        let fine = means.iter().rev().find(|(_, size)| *size >= 32).copied();
-        let (from, from_kernel, from_size) =
-            fine.map_or((0, Kernel::Vmf, finest), |(from, from_size)| (from, Kernel::Mean, from_size));
-        let size = IRRADIANCE_FACE_SIZE;
-        steps.push(Step { from: Some(from), from_kernel, from_size, size, kernel: Kernel::Cosine });
         steps
     }
 
@@ -109,13 +96,9 @@ impl VmfPyramid {
     ///
     /// # Panics
     /// If some are not there.
-    pub fn from_maps(finest: usize, mut maps: Vec<Vec<[f32; 3]>>) -> Self {
-        let irradiance = maps.pop().expect("the irradiance is the last");
+    pub fn from_maps(finest: usize, maps: Vec<Vec<[f32; 3]>>) -> Self {
         let levels = Self::steps(finest).into_iter().zip(maps).filter(|(step, _)| step.kernel == Kernel::Vmf);
-        Self {
-            levels: Pyramid { face_size: finest, levels: levels.map(|(_, map)| map).collect() },
-            irradiance: Pyramid { face_size: IRRADIANCE_FACE_SIZE, levels: vec![irradiance] },
-        }
+        Self { levels: Pyramid { face_size: finest, levels: levels.map(|(_, map)| map).collect() } }
     }
 
     /// Width of the kernel of level 0, in radians.
@@ -175,13 +158,9 @@ fn blurred(source: &[[f32; 3]], step: &Step) -> Vec<[f32; 3]> {
     let texels: Vec<(DVec3, f64)> = texels.collect();
     let texel_of = |texel: usize| {
         let centre = direction(size, texel);
-        let (kappa, extent) = if kernel == Kernel::Cosine {
-            (1.0, 1.0)
-        } else {
-            let from = texel_deficit(from_kernel, from_size, centre);
-            let kappa = kappa_of_deficit((texel_deficit(kernel, size, centre) - from) / (1.0 - from));
-            (kappa, f64::min(KERNEL_EXTENT / kappa, 2.0))
-        };
+        let from = texel_deficit(from_kernel, from_size, centre);
+        let kappa = kappa_of_deficit((texel_deficit(kernel, size, centre) - from) / (1.0 - from));
+        let extent = f64::min(KERNEL_EXTENT / kappa, 2.0);
         let sin_cone = if extent < 1.0 { (extent * (2.0 - extent)).sqrt() } else { 1.0 };
         let (mut sum, mut weight_sum) = (DVec3::ZERO, 0.0);
         for face in 0..6 {
@@ -194,7 +173,7 @@ fn blurred(source: &[[f32; 3]], step: &Step) -> Vec<[f32; 3]> {
                     // 1 - cos as half the squared distance: exact for neighbours too.
                     let away = 0.5 * (direction - centre).length_squared();
                     if away < extent {
-                        let weight = if kernel == Kernel::Cosine { 1.0 - away } else { (-kappa * away).exp() };
+                        let weight = (-kappa * away).exp();
                         sum += weight * solid_angle * to_dvec3(&source[at]);
                         weight_sum += weight * solid_angle;
                     }

@@ -2,7 +2,7 @@
 use super::background::check_map_size;
 use super::{CameraRays, Counters, FrameGraph, Tiles, View, clear, vmf_pyramid};
 use crate::brdf::{Brdf, half_vector_width};
-use crate::environment::{Environment, LightMap, Pyramid, Source, VmfPyramid, sources};
+use crate::environment::{Environment, LightMap, Pyramid, Source, VmfPyramid};
 use crate::graph::{self, Access, BufferDesc, Image};
 use crate::method::Method;
 use crate::threads::{Sample, SliceTable, Threads};
@@ -183,10 +183,10 @@ pub struct DeviceLight {
 
 /// Uploads the sources of `environment`, their power over `scale`: `Sources` in glsl/methods/fitted.glsl.
 fn source_buffer(device: &Arc<Device>, environment: &Environment, scale: f32) -> Result<Buffer> {
-    let sources = sources(environment);
+    let sources = &environment.small_sources().list;
     // The count, and what aligns the structures to 16 bytes.
     let mut words = vec![sources.len() as u32, 0, 0, 0];
-    for Source { direction, width_rad, power } in &sources {
+    for Source { direction, width_rad, power } in sources {
         let power = power.as_vec3() / scale;
         words.extend(direction.as_vec3().extend(*width_rad as f32).to_array().map(f32::to_bits));
         words.extend(power.extend(0.0).to_array().map(f32::to_bits));
@@ -228,11 +228,10 @@ impl DeviceLight {
             intensity: intensity as f32,
         };
         if shader.declares("irradiance_map")? {
-            let VmfPyramid { levels, irradiance } =
-                environment.vmf_filtered(|source| vmf_pyramid(device, cache, source))?;
+            let VmfPyramid { levels } = environment.vmf_filtered(|source| vmf_pyramid(device, cache, source))?;
             let scale = levels.radiance_scale();
             light.pyramid = Some(DevicePyramid::new(device, "environment pyramid", levels, scale)?);
-            light.irradiance = Some(DevicePyramid::new(device, "irradiance map", irradiance, scale)?);
+            light.irradiance = Some(DevicePyramid::new(device, "irradiance map", environment.irradiance(), scale)?);
             light.sources = Some(source_buffer(device, environment, light.pyramid.as_ref().map_or(1.0, |p| p.scale))?);
         } else if shader.declares("environment_pyramid")? {
             let pyramid = environment.box_filtered();

@@ -40,15 +40,16 @@ fn kernel_at(direction: Vec3, level: f32, to_source: Vec3, source_width: f32) ->
     finer + (level - whole) * (coarser - finer)
 }
 
-/// Twin of `f_cos_of_source`.
-fn f_cos_of_source(point: &Point, to_source: Vec3, source_width: f32, w_o: Vec3) -> Vec3 {
+/// f cos and cos at a source. Twin of `at_source`.
+fn at_source(point: &Point, to_source: Vec3, source_width: f32, w_o: Vec3) -> (Vec3, f32) {
     let x = any_tangent(to_source);
     let y = to_source.cross(x);
     let side = |offset: Vec3| {
         let w_i = (to_source + SQRT_2 * source_width * offset).normalize();
-        if w_i.z > 0.0 { point.brdf(w_i, w_o) * w_i.z } else { Vec3::ZERO }
+        if w_i.z > 0.0 { (point.brdf(w_i, w_o) * w_i.z, w_i.z) } else { (Vec3::ZERO, 0.0) }
     };
-    0.25 * [x, y, -x, -y].map(side).iter().sum::<Vec3>()
+    let add = |sum: (Vec3, f32), side: (Vec3, f32)| (sum.0 + 0.25 * side.0, sum.1 + 0.25 * side.1);
+    [x, y, -x, -y].map(side).into_iter().fold((Vec3::ZERO, 0.0), add)
 }
 
 /// Twin of `replaced`.
@@ -67,6 +68,7 @@ pub(super) fn estimate(point: &Point) -> Vec3 {
     let Some(Threads::Fitted(threads)) = &point.material().threads else { panic!("fitted threads are there") };
     let surface = &point.surface;
     let pyramid = point.twin.vmf_pyramid.expect("the method declares the pyramid");
+    let irradiance = point.twin.irradiance.expect("the method declares the map");
     let row = (surface.theta_o * (threads.rows as f32 / FRAC_PI_2)).min((threads.rows - 1) as f32);
     let (below, t) = (row as usize, row.fract());
     let above = (below + 1).min(threads.rows - 1);
@@ -77,11 +79,12 @@ pub(super) fn estimate(point: &Point) -> Vec3 {
     let to_frame: Mat3 = surface.frame.transpose();
     let mut sum = Vec3::ZERO;
     let mut sources = Vec::new();
-    for &Source { direction, width_rad, power } in &point.twin.sources {
+    for &Source { direction, width_rad, power } in point.twin.sources {
         let (to_source, width, power) = (to_frame * direction.as_vec3(), width_rad as f32, power.as_vec3());
         let part = replaced(lobe_width, to_source, width, w_o);
-        let of_cosine = cosine_part * (to_source.z.max(0.0) * FRAC_1_PI);
-        sum += part * power * (f_cos_of_source(point, to_source, width, w_o) - of_cosine);
+        let (f_cos, cosine) = at_source(point, to_source, width, w_o);
+        let of_cosine = cosine_part * (cosine * FRAC_1_PI);
+        sum += power * of_cosine.lerp(f_cos, part);
         sources.push((to_source, width, part * power));
     }
     let finest = finest_level(pyramid.levels.face_size);
@@ -95,6 +98,6 @@ pub(super) fn estimate(point: &Point) -> Vec3 {
         }
         sum += a.weight.lerp(b.weight, t) * radiance;
     }
-    sum += cosine_part * pyramid.irradiance.lookup(surface.frame.z_axis, 0.0);
+    sum += cosine_part * irradiance.lookup(surface.frame.z_axis, 0.0);
     sum.max(Vec3::ZERO)
 }

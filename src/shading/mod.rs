@@ -3,7 +3,7 @@
 //! It starts from the texels of the geometry cache, so that the two can be compared pixel by pixel. BRDFs are evaluated
 //! in double precision; everything else follows the shader line by line.
 use crate::Result;
-use crate::environment::{Alias, LightMap, Pyramid, Source, VmfPyramid, sources};
+use crate::environment::{Alias, LightMap, Pyramid, Source, VmfPyramid};
 use crate::method::Method;
 use crate::packing::{octahedral_decode, unpack_snorm_2x16};
 use crate::passes::SMOOTH_DEG;
@@ -100,7 +100,8 @@ pub struct Twin<'a> {
     pyramid: Option<&'a Pyramid>,
     vmf_pyramid: Option<&'a VmfPyramid>,
     /// Where the method corrects its answer to them.
-    sources: Vec<Source>,
+    sources: &'a [Source],
+    irradiance: Option<&'a Pyramid>,
     map: Option<LightMap>,
     aliases: Vec<Alias>,
     /// One for each material, for methods that draw by them.
@@ -125,7 +126,8 @@ impl<'a> Twin<'a> {
             prepared,
             pyramid,
             vmf_pyramid,
-            sources: if blurred { sources(environment) } else { Vec::new() },
+            irradiance: blurred.then(|| environment.irradiance()),
+            sources: if blurred { &environment.small_sources().list } else { &[] },
             aliases: aliases.map(LightMap::aliases).unwrap_or_default(),
             map,
             slices: vec![],
