@@ -107,7 +107,7 @@ impl Renderer {
         let geometry_cache = upload_geometry(device, &cache, prepared)?;
         let brdfs = prepared.materials.iter().map(|material| (&material.brdf, material.threads.as_ref()));
         let materials = DeviceMaterials::new(device, method, brdfs)?;
-        let light = DeviceLight::new(device, &cache, method, environment, *intensity)?;
+        let light = DeviceLight::new(device, &cache, cache_folder, method, environment, *intensity)?;
         Ok(Self {
             view: view.clone(),
             geometry_cache,

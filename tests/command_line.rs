@@ -120,40 +120,47 @@ fn the_built_in_scene_renders_without_validation_messages_and_with_sane_statisti
 #[test]
 fn the_same_command_gives_the_same_picture_with_any_state_of_the_cache() {
     let folder = workplace();
-    for (name, flags) in [("cold", ""), ("warm", ""), ("none", "--no-cache")] {
-        for kind in ["png", "exr"] {
-            printed(&mut render(&folder, &format!("{SMALL} {flags} -o {name}.{kind}")));
+    for method in ["fitted", "paper"] {
+        for (name, flags) in [("cold", ""), ("warm", ""), ("none", "--no-cache")] {
+            for kind in ["png", "exr"] {
+                printed(&mut render(&folder, &format!("{SMALL} --method {method} {flags} -o {name}.{kind}")));
+            }
+        }
+        for name in ["warm", "none"] {
+            assert!(bytes(&folder, "cold.png") == bytes(&folder, &format!("{name}.png")), "{method}, {name}");
+            let (cold, other) = (picture(&folder, "cold.exr"), picture(&folder, &format!("{name}.exr")));
+            assert!(cold.rgba.iter().flatten().all(|value| value.is_finite()));
+            assert!(cold.rgba == other.rgba, "{method}, {name}");
         }
     }
-    for name in ["warm", "none"] {
-        assert!(bytes(&folder, "cold.png") == bytes(&folder, &format!("{name}.png")), "{name}");
-        let (cold, other) = (picture(&folder, "cold.exr"), picture(&folder, &format!("{name}.exr")));
-        assert!(cold.rgba.iter().flatten().all(|value| value.is_finite()));
-        assert!(cold.rgba == other.rgba, "{name}");
-    }
-    printed(&mut render(&folder, &format!("{SMALL} --seed 7 -o seed.exr")));
+    printed(&mut render(&folder, &format!("{SMALL} --method paper --seed 7 -o seed.exr")));
     assert!(picture(&folder, "cold.exr").rgba != picture(&folder, "seed.exr").rgba, "the seed has no effect");
 }
 
 #[test]
 fn no_cache_leaves_no_cache() {
     let folder = workplace();
-    printed(&mut render(&folder, &format!("{SMALL} --no-cache -o image.png")));
-    assert!(!cache(&folder).exists());
+    for method in ["fitted", "paper"] {
+        printed(&mut render(&folder, &format!("{SMALL} --method {method} --no-cache -o image.png")));
+        assert!(!cache(&folder).exists(), "{method}");
+    }
 }
 
 #[test]
-fn threads_are_cached_and_damage_is_repaired() {
+fn threads_and_pyramids_are_cached_and_damage_is_repaired() {
     let folder = workplace();
-    let run = |name: &str| render(&folder, &format!("{SMALL} --stats {name}.json -o {name}.png")).output().unwrap();
+    let run = |name: &str| {
+        let flags = format!("{SMALL} --method fitted --stats {name}.json -o {name}.png");
+        render(&folder, &flags).output().unwrap()
+    };
     let state = |name: &str| stats(&folder, &format!("{name}.json"))["thread_cache"].as_str().unwrap().to_owned();
     run("first");
     run("second");
     assert_eq!((state("first").as_str(), state("second").as_str()), ("miss", "hit"));
 
-    // Cut the threads and overwrite the pipelines.
+    // Cut the threads and overwrite the pyramid and the pipelines.
     let files: Vec<_> = fs::read_dir(cache(&folder)).unwrap().map(|entry| entry.unwrap().path()).collect();
-    assert!(files.len() >= 2, "{files:?}");
+    assert!(files.len() >= 3, "{files:?}");
     for file in &files {
         let content = fs::read(file).unwrap();
         let threads = file.extension().is_some_and(|extension| extension == "threads");
@@ -162,7 +169,8 @@ fn threads_are_cached_and_damage_is_repaired() {
     }
     let output = run("damaged");
     let warning = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success() && warning.contains("WARN") && warning.contains(".threads"), "{warning}");
+    assert!(output.status.success() && warning.contains("WARN"), "{warning}");
+    assert!(warning.contains(".threads") && warning.contains(".pyramid"), "{warning}");
     run("repaired");
     assert_eq!((state("damaged").as_str(), state("repaired").as_str()), ("miss", "hit"));
     for name in ["second", "damaged", "repaired"] {

@@ -99,7 +99,7 @@ fn material_of(text: &str) -> MaterialSource {
     }
 }
 
-/// The folder that threads and pipelines are cached in; none with `--no-cache`.
+/// The folder that threads, blurred environments and pipelines are cached in; none with `--no-cache`.
 fn cache_folder(no_cache: bool) -> Option<PathBuf> {
     (!no_cache).then(threadlight::threads::default_directory).flatten()
 }

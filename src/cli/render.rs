@@ -94,7 +94,7 @@ pub struct Render {
     /// Print the plan of the frame: passes, barriers, what was culled, memory.
     #[arg(long)]
     print_plan: bool,
-    /// Neither read nor write cached threads and pipelines.
+    /// Neither read nor write cached threads, blurred environments and pipelines.
     #[arg(long)]
     no_cache: bool,
     /// Picture to write: .png (8 bit, display values) or .exr (32-bit float, linear radiance).

@@ -1,11 +1,13 @@
 //! Distant light from all directions: the lat-long environment, and the function of direction that is its ground truth.
 use std::f64::consts::{PI, TAU};
+use std::path::Path;
 use std::sync::OnceLock;
 
 use glam::DVec3;
 
 use crate::error::Result;
 
+mod cache;
 pub mod cube;
 mod irradiance;
 mod light_map;
@@ -87,15 +89,20 @@ impl Environment {
         self.irradiance.get_or_init(|| irradiance_map(self, self.small_sources()))
     }
 
-    /// The pyramid of vMF kernels of this environment: by `make` from the box-filtered one, once for all renderers.
+    /// The pyramid of vMF kernels of this environment: from the cache in `folder` or by `make` from the box-filtered one, once for all
+    /// renderers.
     ///
     /// # Errors
     /// Those of `make`.
-    pub fn vmf_filtered(&self, make: impl FnOnce(&Pyramid) -> Result<VmfPyramid>) -> Result<&VmfPyramid> {
+    pub fn vmf_filtered(
+        &self,
+        folder: Option<&Path>,
+        make: impl FnOnce(&Pyramid) -> Result<VmfPyramid>,
+    ) -> Result<&VmfPyramid> {
         if let Some(pyramid) = self.vmf_filtered.get() {
             return Ok(pyramid);
         }
-        let pyramid = make(self.box_filtered())?;
+        let pyramid = cache::load_or_make(self, folder, || make(self.box_filtered()))?;
         Ok(self.vmf_filtered.get_or_init(|| pyramid))
     }
 

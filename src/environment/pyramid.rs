@@ -10,13 +10,13 @@ use super::cube::{self, direction_of, exact_texel_solid_angle, face_of, point_of
 use super::{Environment, to_dvec3};
 
 /// Level 0 is no finer than this: 6 x 1024^2 texels of 16 bytes are 96 MiB.
-const MAX_FACE_SIZE: usize = 1024;
+pub(super) const MAX_FACE_SIZE: usize = 1024;
 
 /// Largest finite half float.
 const F16_MAX: f64 = 65504.0;
 
 /// A cube map with all its levels, each half the size of the one before, down to one texel a face.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Pyramid {
     /// Texels along the edge of a face at level 0; a power of two.
     pub face_size: usize,

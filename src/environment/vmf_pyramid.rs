@@ -20,7 +20,7 @@ const WIDEST_FACE_SIZE: usize = (2.0 * TEXELS_A_WIDTH) as usize;
 const KERNEL_EXTENT: f64 = 8.0;
 
 /// The environment blurred by kernels.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct VmfPyramid {
     /// Level l holds the convolution with the kernel of width [`Self::finest_width_rad`] 2^l, as a bilinear lookup returns it.
     pub levels: Pyramid,

@@ -32,7 +32,7 @@ pub struct Cases {
     pub scenes: Vec<(String, Scene)>,
     /// Seed of whatever is random.
     pub seed: u64,
-    /// Where threads and pipelines are cached.
+    /// Where threads, blurred environments and pipelines are cached.
     pub cache: Option<PathBuf>,
 }
 

@@ -12,6 +12,7 @@ use crate::vulkan::{
 use crate::{Error, Result};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
+use std::path::Path;
 use std::sync::Arc;
 
 /// `Material` in glsl/material.glsl.
@@ -207,13 +208,14 @@ pub(super) struct DevicePyramid {
 }
 
 impl DeviceLight {
-    /// Makes and uploads what `method` looks up of `environment`.
+    /// Makes and uploads what `method` looks up of `environment`; what takes long is kept in `cache_folder`.
     ///
     /// # Errors
     /// No device memory left, or a map wider or higher than the device's images can be.
     pub fn new(
         device: &Arc<Device>,
         cache: &PipelineCache,
+        cache_folder: Option<&Path>,
         method: Method,
         environment: &Environment,
         intensity: f64,
@@ -228,7 +230,8 @@ impl DeviceLight {
             intensity: intensity as f32,
         };
         if shader.declares("irradiance_map")? {
-            let VmfPyramid { levels } = environment.vmf_filtered(|source| vmf_pyramid(device, cache, source))?;
+            let VmfPyramid { levels } =
+                environment.vmf_filtered(cache_folder, |source| vmf_pyramid(device, cache, source))?;
             let scale = levels.radiance_scale();
             light.pyramid = Some(DevicePyramid::new(device, "environment pyramid", levels, scale)?);
             light.irradiance = Some(DevicePyramid::new(device, "irradiance map", environment.irradiance(), scale)?);

@@ -45,7 +45,7 @@ pub struct CasesArguments {
     /// Vulkan device: its index or part of its name, as `threadlight devices` lists them.
     #[arg(long, value_name = "NAME|INDEX")]
     device: Option<String>,
-    /// Neither read nor write cached threads and pipelines.
+    /// Neither read nor write cached threads, blurred environments and pipelines.
     #[arg(long)]
     no_cache: bool,
 }
