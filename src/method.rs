@@ -101,6 +101,11 @@ impl Method {
         }
     }
 
+    /// How many threads or samples it has where none are asked for.
+    pub fn default_count(self) -> u32 {
+        self.threads().map_or(100, |kind| kind.default_count() as u32)
+    }
+
     /// Whether a pixel within one smooth surface is one sum at its mean normal, not a partition among its sub-pixels:
     /// SHARES_SURFACE in the shader.
     pub fn shares_surface(self) -> bool {

@@ -88,7 +88,8 @@ pub fn load_threads(
 /// The first file or setting that cannot be used, or a cancelled generation.
 pub fn prepare(scene: &Scene, cache: Option<&Path>, observer: &dyn Observer) -> Result<Prepared> {
     let method = Method::from_name(&scene.shading.method)?;
-    check_count(method, scene.shading.threads, scene.image.subpixels)?;
+    let count = scene.shading.threads.unwrap_or(method.default_count());
+    check_count(method, count, scene.image.subpixels)?;
     let mut meshes: Vec<(String, Mesh)> = Vec::new();
     let mut objects = Vec::new();
     let mut used_materials: Vec<&str> = Vec::new();
@@ -152,7 +153,7 @@ pub fn prepare(scene: &Scene, cache: Option<&Path>, observer: &dyn Observer) -> 
             _ => error,
         })?;
         let mut material = PreparedMaterial { name: name.to_owned(), brdf, threads: None };
-        let of = [scene.shading.threads.into(), scene.shading.seed];
+        let of = [count.into(), scene.shading.seed];
         if let Some((threads, state, time)) = load_threads(method, &material.brdf, of, cache, observer)? {
             thread_time += time;
             if state == CacheState::Miss {
@@ -164,7 +165,7 @@ pub fn prepare(scene: &Scene, cache: Option<&Path>, observer: &dyn Observer) -> 
     }
     Ok(Prepared {
         method,
-        sampling: Sampling { count: scene.shading.threads, seed: scene.shading.seed },
+        sampling: Sampling { count, seed: scene.shading.seed },
         view,
         show_environment: image.background == crate::scene::Background::Environment,
         intensity: scene.environment.intensity,

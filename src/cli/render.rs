@@ -47,7 +47,8 @@ pub struct Render {
     /// Shading method.
     #[arg(long, value_name = "NAME", value_parser = methods())]
     method: Option<String>,
-    /// Sample threads per pixel, 1 to 1024; or samples per pixel of methods that have none, 1 to 10000.
+    /// Sample threads per pixel: fitted 1 to 128 (default 16), paper 1 to 1024 (default 100); or samples per pixel of methods that
+    /// have none, 1 to 10000 (default 100).
     #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=i64::from(MAX_SAMPLES)))]
     threads: Option<u32>,
     /// Method `reference` goes on until its estimated error of display values is below this: each pixel's on the
@@ -211,7 +212,7 @@ impl Render {
             let transparent = scene.image.background == Background::None;
             match format {
                 Some(Format::Exr) => {
-                    let mut header = self.exr_header(&scene, &prepared, &rendering, &device_name);
+                    let mut header = self.exr_header(&prepared, &rendering, &device_name);
                     if let Some(reference) = &reference {
                         let number = |name: &str, value: f64| (name.to_owned(), value.to_string());
                         header.more.push(number("tolerance", reference.tolerance));
@@ -224,7 +225,7 @@ impl Render {
         }
         let messages = messages.all();
         if let Some(path) = &self.stats {
-            let stats = Stats { reference, ..stats(&scene, &prepared, &rendering, &device_name, messages.len()) };
+            let stats = Stats { reference, ..stats(&prepared, &rendering, &device_name, messages.len()) };
             let text = serde_json::to_string_pretty(&stats).context("--stats")? + "\n";
             output::write_whole(path, text.as_bytes())?;
         }
@@ -261,7 +262,7 @@ impl Render {
             }
         }
         lay(&self.method, &mut scene.shading.method);
-        lay(&self.threads, &mut scene.shading.threads);
+        scene.shading.threads = self.threads.or(scene.shading.threads);
         lay(&self.seed, &mut scene.shading.seed);
         lay(&self.subpixels, &mut scene.image.subpixels);
         lay(&self.exposure, &mut scene.image.exposure);
@@ -271,11 +272,11 @@ impl Render {
         Ok(scene)
     }
 
-    fn exr_header(&self, scene: &Scene, prepared: &Prepared, rendering: &Rendering, device: &str) -> ExrHeader {
+    fn exr_header(&self, prepared: &Prepared, rendering: &Rendering, device: &str) -> ExrHeader {
         let materials: Vec<_> = prepared.materials.iter().map(|material| material.name.as_str()).collect();
         ExrHeader {
             method: prepared.method.name().to_owned(),
-            threads: scene.shading.threads,
+            threads: prepared.sampling.count,
             material: materials.join(", "),
             environment: prepared.environment.name.clone(),
             device: device.to_owned(),
@@ -286,7 +287,6 @@ impl Render {
 }
 
 fn stats<'a>(
-    scene: &'a Scene,
     prepared: &'a Prepared,
     rendering: &'a Rendering,
     device: &'a str,
@@ -297,7 +297,7 @@ fn stats<'a>(
         version: env!("CARGO_PKG_VERSION"),
         device,
         method: prepared.method.name(),
-        threads: scene.shading.threads,
+        threads: prepared.sampling.count,
         subpixels: prepared.view.subpixels,
         width: prepared.view.width,
         height: prepared.view.height,

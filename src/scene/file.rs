@@ -240,8 +240,8 @@ pub(super) fn subpixels<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u3
 }
 
 /// Number of threads or samples.
-pub(super) fn threads<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u32, D::Error> {
-    integer(deserializer, 1..=MAX_SAMPLES)
+pub(super) fn threads<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<u32>, D::Error> {
+    integer(deserializer, 1..=MAX_SAMPLES).map(Some)
 }
 
 /// Factor of radiance before display.
@@ -425,7 +425,7 @@ mod tests {
             intensity: 2.0,
         };
         assert_eq!(scene.environment, expected);
-        assert_eq!(scene.shading, ShadingSettings { method: "paper".into(), threads: 64, seed: 7 });
+        assert_eq!(scene.shading, ShadingSettings { method: "paper".into(), threads: Some(64), seed: 7 });
         assert_eq!(scene.materials[0].source, MaterialSource::File("/base/x.binary".into()));
         let MaterialSource::Model { model, parameters } = &scene.materials[1].source else { panic!("not a model") };
         assert_eq!((model.as_str(), parameters["alpha"].as_float(), parameters.len()), ("conductor", Some(0.1), 4));
@@ -441,7 +441,7 @@ mod tests {
         assert_eq!(scene, Scene::default());
         assert_eq!(
             (scene.image.width, scene.image.height, scene.shading.threads, scene.image.subpixels),
-            (640, 480, 100, 2)
+            (640, 480, None, 2)
         );
     }
 

@@ -20,7 +20,7 @@ pub const DEFAULT_MATERIAL: &str = "gold";
 /// The built-in environment of a scene that names none.
 pub const DEFAULT_ENVIRONMENT: &str = "studio";
 /// The shading method of a scene that names none.
-pub const DEFAULT_METHOD: &str = "paper";
+pub const DEFAULT_METHOD: &str = "fitted";
 
 /// Most columns and most rows of an image.
 pub const MAX_SIZE_PX: u32 = 16384;
@@ -126,9 +126,9 @@ pub struct EnvironmentSettings {
 pub struct ShadingSettings {
     /// Name of the estimator.
     pub method: String,
-    /// Threads, 1 to 1024, or samples of methods that have none, 1 to [`MAX_SAMPLES`].
-    #[serde(deserialize_with = "file::threads")]
-    pub threads: u32,
+    /// Threads, or samples of methods that have none, 1 to [`MAX_SAMPLES`]; without it, as many as suit the method.
+    #[serde(deserialize_with = "file::threads", skip_serializing_if = "Option::is_none")]
+    pub threads: Option<u32>,
     /// Seed of whatever is random.
     pub seed: u64,
 }
@@ -227,7 +227,7 @@ impl EnvironmentSettings {
 
 impl Default for ShadingSettings {
     fn default() -> Self {
-        Self { method: DEFAULT_METHOD.into(), threads: 100, seed: 0 }
+        Self { method: DEFAULT_METHOD.into(), threads: None, seed: 0 }
     }
 }
 

@@ -59,7 +59,7 @@ pub fn sphere(material: MaterialSource, environment: &str, threads: u32, (width,
         Scene { materials: vec![MaterialSettings { name: "m".to_owned(), source: material }], ..Scene::default() };
     scene.objects[0].material = "m".to_owned();
     scene.environment.source = Source::Builtin(environment.to_owned());
-    scene.shading.threads = threads;
+    scene.shading.threads = Some(threads);
     (scene.image.width, scene.image.height) = (width, height);
     scene
 }
