@@ -27,6 +27,7 @@
 //! | 3.2.2, 3.2.3: smoothing and peaks | [`threads::smoothing`], [`threads::peaks`] |
 //! | 4.1: geometry cache at sub-pixel resolution | [`passes::geometry_cache`] |
 //! | 4.2: each sub-pixel evaluates its partition of the threads | [`passes::shade`], `glsl/shade.comp` |
+//! | beyond it: fitted threads | [`threads::fitted`], `glsl/methods/fitted.glsl` |
 //! | tables 1 to 4, figures 10 to 13: how fast, how wrong | [`evaluate`] |
 //!
 //! Dependencies run downwards: `pipeline` and [`prepare`], then [`passes`], then [`graph`] (which passes run, in which order,
