@@ -15,7 +15,7 @@ use crate::error::{Error, Result};
 use crate::output::write_whole;
 
 /// Version of the file format and of the maps in it: to be raised when the same environment gets others.
-const FORMAT_VERSION: u32 = 1;
+const FORMAT_VERSION: u32 = 2;
 
 const MAGIC: &[u8; 8] = b"VMFMAPS\0";
 
@@ -96,7 +96,7 @@ fn decode(bytes: &[u8]) -> Option<VmfPyramid> {
         maps.push(values.collect::<Vec<_>>().as_chunks().0.to_vec());
         rest = after;
     }
-    rest.is_empty().then(|| VmfPyramid { levels: Pyramid { face_size, levels: maps } })
+    rest.is_empty().then_some(VmfPyramid { levels: Pyramid { face_size, levels: maps } })
 }
 
 #[cfg(test)]
