@@ -67,7 +67,6 @@ impl TestLights {
             let turn = scale + SCALES * seed;
             for uv in fibonacci_lattice(per_scale) {
                 let near = slice.direction(glam::dvec2(shift(uv.x, 3 * turn + 1), shift(uv.y, turn)));
-                // Blurred by the light's own width, so that lights stand in front of edges too.
                 lights.push(Light { direction: near, scale });
             }
             for uv in fibonacci_lattice(per_scale) {

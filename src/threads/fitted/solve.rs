@@ -60,24 +60,28 @@ pub struct Fit<'a> {
     prior: Option<(&'a [Kernel], f64)>,
 }
 
-/// The weighted design: columns of B (answers less the cosine's) and D (their derivatives), lights down the columns.
-struct Design {
-    columns: DMatrix<f64>,
-}
-
 impl<'a> Fit<'a> {
     /// Of the slice with this albedo, which answers `lights` as they say.
-    pub fn new(lights: &'a TestLights, albedo: DVec3, prior: Option<(&'a [Kernel], f64)>) -> Self {
-        Self { lights, albedo, prior }
+    pub fn new(lights: &'a TestLights, albedo: DVec3) -> Self {
+        Self { lights, albedo, prior: None }
+    }
+
+    /// The same, tied to kernels `before`: each that moves by its width, or whose level changes by 1, counts as much as this part of the
+    /// squared responses.
+    pub fn tied(self, before: &'a [Kernel], strength: f64) -> Self {
+        Self { prior: Some((before, strength * self.squared_responses())), ..self }
+    }
+
+    fn squared_responses(&self) -> f64 {
+        let TestLights { weight, response, .. } = self.lights;
+        weight.iter().zip(response).map(|(weight, response)| (*weight * *response).length_squared()).sum()
     }
 
     /// Sum over lights and channels of the squared weighted residuals, over the sum of the squared weighted responses: the square
     /// of the relative error.
     pub fn relative_error(&self, kernels: &[Kernel]) -> f64 {
         let residuals = self.residuals(kernels);
-        let total: f64 = (0..self.lights.lights.len())
-            .map(|j| (self.lights.weight[j] * self.lights.response[j]).length_squared())
-            .sum();
+        let total = self.squared_responses();
         (residuals.iter().map(|r| r.length_squared()).sum::<f64>() / total.max(f64::MIN_POSITIVE)).sqrt()
     }
 
@@ -104,7 +108,8 @@ impl<'a> Fit<'a> {
         strength * cost.sum::<f64>()
     }
 
-    fn design(&self, kernels: &[Kernel]) -> Design {
+    /// The weighted design, a row a light: answers of each kernel less the cosine's, then their derivatives by two tangents and the level.
+    fn design(&self, kernels: &[Kernel]) -> DMatrix<f64> {
         let m = kernels.len();
         let TestLights { lights, weight, cosine, .. } = self.lights;
         let mut columns = DMatrix::zeros(lights.len(), 4 * m);
@@ -118,19 +123,18 @@ impl<'a> Fit<'a> {
                 columns[(j, m + 3 * k + 2)] = weight[j] * by_level;
             }
         }
-        Design { columns }
+        columns
     }
 
     /// Improves `kernels`; returns the number of steps tried.
     pub fn solve(&self, kernels: &mut Vec<Kernel>, effort: Effort) -> usize {
-        let m = kernels.len();
         let mut damping = 1e-3;
         let mut tried = 0;
         let squares = |r: &[DVec3]| r.iter().map(|r| r.length_squared()).sum::<f64>();
         let mut residuals = self.residuals(kernels);
         let mut cost = squares(&residuals) + self.prior_cost(kernels);
         while tried < effort.steps {
-            let design = self.design(kernels).columns;
+            let design = self.design(kernels);
             let gram = design.transpose() * &design;
             let right: [DVector<f64>; 3] = std::array::from_fn(|c| {
                 let r = DVector::from_iterator(residuals.len(), residuals.iter().map(|r| r[c]));
@@ -156,7 +160,6 @@ impl<'a> Fit<'a> {
             if cost > before * (1.0 - effort.least_gain) || cost == 0.0 {
                 break;
             }
-            debug_assert!(kernels.len() == m);
         }
         tried
     }
