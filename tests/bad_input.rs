@@ -95,7 +95,8 @@ fn numbers_out_of_range_name_the_flag_and_the_range() {
     refuses(&folder, "threads gold --count many -o out/gold.threads", &["--count", "many"]);
     refuses(&folder, "threads gold --method uniform -o out/gold.threads", &["uniform", "fitted", "paper"]);
     // More than a method can have.
-    refuses(&folder, "render --threads 1025 -o out/image.png", &["threads", "1025", "1024", "paper"]);
+    refuses(&folder, "render --method paper --threads 1025 -o out/image.png", &["threads", "1025", "1024", "paper"]);
+    refuses(&folder, "render --threads 129 -o out/image.png", &["threads", "129", "128", "fitted"]);
     let many = "render --method uniform --threads 9000 --subpixels 4 -o out/image.png";
     refuses(&folder, many, &["threads", "9000", "4062", "sub-pixels"]);
     // More sub-pixels than an image of the device holds, though each flag is within its range.
@@ -109,8 +110,8 @@ fn unknown_names_are_told_with_the_known_ones() {
     refuses(&folder, &render("--environment mars"), &["mars", "studio", ".hdr"]);
     refuses(&folder, &render("--mesh cube"), &["cube", "sphere", ".obj"]);
     refuses(&folder, &render("--method magic"), &["magic", "paper"]);
-    refuses(&folder, &render("--tolerance 1e-3"), &["--tolerance", "paper"]);
-    refuses(&folder, &render("--reference-on gpu"), &["--reference-on", "paper"]);
+    refuses(&folder, &render("--tolerance 1e-3"), &["--tolerance", "fitted"]);
+    refuses(&folder, &render("--reference-on gpu"), &["--reference-on", "fitted"]);
     refuses(&folder, &render("--method reference --reference-on tpu"), &["--reference-on", "tpu", "cpu, gpu"]);
     refuses(&folder, &render("--method reference --print-plan"), &["--print-plan", "reference"]);
     refuses(&folder, &render("--device abacus"), &["--device abacus", "name one of"]);

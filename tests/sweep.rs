@@ -51,6 +51,7 @@ fn sixteen_threads(gpu: &Validated, prepared: &Prepared) -> Result<ReferencePict
     own.materials[0].brdf = material.brdf.clone();
     own.materials[0].threads = Some(threads);
     own.sampling.count = 16;
+    own.method = Method::Paper;
     let rendering = gpu.render(&own, Wanted { radiance: true, ..Wanted::default() });
     Ok(ReferencePicture { radiance: rendering.radiance, error_estimate: 1e-4 })
 }

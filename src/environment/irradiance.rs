@@ -6,7 +6,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::cube::{direction_of, face_of};
-use super::{Environment, Pyramid, SmallSources, to_dvec3};
+use super::{Environment, Pyramid, SmallSources};
 
 /// Texels along the edge of a face: bilinear between them is good to 1e-4 of the largest value, without small sources.
 const FACE_SIZE: usize = 64;
@@ -14,45 +14,91 @@ const FACE_SIZE: usize = 64;
 /// The light is gathered in cells of a cube map with faces of this size: 2 degrees, each with the centroid of its light.
 const CELLS_SIZE: usize = 48;
 
+/// Pixels are divided until there are so many columns: cells then have ten samples and more.
+const FEWEST_COLUMNS: usize = 1024;
+
+/// The light of a cell.
+#[derive(Clone, Copy, Default)]
+struct Cell {
+    solid_angle: f32,
+    power: Vec3,
+    /// Sum of directions, weighted by solid angle, then by power.
+    middle: Vec3,
+    centroid: Vec3,
+}
+
 /// Irradiance over pi without `sources`, for every normal: a cube map of one level.
 pub fn irradiance_map(environment: &Environment, sources: &SmallSources) -> Pyramid {
-    let mut cells = vec![(Vec3::ZERO, Vec3::ZERO); 6 * CELLS_SIZE * CELLS_SIZE];
-    for (row, texels) in environment.texels.chunks_exact(environment.width).enumerate() {
-        let solid_angle = environment.weight_solid_angle(row);
-        for (column, texel) in texels.iter().enumerate() {
-            if sources.pixels[row * environment.width + column] {
-                continue;
-            }
-            let direction = environment.direction(column as f64, row as f64);
-            let (face, s, t) = face_of(direction);
-            let cell = |x: f64| ((x * CELLS_SIZE as f64) as usize).min(CELLS_SIZE - 1);
-            let (power, centroid) = &mut cells[(face * CELLS_SIZE + cell(t)) * CELLS_SIZE + cell(s)];
-            let light = (solid_angle * to_dvec3(texel)).as_vec3();
-            *power += light;
-            *centroid += light.element_sum() * direction.as_vec3();
-        }
-    }
-    cells.retain(|(power, _)| *power != Vec3::ZERO);
-    cells.iter_mut().for_each(|(power, centroid)| {
-        *power *= std::f32::consts::FRAC_1_PI;
-        *centroid = centroid.normalize_or_zero();
-    });
+    let mut rest = environment.clone();
+    rest.texels
+        .iter_mut()
+        .zip(&sources.pixels)
+        .filter(|(_, is_source)| **is_source)
+        .for_each(|(texel, _)| *texel = [0.0; 3]);
+    let cells = gather(&rest);
     let irradiance = |texel: usize| {
         let middle = |index: usize| (index as f64 + 0.5) / FACE_SIZE as f64;
         let (face, row, column) = (texel / FACE_SIZE / FACE_SIZE, texel / FACE_SIZE % FACE_SIZE, texel % FACE_SIZE);
         let n = direction_of(face, middle(column), middle(row)).as_vec3();
-        let sum: Vec3 = cells.iter().map(|(power, centroid)| n.dot(*centroid).max(0.0) * *power).sum();
-        sum.to_array()
+        let (mut sum, mut cosines) = (Vec3::ZERO, 0.0);
+        for cell in &cells {
+            sum += n.dot(cell.centroid).max(0.0) * cell.power;
+            cosines += n.dot(cell.middle).max(0.0) * cell.solid_angle;
+        }
+        // Over what a constant gives, which is pi but for the size of the cells: constants stay as they are.
+        (sum / cosines).to_array()
     };
     let texels = (0..6 * FACE_SIZE * FACE_SIZE).into_par_iter().map(irradiance).collect();
     Pyramid { face_size: FACE_SIZE, levels: vec![texels] }
 }
 
+/// The light of `environment` in cells.
+fn gather(environment: &Environment) -> Vec<Cell> {
+    let mut cells = vec![Cell::default(); 6 * CELLS_SIZE * CELLS_SIZE];
+    // At least 2: radiance is bilinear between the centres of pixels, so these alone would not tell how wide it is.
+    let times = FEWEST_COLUMNS.div_ceil(environment.width.min(2 * environment.height)).max(2);
+    let edge = |row: usize| (std::f64::consts::PI * row as f64 / (times * environment.height) as f64).cos();
+    for row in 0..times * environment.height {
+        let solid_angle = std::f64::consts::TAU / (times * environment.width) as f64 * (edge(row) - edge(row + 1));
+        for column in 0..times * environment.width {
+            let place = |index: usize| (index as f64 + 0.5) / times as f64 - 0.5;
+            let direction = environment.direction(place(column), place(row));
+            let light = (solid_angle * environment.radiance(direction)).as_vec3();
+            let (face, s, t) = face_of(direction);
+            let index = |x: f64| ((x * CELLS_SIZE as f64) as usize).min(CELLS_SIZE - 1);
+            let cell = &mut cells[(face * CELLS_SIZE + index(t)) * CELLS_SIZE + index(s)];
+            let direction = direction.as_vec3();
+            cell.solid_angle += solid_angle as f32;
+            cell.middle += solid_angle as f32 * direction;
+            cell.power += light;
+            cell.centroid += light.element_sum() * direction;
+        }
+    }
+    cells.iter_mut().for_each(|cell| {
+        cell.middle = cell.middle.normalize_or_zero();
+        // Where there is no light, any place will do.
+        cell.centroid = cell.centroid.try_normalize().unwrap_or(cell.middle);
+    });
+    cells
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::tests::environment;
+    use super::super::to_dvec3;
     use super::*;
     use glam::DVec3;
+
+    #[test]
+    fn a_constant_stays_as_it_is_however_few_pixels_it_has() {
+        for (width, height) in [(1, 1), (3, 2), (64, 32)] {
+            let map = environment(width, height, |_, _| [1.0, 0.1, 7.0]);
+            let irradiance = irradiance_map(&map, &SmallSources::of(&map));
+            for texel in &irradiance.levels[0] {
+                assert!((Vec3::from(*texel) / Vec3::new(1.0, 0.1, 7.0) - 1.0).abs().max_element() < 1e-5, "{texel:?}");
+            }
+        }
+    }
 
     #[test]
     fn lookups_and_sources_together_are_the_integral_of_the_cosine() {

@@ -102,7 +102,14 @@ impl Environment {
         if let Some(pyramid) = self.vmf_filtered.get() {
             return Ok(pyramid);
         }
-        let pyramid = cache::load_or_make(self, folder, || make(self.box_filtered()))?;
+        // Blur of the finest kernel would show on maps of few pixels: their texels are a quarter as large.
+        const FEWEST: usize = 512;
+        let face_size = Pyramid::face_size_for(self);
+        let finer = (4 * face_size).min(FEWEST);
+        let pyramid = cache::load_or_make(self, folder, || match finer > face_size {
+            true => make(&Pyramid::box_filtered_to(self, finer)),
+            false => make(self.box_filtered()),
+        })?;
         Ok(self.vmf_filtered.get_or_init(|| pyramid))
     }
 

@@ -28,9 +28,18 @@ impl Pyramid {
     /// The means of [`Environment::radiance`] over the solid angles of the texels. Constants stay constant to the bit,
     /// and the energy of a single bright pixel arrives to 3e-3 wherever it is (5e-4 RMS).
     pub fn box_filtered(environment: &Environment) -> Self {
-        // A texel at the middle of a face, 2 / face_size rad, is then no larger than a pixel at the equator, 2 pi / width.
+        Self::box_filtered_to(environment, Self::face_size_for(environment))
+    }
+
+    /// Texels along the edge of a face, such that one at its middle, 2 / face_size rad, is no larger than a pixel at the equator,
+    /// 2 pi / width.
+    pub(super) fn face_size_for(environment: &Environment) -> usize {
         let pixels = (environment.width as f64 / PI).ceil() as usize;
-        let face_size = pixels.next_power_of_two().clamp(1, MAX_FACE_SIZE);
+        pixels.next_power_of_two().clamp(1, MAX_FACE_SIZE)
+    }
+
+    /// The same with faces of this size, a power of two.
+    pub(super) fn box_filtered_to(environment: &Environment, face_size: usize) -> Self {
         let mut levels = vec![finest_level(environment, face_size)];
         for size in (0..face_size.ilog2()).rev().map(|log2| 1 << log2) {
             levels.push(coarser_level(levels.last().expect("there is level 0"), size));

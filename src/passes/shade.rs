@@ -45,6 +45,9 @@ impl DeviceMaterials {
     ///
     /// # Errors
     /// No device memory left, or more measured tables than a 3D image of the device holds.
+    ///
+    /// # Panics
+    /// Threads of another kind than the method's: its shader would take one for the other.
     pub fn new<'m>(
         device: &Arc<Device>,
         method: Method,
@@ -63,6 +66,9 @@ impl DeviceMaterials {
                 parameters[..2].copy_from_slice(&tables.add(device, table.texels())?.map(|texels| texels as f32));
             }
             models_used |= 1 << brdf.model_index();
+            if let Some(kind) = method.threads() {
+                assert_eq!(thread_table.map(Threads::kind), Some(kind), "threads of method {}", method.name());
+            }
             let [row_count, thread_count] = thread_table.map_or([0, 0], Threads::size);
             records.push(MaterialRecord {
                 parameters,
