@@ -27,7 +27,7 @@ const DIM_RESPONSE: f64 = 0.1;
 pub struct Light {
     /// Where it is, unit, in the shading frame.
     pub direction: DVec3,
-    /// Its width: one of [`light_kappa`].
+    /// Which of the widths it has, 0 to [`SCALES`] - 1: see [`light_kappa`].
     pub scale: usize,
 }
 

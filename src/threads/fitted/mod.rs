@@ -1,6 +1,15 @@
-//! Fitted threads.
+//! Fitted threads: kernels of the environment's pyramid that answer any light as the BRDF does.
+//!
+//! | | module |
+//! |---|---|
+//! | kernels, and how they overlap lights | [`kernel`] |
+//! | the lights that they are fitted to | [`lights`] |
+//! | where the fit of the first row starts | [`cells`] |
+//! | the fit of one row | [`solve`] |
+//! | of all rows | [`generate()`] |
+//! | as stored and looked up, 12 bytes a thread and row | [`FittedTable`] |
 pub mod cells;
-pub mod generate;
+mod generate;
 pub mod kernel;
 pub mod lights;
 pub mod solve;

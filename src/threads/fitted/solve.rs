@@ -77,8 +77,7 @@ impl<'a> Fit<'a> {
         weight.iter().zip(response).map(|(weight, response)| (*weight * *response).length_squared()).sum()
     }
 
-    /// Sum over lights and channels of the squared weighted residuals, over the sum of the squared weighted responses: the square
-    /// of the relative error.
+    /// The square root of the sum over lights and channels of squared weighted residuals, over that of squared weighted responses.
     pub fn relative_error(&self, kernels: &[Kernel]) -> f64 {
         let residuals = self.residuals(kernels);
         let total = self.squared_responses();
