@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::cube::{direction_of, face_of};
 use super::{Environment, Pyramid, SmallSources};
 
-/// Texels along the edge of a face: bilinear between them is good to 1e-4 of the largest value, without small sources.
+/// Texels along the edge of a face: bilinear between them is good to h^2 / 4, 2.4e-4 of the largest value, without small sources.
 const FACE_SIZE: usize = 64;
 
 /// The light is gathered in cells of a cube map with faces of this size: 2 degrees, each with the centroid of its light.
@@ -29,13 +29,10 @@ struct Cell {
 
 /// Irradiance over pi without `sources`, for every normal: a cube map of one level.
 pub fn irradiance_map(environment: &Environment, sources: &SmallSources) -> Pyramid {
-    let mut rest = environment.clone();
-    rest.texels
-        .iter_mut()
-        .zip(&sources.pixels)
-        .filter(|(_, is_source)| **is_source)
-        .for_each(|(texel, _)| *texel = [0.0; 3]);
-    let cells = gather(&rest);
+    let rest = environment.texels.iter().zip(&sources.pixels);
+    let rest = rest.map(|(texel, is_source)| if *is_source { [0.0; 3] } else { *texel }).collect();
+    let Environment { name, width, height, repaired, .. } = environment;
+    let cells = gather(&Environment::new(name.clone(), *width, *height, rest, *repaired));
     let irradiance = |texel: usize| {
         let middle = |index: usize| (index as f64 + 0.5) / FACE_SIZE as f64;
         let (face, row, column) = (texel / FACE_SIZE / FACE_SIZE, texel / FACE_SIZE % FACE_SIZE, texel % FACE_SIZE);
