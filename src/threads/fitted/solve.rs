@@ -125,8 +125,8 @@ impl<'a> Fit<'a> {
         columns
     }
 
-    /// Improves `kernels`; returns the number of steps tried.
-    pub fn solve(&self, kernels: &mut Vec<Kernel>, effort: Effort) -> usize {
+    /// Improves `kernels`.
+    pub fn solve(&self, kernels: &mut Vec<Kernel>, effort: Effort) {
         let mut damping = 1e-3;
         let mut tried = 0;
         let squares = |r: &[DVec3]| r.iter().map(|r| r.length_squared()).sum::<f64>();
@@ -153,14 +153,13 @@ impl<'a> Fit<'a> {
                 }
                 damping *= 5.0;
                 if tried >= effort.steps || damping > 1e6 {
-                    return tried;
+                    return;
                 }
             }
             if cost > before * (1.0 - effort.least_gain) || cost == 0.0 {
                 break;
             }
         }
-        tried
     }
 
     /// Gauss and Newton's matrix and the gradient. Unknowns: red, green and blue weights of all kernels, then two tangents and the
