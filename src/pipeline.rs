@@ -1,11 +1,10 @@
 //! The method on one screen: the frame as a graph of passes, and the renderer that runs it.
-use crate::graph::{Access, Buffer, BufferDesc, Executable, Image};
+use crate::graph::{Buffer, Executable, Image};
 use crate::method::Method;
 use crate::passes::*;
 use crate::prepare::Prepared;
-use crate::vulkan::{self, BufferUse, Device, Frames, PassTime, PipelineCache};
+use crate::vulkan::{Device, Frames, PassTime, PipelineCache};
 use crate::{Error, Result};
-use ash::vk;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -131,7 +130,7 @@ impl Renderer {
     pub fn render(&self, wanted: Wanted, repeat: u32) -> Result<Rendering> {
         let mut graph = FrameGraph::new();
         let frame = declare(&mut graph, self);
-        let mut readbacks = Readbacks { graph, device: &self.device, imports: Vec::new() };
+        let mut readbacks = Readbacks::new(&self.device, graph);
         let counters = readbacks.buffer("read_counters", frame.counters, size_of::<Counters>() as u64)?;
         let lookups = readbacks.buffer("read_lookups", frame.lookups, size_of::<u64>() as u64)?;
         let View { width, height, .. } = self.view;
@@ -207,7 +206,7 @@ pub fn render_geometry(
     let pass = upload_geometry(device, &cache, prepared)?;
     let mut graph = FrameGraph::new();
     let geometry = geometry_cache(&mut graph, &pass, &prepared.view);
-    let mut readbacks = Readbacks { graph, device, imports: Vec::new() };
+    let mut readbacks = Readbacks::new(device, graph);
     let target = readbacks.image("read_geometry", geometry, prepared.view.cache_size(), 8, true)?;
     let Readbacks { graph, imports, .. } = readbacks;
     let executable = Executable::new(device, graph, &imports)?;
@@ -224,7 +223,7 @@ pub fn render_geometry(
 pub fn time_bare_lookups(device: &Arc<Device>, bare: &BareLookups) -> Result<(f64, Vec<[f32; 4]>)> {
     let mut graph = FrameGraph::new();
     let sums = bare_lookups(&mut graph, bare);
-    let mut readbacks = Readbacks { graph, device, imports: Vec::new() };
+    let mut readbacks = Readbacks::new(device, graph);
     let target = readbacks.buffer("read_sums", sums, bare.sums_bytes())?;
     let Readbacks { graph, imports, .. } = readbacks;
     let executable = Executable::new(device, graph, &imports)?;
@@ -232,55 +231,6 @@ pub fn time_bare_lookups(device: &Arc<Device>, bare: &BareLookups) -> Result<(f6
     let passes = executable.execute_timed(device, &mut frames)?;
     let gpu_ms = passes.iter().filter(|pass| !pass.is_readback()).map(|pass| pass.gpu_ms).sum();
     Ok((gpu_ms, texels(Some(&target))))
-}
-
-/// Adds copies into host memory to a graph.
-struct Readbacks<'a, 'd> {
-    graph: FrameGraph<'a>,
-    device: &'d Arc<Device>,
-    imports: Vec<(Buffer, Arc<vulkan::Buffer>)>,
-}
-
-impl Readbacks<'_, '_> {
-    /// Imports a buffer that the CPU will read after the frame.
-    fn target(&mut self, name: &str, size_bytes: u64) -> Result<(Buffer, Arc<vulkan::Buffer>)> {
-        let usage = vk::BufferUsageFlags::TRANSFER_DST;
-        let target = Arc::new(vulkan::Buffer::new(self.device, name, size_bytes, usage, BufferUse::Readback)?);
-        let handle = self.graph.import_buffer(name, BufferDesc { size_bytes }, None, Some(Access::HostRead));
-        self.imports.push((handle, target.clone()));
-        Ok((handle, target))
-    }
-
-    fn buffer(&mut self, name: &str, source: Buffer, size_bytes: u64) -> Result<Arc<vulkan::Buffer>> {
-        let (handle, target) = self.target(&format!("{name}_target"), size_bytes)?;
-        let copied = read_buffer(&mut self.graph, name, source, handle);
-        self.graph.output(copied);
-        Ok(target)
-    }
-
-    fn image(
-        &mut self,
-        name: &str,
-        source: Image,
-        [width, height]: [u32; 2],
-        texel_bytes: u64,
-        wanted: bool,
-    ) -> Result<Option<Arc<vulkan::Buffer>>> {
-        if !wanted {
-            return Ok(None);
-        }
-        let (handle, target) =
-            self.target(&format!("{name}_target"), texel_bytes * u64::from(width) * u64::from(height))?;
-        let copied = read_image(&mut self.graph, name, source, handle);
-        self.graph.output(copied);
-        Ok(Some(target))
-    }
-}
-
-/// The contents of a buffer that was read back; empty if it was not wanted.
-fn texels<T: bytemuck::Pod>(buffer: Option<&vulkan::Buffer>) -> Vec<T> {
-    let bytes = buffer.and_then(|buffer| buffer.contents()).unwrap_or_default();
-    bytemuck::pod_collect_to_vec(bytes)
 }
 
 /// The middle value; of an even number, the mean of the two in the middle.

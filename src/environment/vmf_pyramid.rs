@@ -85,20 +85,13 @@ impl VmfPyramid {
     /// From the box-filtered pyramid of the same environment, on the CPU: slow.
     pub fn new(source: &Pyramid) -> Self {
         let mut maps: Vec<Vec<[f32; 3]>> = Vec::new();
-        for step in Self::steps(source.face_size) {
+        let steps = Self::steps(source.face_size);
+        for step in &steps {
             let from = step.from.map_or(&source.levels[0], |from| &maps[from]);
-            maps.push(if step.kernel == Kernel::Mean { means_of_four(from, step.size) } else { blurred(from, &step) });
+            maps.push(if step.kernel == Kernel::Mean { means_of_four(from, step.size) } else { blurred(from, step) });
         }
-        Self::from_maps(source.face_size, maps)
-    }
-
-    /// Of maps made as [`Self::steps`] says, for faces of `finest` texels.
-    ///
-    /// # Panics
-    /// If some are not there.
-    pub fn from_maps(finest: usize, maps: Vec<Vec<[f32; 3]>>) -> Self {
-        let levels = Self::steps(finest).into_iter().zip(maps).filter(|(step, _)| step.kernel == Kernel::Vmf);
-        Self { levels: Pyramid { face_size: finest, levels: levels.map(|(_, map)| map).collect() } }
+        let levels = steps.iter().zip(maps).filter(|(step, _)| step.kernel == Kernel::Vmf).map(|(_, map)| map);
+        Self { levels: Pyramid { face_size: source.face_size, levels: levels.collect() } }
     }
 
     /// Width of the kernel of level 0, in radians.

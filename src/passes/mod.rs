@@ -18,7 +18,7 @@ pub use bare_lookups::{BareLookups, bare_lookups};
 pub use classify::{Classify, Counters, SMOOTH_DEG, Tiles, classify};
 pub use clear::clear;
 pub use geometry_cache::{DeviceMesh, GeometryCache, Object, geometry_cache};
-pub use readback::{read_buffer, read_image};
+pub use readback::{Readbacks, texels};
 pub use shade::{DeviceLight, DeviceMaterials, Sampling, Shade, Shaded, shade};
 pub use tone_map::{ToneMap, tone_map};
 pub use view::{CameraRays, View};

@@ -1,9 +1,13 @@
 //! Copies what the CPU wants to see into memory that it can read.
 use super::FrameGraph;
-use crate::graph::{Access, Buffer, Image};
+use crate::Result;
+use crate::graph::{Access, Buffer, BufferDesc, Image};
+use crate::vulkan::{self, BufferUse, Device};
+use ash::vk;
+use std::sync::Arc;
 
 /// Copies all texels of `image`, tightly packed, into the imported buffer `target`.
-pub fn read_image(graph: &mut FrameGraph<'_>, name: &str, image: Image, target: Buffer) -> Buffer {
+fn read_image(graph: &mut FrameGraph<'_>, name: &str, image: Image, target: Buffer) -> Buffer {
     let mut pass = graph.pass(name);
     pass.read(image, Access::TransferRead);
     let target = pass.write(target, Access::TransferWrite);
@@ -15,7 +19,7 @@ pub fn read_image(graph: &mut FrameGraph<'_>, name: &str, image: Image, target: 
 }
 
 /// Copies all of `buffer` into the imported buffer `target`.
-pub fn read_buffer(graph: &mut FrameGraph<'_>, name: &str, buffer: Buffer, target: Buffer) -> Buffer {
+fn read_buffer(graph: &mut FrameGraph<'_>, name: &str, buffer: Buffer, target: Buffer) -> Buffer {
     let mut pass = graph.pass(name);
     pass.read(buffer, Access::TransferRead);
     let target = pass.write(target, Access::TransferWrite);
@@ -24,4 +28,68 @@ pub fn read_buffer(graph: &mut FrameGraph<'_>, name: &str, buffer: Buffer, targe
         Ok(())
     }));
     target
+}
+
+/// Adds copies into host memory to a graph.
+pub struct Readbacks<'a, 'd> {
+    /// With the copies that were asked for so far.
+    pub graph: FrameGraph<'a>,
+    device: &'d Arc<Device>,
+    /// What its execution is given.
+    pub imports: Vec<(Buffer, Arc<vulkan::Buffer>)>,
+}
+
+impl<'a, 'd> Readbacks<'a, 'd> {
+    /// For a graph that is otherwise complete.
+    pub fn new(device: &'d Arc<Device>, graph: FrameGraph<'a>) -> Self {
+        Self { graph, device, imports: Vec::new() }
+    }
+
+    /// Imports a buffer that the CPU will read after the frame.
+    fn target(&mut self, name: &str, size_bytes: u64) -> Result<(Buffer, Arc<vulkan::Buffer>)> {
+        let usage = vk::BufferUsageFlags::TRANSFER_DST;
+        let target = Arc::new(vulkan::Buffer::new(self.device, name, size_bytes, usage, BufferUse::Readback)?);
+        let handle = self.graph.import_buffer(name, BufferDesc { size_bytes }, None, Some(Access::HostRead));
+        self.imports.push((handle, target.clone()));
+        Ok((handle, target))
+    }
+
+    /// The memory that `source` will be copied to.
+    ///
+    /// # Errors
+    /// No memory left.
+    pub fn buffer(&mut self, name: &str, source: Buffer, size_bytes: u64) -> Result<Arc<vulkan::Buffer>> {
+        let (handle, target) = self.target(&format!("{name}_target"), size_bytes)?;
+        let copied = read_buffer(&mut self.graph, name, source, handle);
+        self.graph.output(copied);
+        Ok(target)
+    }
+
+    /// The memory that `source` will be copied to; none if it is not wanted.
+    ///
+    /// # Errors
+    /// No memory left.
+    pub fn image(
+        &mut self,
+        name: &str,
+        source: Image,
+        [width, height]: [u32; 2],
+        texel_bytes: u64,
+        wanted: bool,
+    ) -> Result<Option<Arc<vulkan::Buffer>>> {
+        if !wanted {
+            return Ok(None);
+        }
+        let (handle, target) =
+            self.target(&format!("{name}_target"), texel_bytes * u64::from(width) * u64::from(height))?;
+        let copied = read_image(&mut self.graph, name, source, handle);
+        self.graph.output(copied);
+        Ok(Some(target))
+    }
+}
+
+/// The contents of a buffer that was read back; empty if it was not wanted.
+pub fn texels<T: bytemuck::Pod>(buffer: Option<&vulkan::Buffer>) -> Vec<T> {
+    let bytes = buffer.and_then(|buffer| buffer.contents()).unwrap_or_default();
+    bytemuck::pod_collect_to_vec(bytes)
 }

@@ -1,9 +1,9 @@
 //! Blurs an environment by the kernels that fitted threads look up, once at load: a graph of its own, a pass a level.
-use super::{FrameGraph, read_buffer};
+use super::{FrameGraph, Readbacks, texels};
 use crate::Result;
-use crate::environment::{Pyramid, Step, VmfPyramid};
+use crate::environment::{Kernel, Pyramid, Step, VmfPyramid};
 use crate::graph::{Access, BufferDesc, Executable};
-use crate::vulkan::{Bindings, Buffer, BufferUse, ComputePipeline, Device, Frames, Groups, PipelineCache, compiled};
+use crate::vulkan::{Bindings, Buffer, ComputePipeline, Device, Frames, Groups, PipelineCache, compiled};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 use std::sync::Arc;
@@ -23,16 +23,16 @@ struct Push {
 /// Whatever Vulkan refuses.
 pub fn vmf_pyramid(device: &Arc<Device>, cache: &PipelineCache, source: &Pyramid) -> Result<VmfPyramid> {
     let pipeline = ComputePipeline::new(device, cache, &compiled::VMF_PYRAMID, &[])?;
-    let texels = bytemuck::cast_slice(&source.levels[0]);
-    let finest = Arc::new(Buffer::with_contents(device, "box", vk::BufferUsageFlags::STORAGE_BUFFER, texels)?);
+    let finest_texels = bytemuck::cast_slice(&source.levels[0]);
+    let finest = Arc::new(Buffer::with_contents(device, "box", vk::BufferUsageFlags::STORAGE_BUFFER, finest_texels)?);
     let mut graph = FrameGraph::new();
-    let size_bytes = texels.len() as u64;
+    let size_bytes = finest_texels.len() as u64;
     let finest_handle = graph.import_buffer("box", BufferDesc { size_bytes }, Some(Access::StorageReadCompute), None);
-    let mut imports = vec![(finest_handle, finest)];
-    let (mut levels, mut targets) = (Vec::new(), Vec::new());
-    for (index, step) in VmfPyramid::steps(source.face_size).iter().enumerate() {
-        let size_bytes = (6 * step.size * step.size * size_of::<[f32; 3]>()) as u64;
-        let from = step.from.map_or(finest_handle, |from| levels[from]);
+    let steps = VmfPyramid::steps(source.face_size);
+    let mut maps = Vec::new();
+    for (index, step) in steps.iter().enumerate() {
+        let from = step.from.map_or(finest_handle, |from| maps[from]);
+        let size_bytes = size_bytes_of(step);
         let level = graph.buffer(&format!("map_{index}"), BufferDesc { size_bytes });
         let mut pass = graph.pass(&format!("blur_{index}"));
         pass.read(from, Access::StorageReadCompute);
@@ -51,20 +51,25 @@ pub fn vmf_pyramid(device: &Arc<Device>, cache: &PipelineCache, source: &Pyramid
             let groups = size.div_ceil(8) as u32;
             commands.dispatch(pipeline, &bindings, bytemuck::bytes_of(&push), Groups::Direct([groups, groups, 6]))
         }));
-        levels.push(level);
-        let name = format!("read_level_{index}");
-        let usage = vk::BufferUsageFlags::TRANSFER_DST;
-        let target = Arc::new(Buffer::new(device, &name, size_bytes, usage, BufferUse::Readback)?);
-        let handle = graph.import_buffer(&name, BufferDesc { size_bytes }, None, Some(Access::HostRead));
-        imports.push((handle, target.clone()));
-        let copied = read_buffer(&mut graph, &name, level, handle);
-        graph.output(copied);
-        targets.push(target);
+        maps.push(level);
     }
+    // The others have served.
+    let levels = steps.iter().zip(maps).enumerate().filter(|(_, (step, _))| step.kernel == Kernel::Vmf);
+    let mut readbacks = Readbacks::new(device, graph);
+    readbacks.imports.push((finest_handle, finest));
+    let targets =
+        levels.map(|(index, (step, map))| readbacks.buffer(&format!("read_map_{index}"), map, size_bytes_of(step)));
+    let targets = targets.collect::<Result<Vec<_>>>()?;
+    let Readbacks { graph, imports, .. } = readbacks;
     let executable = Executable::new(device, graph, &imports)?;
     let mut frames = Frames::new(device, "vmf_pyramid", 1)?;
     executable.execute(&mut frames)?;
     frames.wait()?;
-    let level = |target: &Arc<Buffer>| bytemuck::pod_collect_to_vec(target.contents().unwrap_or_default());
-    Ok(VmfPyramid::from_maps(source.face_size, targets.iter().map(level).collect()))
+    let levels = targets.iter().map(|target| texels(Some(target))).collect();
+    Ok(VmfPyramid { levels: Pyramid { face_size: source.face_size, levels } })
+}
+
+/// Size of the map that a step makes.
+fn size_bytes_of(step: &Step) -> u64 {
+    (6 * step.size * step.size * size_of::<[f32; 3]>()) as u64
 }
