@@ -66,7 +66,8 @@ uvec2 subpixel = uvec2(0);
 // A method defines `vec3 estimate(Surface surface, Material material, uint first, uint stride)`: the sum over its threads or
 // samples first, first + stride, ... of weight times environment, a partition of the radiance that leaves `surface` towards
 // the eye, and `const bool SHARES_SURFACE`: whether a pixel that lies on one smooth surface is one sum at its mean normal,
-// not a partition among its sub-pixels. It includes what it looks up; nothing else of the scene is made or uploaded.
+// not a partition among its sub-pixels, but for where `bool needs_subpixels(Surface surface, Material material)` has each sum over
+// all of them. It includes what it looks up; nothing else of the scene is made or uploaded.
 #include "method.glsl"
 
 shared uint group_lookups;
@@ -79,6 +80,12 @@ vec3 normal_sum(uvec2 pixel) {
         sum += geometry_normal(texelFetch(geometry, ivec2(subpixel), 0).xy);
     }
     return sum;
+}
+
+// The surface that is seen at a place in the picture, from 0 to 1.
+Surface surface_at(vec2 position, vec3 normal) {
+    vec3 w_o = -normalize(camera_ray(push.camera, position));
+    return make_surface(to_environment(normal), to_environment(w_o));
 }
 
 void main() {
@@ -101,6 +108,13 @@ void main() {
         vec3 normals = interior ? normal_sum(pixel) : vec3(0.0);
         float normal_variance = interior ? max(1.0 - length(normals) / float(subpixel_count), 0.0) : 0.0;
         bool shares_surface = interior && SHARES_SURFACE && normal_variance < SHARED_VARIANCE;
+        Surface middle;
+        if (shares_surface) {
+            middle = surface_at((vec2(pixel) + 0.5) / vec2(push.size_px), normalize(normals));
+            middle.normal_variance = normal_variance;
+            uvec2 texel = texelFetch(geometry, ivec2(pixel * SUBPIXELS), 0).xy;
+            shares_surface = !needs_subpixels(middle, materials[geometry_material(texel)]);
+        }
         uint stride = interior && !SHARES_SURFACE ? subpixel_count : 1;
         vec3 sum = vec3(0.0);
         uint covered = 0;
@@ -109,12 +123,11 @@ void main() {
             uvec2 texel = texelFetch(geometry, ivec2(subpixel), 0).xy;
             if (is_covered(texel)) {
                 ++covered;
-                vec2 position = shares_surface ? (vec2(pixel) + 0.5) / vec2(push.size_px)
-                                               : (vec2(subpixel) + 0.5) / vec2(push.size_px * SUBPIXELS);
-                vec3 w_o = -normalize(camera_ray(push.camera, position));
-                vec3 normal = shares_surface ? normalize(normals) : geometry_normal(texel);
-                Surface surface = make_surface(to_environment(normal), to_environment(w_o));
-                surface.normal_variance = shares_surface || stride > 1 ? normal_variance : 0.0;
+                Surface surface = middle;
+                if (!shares_surface) {
+                    surface = surface_at((vec2(subpixel) + 0.5) / vec2(push.size_px * SUBPIXELS), geometry_normal(texel));
+                    surface.normal_variance = stride > 1 ? normal_variance : 0.0;
+                }
                 sum += estimate(surface, materials[geometry_material(texel)], stride > 1 ? j : 0, stride);
             }
         }

@@ -1,7 +1,10 @@
-// The environment blurred by von Mises-Fisher kernels, as the GPU holds it. Twin: src/environment/vmf_pyramid.rs.
+// The environment blurred by von Mises-Fisher kernels, as the GPU holds it: without its small sources, and these alone.
+// Twin: src/environment/vmf_pyramid.rs; of what looks it up, src/shading/fitted.rs.
+#include "environment_map.glsl"
 
 layout(set = 0, binding = 4) uniform samplerCube environment_pyramid;
 layout(set = 0, binding = 13) uniform samplerCube irradiance_map;
+layout(set = 0, binding = 15) uniform samplerCube source_pyramid;
 
 // Width of the kernel of level 0, in radians, and its faces: FINEST_WIDTH_RAD in src/threads/fitted/kernel.rs.
 const float FINEST_WIDTH_RAD = 1.0 / 256.0;
@@ -12,9 +15,60 @@ float finest_level(float face_size) {
     return log2(FINEST_FACE_SIZE / face_size);
 }
 
+// Variance along each axis of a kernel of `level`, over that of level 0: of whole levels 4^level, of level -1, the environment as it
+// is, none; between them kernels blend, and so do their variances.
+float variance_of_level(float level) {
+    float whole = floor(level);
+    return level < 0.0 ? level + 1.0 : exp2(2.0 * whole) * (1.0 + 3.0 * (level - whole));
+}
+
+float level_of_variance(float variance) {
+    if (variance < 1.0) {
+        return variance - 1.0;
+    }
+    float whole = floor(0.5 * log2(variance));
+    return whole + (variance * exp2(-2.0 * whole) - 1.0) / 3.0;
+}
+
 // The level of a kernel that is blurred by normals of this variance along each axis, in rad^2: mirrored directions turn
 // twice as far, and variances add up.
 float level_within_pixel(float level, float normal_variance) {
-    float width = FINEST_WIDTH_RAD * exp2(level);
-    return level + 0.5 * log2(1.0 + 4.0 * normal_variance / (width * width));
+    float added = 4.0 * normal_variance / (FINEST_WIDTH_RAD * FINEST_WIDTH_RAD);
+    return added > 0.0 ? level_of_variance(variance_of_level(level) + added) : level;
+}
+
+// The environment as it is, with so much of its sources.
+vec3 sharp_radiance(vec3 d, float sources) {
+    ++lookups;
+    Corners c = environment_corners(d);
+    vec3 sum = vec3(0.0);
+    for (int i = 0; i < 4; ++i) {
+        bool right = (i & 1) != 0;
+        bool bottom = i > 1;
+        vec4 texel = texelFetch(environment_map, ivec2(right ? c.right : c.left, bottom ? c.bottom : c.top), 0);
+        float weight = (right ? c.t.x : 1.0 - c.t.x) * (bottom ? c.t.y : 1.0 - c.t.y);
+        sum += weight * (texel.a > 0.0 ? sources : 1.0) * texel.rgb;
+    }
+    return sum;
+}
+
+// The environment blurred by the kernel of `level`, with so much of its sources.
+vec3 blurred_radiance(vec3 d, float level, float sources) {
+    float finest = finest_level(push.face_size);
+    // Sharper than the pyramid: its finest level and the environment as it is, with the variance of the kernel.
+    float sharp = level < finest ? 1.0 - variance_of_level(level) / variance_of_level(finest) : 0.0;
+    vec3 radiance = vec3(0.0);
+    if (sharp < 1.0) {
+        ++lookups;
+        float pyramid_level = max(level - finest, 0.0);
+        radiance = (1.0 - sharp) * textureLod(environment_pyramid, d, pyramid_level).rgb;
+        if (sources > 0.0) {
+            ++lookups;
+            radiance += (1.0 - sharp) * sources * textureLod(source_pyramid, d, pyramid_level).rgb;
+        }
+    }
+    if (sharp > 0.0) {
+        radiance += sharp * sharp_radiance(d, sources);
+    }
+    return radiance;
 }

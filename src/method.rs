@@ -2,6 +2,7 @@
 //!
 //! A method is one GLSL file in `glsl/methods/` that defines `estimate`, one CPU twin in `shading/`, and
 //! one line here in each list.
+use crate::environment::Environment;
 use crate::threads;
 use crate::vulkan::{Shader, compiled};
 use crate::{Error, Result};
@@ -107,6 +108,11 @@ impl Method {
     }
 
     /// Whether a pixel within one smooth surface is one sum at its mean normal, not a partition among its sub-pixels:
+    /// Whether its shader evaluates BRDFs under `environment`: fitted threads hold all that is needed, but for small bright sources.
+    pub fn evaluates_brdf(self, environment: &Environment) -> bool {
+        self != Self::Fitted || !environment.small_sources().list.is_empty()
+    }
+
     /// SHARES_SURFACE in the shader.
     pub fn shares_surface(self) -> bool {
         matches!(self, Self::Fitted)

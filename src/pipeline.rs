@@ -105,8 +105,10 @@ impl Renderer {
         let cache = PipelineCache::new(device, cache_folder)?;
         let geometry_cache = upload_geometry(device, &cache, prepared)?;
         let brdfs = prepared.materials.iter().map(|material| (&material.brdf, material.threads.as_ref()));
-        let materials = DeviceMaterials::new(device, method, brdfs)?;
-        let light = DeviceLight::new(device, &cache, cache_folder, method, environment, *intensity)?;
+        let evaluates_brdf = method.evaluates_brdf(environment);
+        let materials = DeviceMaterials::new(device, method, brdfs, evaluates_brdf)?;
+        let light =
+            DeviceLight::new(device, &cache, cache_folder, method, environment, *intensity, &prepared.materials)?;
         Ok(Self {
             view: view.clone(),
             geometry_cache,

@@ -4,7 +4,7 @@
 #include "environment_pyramid.glsl"
 #include "importance_sampling.glsl"
 
-const bool SHARES_SURFACE = false;
+#include "partition.glsl"
 
 vec3 estimate(Surface surface, Material material, uint first, uint stride) {
     vec3 w_o = view_direction(surface);

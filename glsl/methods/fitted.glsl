@@ -1,8 +1,8 @@
 // Fitted threads: sum over k of w_k (environment blurred by kernel k)(d_k), plus the cosine part's irradiance. Directions, widths and
 // weights were fitted to f(w_i, w_o) (n . w_i), so no BRDF is left to evaluate.
 //
-// Few threads fit tails of lobes worst, and under small bright sources tails matter most. For these the fit's own answer is
-// replaced by the BRDF's.
+// Few threads fit tails of lobes worst, and under small bright sources tails matter most. So the blurred environment is without
+// these, and they are shaded by the BRDF itself.
 // Twin: src/shading/fitted.rs.
 #include "vmf_pyramid.glsl"
 
@@ -32,10 +32,9 @@ vec3 unpack_cosine_part(uint at) {
 }
 
 struct Source {
-    vec3 direction; // of its centroid, in the environment's coordinates
-    float width;    // standard deviation along an axis, in radians
-    vec3 power;     // radiance integrated over its solid angle, over the scale of the pyramid's texels
-    float padding;
+    vec4 direction; // of its centroid, in the environment's coordinates; w: standard deviation along its longer axis, in radians
+    vec4 axis[2];   // across that, as long as its standard deviation along each
+    vec4 power;     // radiance integrated over its solid angle, over the scale of the pyramid's texels
 };
 
 layout(set = 0, binding = 14, std430) readonly buffer Sources {
@@ -43,57 +42,63 @@ layout(set = 0, binding = 14, std430) readonly buffer Sources {
     Source sources[];
 };
 
-const uint MAX_SOURCES = 8;
-
-// vMF, by half the squared distance between unit vectors, which is 1 - cos.
-float vmf(float away, float kappa) {
-    return kappa / (radians(360.0) * (1.0 - exp(-2.0 * kappa))) * exp(-kappa * away);
+// How far a source is from where the BRDF cannot be taken at a few points of it, because it is mirrored towards the eye and wider than
+// the lobe; in half standard deviations of the source. Within a half vector of lobe_width f loses a quarter, as a Gaussian does
+// at 0.76 of its width; reflection doubles that. Twin: src/environment/sources.rs, with CLEAR for the bounds of its use below.
+float clearance(Source source, Material material, vec3 mirror) {
+    float lobe = 2.6 * material.lobe_width;
+    return (distance(source.direction.xyz, mirror) + 4.0 * lobe) / (2.0 * source.direction.w);
 }
 
-// kappa of the kernel of a whole level, blurred by a source.
-float blurred_kappa(float level, float source_width) {
-    float width = FINEST_WIDTH_RAD * exp2(level);
-    return 1.0 / (width * width + source_width * source_width);
+// How much of the answer to sources is the BRDF's: the rest is the kernels', which fit best where the mirrored view is. Sources count
+// as no narrower than `least_width`.
+float share_of_brdf(Material material, vec3 mirror, float least_width) {
+    float share = 1.0;
+    for (uint s = 0; s < source_count; ++s) {
+        Source source = sources[s];
+        source.direction.w = max(source.direction.w, least_width);
+        share = min(share, smoothstep(1.25, 2.5, clearance(source, material, mirror)));
+    }
+    return share;
 }
 
-// What a lookup of `level` at `direction` weighs a source at `to_source` by.
-float kernel_at(vec3 direction, float level, vec3 to_source, float source_width) {
-    vec3 difference = direction - to_source;
-    float away = 0.5 * dot(difference, difference);
-    float whole = floor(level);
-    float finer = vmf(away, blurred_kappa(whole, source_width));
-    float coarser = vmf(away, blurred_kappa(whole + 1.0, source_width));
-    return mix(finer, coarser, level - whole);
+// The mirrored view, in the environment's coordinates.
+vec3 mirrored(Surface surface, vec3 w_o) {
+    return surface.frame * vec3(-w_o.x, -w_o.y, w_o.z);
 }
 
-// What is to be integrated over a source: the mean of four points with its variance.
-struct AtSource {
+// A sun that is mirrored within a pixel is too small and too bright for a blur to tell what is seen of it.
+bool needs_subpixels(Surface surface, Material material) {
+    // Normals mirrored turn twice as far.
+    float blur = 2.0 * sqrt(surface.normal_variance);
+    return share_of_brdf(material, mirrored(surface, view_direction(surface)), blur) < 1.0;
+}
+
+// Powers of all sources times what is to be integrated over them.
+struct AtSources {
     vec3 f_cos;
-    float cosine;
+    vec3 cosine;
 };
 
-AtSource at_source(Material material, vec3 to_source, float source_width, vec3 w_o) {
-    vec3 x = any_tangent(to_source);
-    vec3 y = cross(to_source, x);
-    AtSource mean = AtSource(vec3(0.0), 0.0);
-    for (int i = 0; i < 4; ++i) {
-        float sign = i < 2 ? 1.0 : -1.0;
-        vec3 w_i = normalize(to_source + sign * sqrt(2.0) * source_width * ((i & 1) == 0 ? x : y));
-        if (w_i.z > 0.0) {
-            mean.f_cos += 0.25 * brdf(material, w_i, w_o) * w_i.z;
-            mean.cosine += 0.25 * w_i.z;
+AtSources at_sources(Surface surface, Material material, vec3 w_o, vec3 mirror) {
+    AtSources sum = AtSources(vec3(0.0), vec3(0.0));
+    for (uint s = 0; s < source_count; ++s) {
+        Source source = sources[s];
+        // Gauss and Legendre's points on a square of the source's variance; from afar, where a lobe is eight times wider, its middle.
+        int side = clearance(source, material, mirror) > 16.0 ? 1 : 3;
+        for (int i = 0; i < side * side; ++i) {
+            ivec2 place = ivec2(i % side, i / side) - side / 2;
+            vec2 at = sqrt(3.0 * 0.6) * vec2(place);
+            vec2 weights = side == 1 ? vec2(1.0) : mix(vec2(4.0 / 9.0), vec2(2.5 / 9.0), notEqual(place, ivec2(0)));
+            vec3 w_i = normalize((source.direction.xyz + at.x * source.axis[0].xyz + at.y * source.axis[1].xyz) * surface.frame);
+            if (w_i.z > 0.0) {
+                vec3 power = weights.x * weights.y * w_i.z * source.power.rgb;
+                sum.f_cos += power * brdf(material, w_i, w_o);
+                sum.cosine += power;
+            }
         }
     }
-    return mean;
-}
-
-// How much of a source's answer is replaced. Where it is mirrored towards the eye, four points are too few to tell what a lobe makes
-// of it that is narrower; but there the fit is best. Within a half vector of lobe_width f loses a quarter, as a Gaussian does at
-// 0.76 of its width; reflection doubles that.
-float replaced(Material material, vec3 to_source, float source_width, vec3 w_o) {
-    vec3 mirror = vec3(-w_o.x, -w_o.y, w_o.z);
-    float lobe = 2.6 * material.lobe_width;
-    return smoothstep(1.5, 3.0, (length(to_source - mirror) + 4.0 * lobe) / (2.0 * source_width));
+    return sum;
 }
 
 vec3 estimate(Surface surface, Material material, uint first, uint stride) {
@@ -104,31 +109,22 @@ vec3 estimate(Surface surface, Material material, uint first, uint stride) {
     uint above = below + (uint(row) + 1 < material.row_count ? words_a_row : 0);
     float t = fract(row);
     vec3 cosine_part = mix(unpack_cosine_part(below), unpack_cosine_part(above), t);
-    vec3 w_o = view_direction(surface);
     vec3 sum = vec3(0.0);
-    vec3 to_source[MAX_SOURCES];
-    float part[MAX_SOURCES];
-    for (uint s = 0; s < source_count; ++s) {
-        to_source[s] = sources[s].direction * surface.frame;
-        part[s] = replaced(material, to_source[s], sources[s].width, w_o);
-        AtSource mean = at_source(material, to_source[s], sources[s].width, w_o);
+    float of_kernels = 0.0;
+    if (source_count > 0) {
+        vec3 w_o = view_direction(surface);
+        vec3 mirror = mirrored(surface, w_o);
+        of_kernels = 1.0 - share_of_brdf(material, mirror, 0.0);
+        AtSources at = at_sources(surface, material, w_o, mirror);
         // The irradiance map has no sources.
-        vec3 of_cosine = cosine_part * (mean.cosine / radians(180.0));
-        sum += sources[s].power * mix(of_cosine, mean.f_cos, part[s]);
+        sum = mix(at.f_cos, at.cosine * cosine_part / radians(180.0), of_kernels);
     }
     for (uint k = first; k < material.thread_count; k += stride) {
         Kernel a = unpack_kernel(below + 3 * (k + 1));
         Kernel b = unpack_kernel(above + 3 * (k + 1));
-        vec3 direction = normalize(mix(a.direction, b.direction, t));
+        vec3 direction = surface.frame * normalize(mix(a.direction, b.direction, t));
         float level = level_within_pixel(mix(a.level, b.level, t), surface.normal_variance);
-        level = max(level, finest_level(push.face_size));
-        ++lookups;
-        vec3 radiance =
-            textureLod(environment_pyramid, surface.frame * direction, level - finest_level(push.face_size)).rgb;
-        for (uint s = 0; s < source_count; ++s) {
-            radiance -= part[s] * kernel_at(direction, level, to_source[s], sources[s].width) * sources[s].power;
-        }
-        sum += mix(a.weight, b.weight, t) * radiance;
+        sum += mix(a.weight, b.weight, t) * blurred_radiance(direction, level, of_kernels);
     }
     ++lookups;
     sum += cosine_part * textureLod(irradiance_map, surface.frame[2], 0.0).rgb;

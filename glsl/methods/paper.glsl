@@ -4,7 +4,7 @@
 // Twin: src/shading/paper.rs.
 #include "environment_pyramid.glsl"
 
-const bool SHARES_SURFACE = false;
+#include "partition.glsl"
 
 // Row by row of theta_o: the row's albedo, then thread by thread the direction in the shading frame, and the logarithm
 // to base 2 of its pdf in 1/sr. Between rows the logarithm is nearer to the pdf than a linear blend.

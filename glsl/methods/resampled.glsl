@@ -6,7 +6,7 @@
 #include "light_sampling.glsl"
 #include "importance_sampling.glsl"
 
-const bool SHARES_SURFACE = false;
+#include "partition.glsl"
 
 const int CANDIDATES = 8; // even
 

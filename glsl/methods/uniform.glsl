@@ -2,7 +2,7 @@
 #include "random.glsl"
 #include "environment_map.glsl"
 
-const bool SHARES_SURFACE = false;
+#include "partition.glsl"
 
 vec3 estimate(Surface surface, Material material, uint first, uint stride) {
     vec3 w_o = view_direction(surface);

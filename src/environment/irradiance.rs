@@ -1,12 +1,12 @@
 //! The irradiance map: the environment convolved with the cosine, which takes the part of every BRDF that is like Lambert's in one lookup.
 //!
-//! Small bright sources are left out of it: between the texels of a map their terminator would be a step, so shading adds
-//! theirs exactly.
+//! It is for environments without small bright sources: between the texels of a map their terminator would be a step, so
+//! shading adds theirs exactly.
 use glam::Vec3;
 use rayon::prelude::*;
 
 use super::cube::{direction_of, face_of};
-use super::{Environment, Pyramid, SmallSources};
+use super::{Environment, Pyramid};
 
 /// Texels along the edge of a face: bilinear between them is good to h^2 / 4, 2.4e-4 of the largest value, without small sources.
 const FACE_SIZE: usize = 64;
@@ -27,12 +27,9 @@ struct Cell {
     centroid: Vec3,
 }
 
-/// Irradiance over pi without `sources`, for every normal: a cube map of one level.
-pub fn irradiance_map(environment: &Environment, sources: &SmallSources) -> Pyramid {
-    let rest = environment.texels.iter().zip(&sources.pixels);
-    let rest = rest.map(|(texel, is_source)| if *is_source { [0.0; 3] } else { *texel }).collect();
-    let Environment { name, width, height, repaired, .. } = environment;
-    let cells = gather(&Environment::new(name.clone(), *width, *height, rest, *repaired));
+/// Irradiance over pi for every normal: a cube map of one level.
+pub fn irradiance_map(environment: &Environment) -> Pyramid {
+    let cells = gather(environment);
     let irradiance = |texel: usize| {
         let middle = |index: usize| (index as f64 + 0.5) / FACE_SIZE as f64;
         let (face, row, column) = (texel / FACE_SIZE / FACE_SIZE, texel / FACE_SIZE % FACE_SIZE, texel % FACE_SIZE);
@@ -90,7 +87,7 @@ mod tests {
     fn a_constant_stays_as_it_is_however_few_pixels_it_has() {
         for (width, height) in [(1, 1), (3, 2), (64, 32)] {
             let map = environment(width, height, |_, _| [1.0, 0.1, 7.0]);
-            let irradiance = irradiance_map(&map, &SmallSources::of(&map));
+            let irradiance = irradiance_map(&map);
             for texel in &irradiance.levels[0] {
                 assert!((Vec3::from(*texel) / Vec3::new(1.0, 0.1, 7.0) - 1.0).abs().max_element() < 1e-5, "{texel:?}");
             }
@@ -103,9 +100,9 @@ mod tests {
             let spot = if (x, y) == (70, 20) { 4e3 } else { 0.5 };
             [1.0 + ((x * 7 + y * 3) % 13) as f32, spot, (y / 20) as f32]
         });
-        let sources = SmallSources::of(&map);
+        let sources = map.small_sources();
         assert_eq!(sources.list.len(), 1);
-        let irradiance = irradiance_map(&map, &sources);
+        let irradiance = map.rest().irradiance();
         for i in 0..200 {
             let z: f64 = 1.0 - (f64::from(i) + 0.5) / 100.0;
             let angle = f64::from(i) * 2.4;

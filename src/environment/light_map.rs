@@ -1,4 +1,4 @@
-//! The environment as estimators look it up and draw from it: radiance, sampling density, alias table.
+//! The environment as shaders look it up and draw from it: radiance, sampling density, alias table.
 use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 
@@ -14,7 +14,7 @@ pub struct LightMap {
     pub width: usize,
     /// Rows.
     pub height: usize,
-    /// Radiance, and density over the unit square (u, v), at pixel centres, row by row from the top.
+    /// Radiance, and density over the unit square (u, v) or whether it is a small source's, at pixel centres, row by row from the top.
     pub texels: Vec<[f32; 4]>,
 }
 
@@ -45,6 +45,13 @@ impl LightMap {
         Self { width, height, texels }
     }
 
+    /// The map of `environment`, with the pixels of small sources marked by 1 where densities would be, and all others by 0.
+    pub fn with_sources_marked(environment: &Environment) -> Self {
+        let texels = environment.texels.iter().zip(&environment.small_sources().pixels);
+        let texels = texels.map(|(&[r, g, b], &is_source)| [r, g, b, f32::from(u8::from(is_source))]).collect();
+        Self { width: environment.width, height: environment.height, texels }
+    }
+
     /// The alias table over the pixels (Vose 1991).
     pub fn aliases(&self) -> Vec<Alias> {
         let mut remaining: Vec<f64> = self.texels.iter().map(|texel| f64::from(texel[3])).collect();
@@ -66,8 +73,8 @@ impl LightMap {
         aliases
     }
 
-    /// Radiance and density from the unit direction `d`. Twin of `environment_texel` in glsl/environment_map.glsl.
-    pub fn texel(&self, d: Vec3) -> Vec4 {
+    /// The four pixels around the unit direction `d`, with their weights. Twin of `environment_corners` in glsl/environment_map.glsl.
+    pub fn corners(&self, d: Vec3) -> [(f32, Vec4); 4] {
         let sin_theta = d.x.hypot(d.z);
         let phi = d.x.atan2(-d.z);
         let theta = sin_theta.atan2(d.y);
@@ -78,9 +85,18 @@ impl LightMap {
         let row = |y: f32| (y.max(0.0) as usize).min(self.height - 1);
         let (top, bottom) = (row(y.floor()), row(y.floor() + 1.0));
         let texel = |column: usize, row: usize| Vec4::from(self.texels[row * self.width + column]);
-        let above = texel(left, top).lerp(texel(right, top), x - x.floor());
-        let below = texel(left, bottom).lerp(texel(right, bottom), x - x.floor());
-        above.lerp(below, y - y.floor())
+        let (t, u) = (x - x.floor(), y - y.floor());
+        [
+            ((1.0 - t) * (1.0 - u), texel(left, top)),
+            (t * (1.0 - u), texel(right, top)),
+            ((1.0 - t) * u, texel(left, bottom)),
+            (t * u, texel(right, bottom)),
+        ]
+    }
+
+    /// Radiance and density from the unit direction `d`. Twin of `environment_texel` in glsl/environment_map.glsl.
+    pub fn texel(&self, d: Vec3) -> Vec4 {
+        self.corners(d).into_iter().map(|(weight, texel)| weight * texel).sum()
     }
 }
 

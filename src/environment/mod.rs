@@ -14,7 +14,7 @@ mod light_map;
 mod load;
 mod procedural;
 pub mod pyramid;
-mod sources;
+pub mod sources;
 mod vmf_pyramid;
 
 pub use irradiance::irradiance_map;
@@ -48,6 +48,8 @@ pub struct Environment {
     vmf_filtered: OnceLock<VmfPyramid>,
     /// Made when first asked for.
     small_sources: OnceLock<SmallSources>,
+    /// This without its small sources, and these alone, if there are any. Made when first asked for.
+    parts: OnceLock<Option<Box<[Environment; 2]>>>,
     /// Made when first asked for.
     irradiance: OnceLock<Pyramid>,
 }
@@ -70,6 +72,7 @@ impl Environment {
             box_filtered: OnceLock::new(),
             vmf_filtered: OnceLock::new(),
             small_sources: OnceLock::new(),
+            parts: OnceLock::new(),
             irradiance: OnceLock::new(),
         }
     }
@@ -84,9 +87,33 @@ impl Environment {
         self.small_sources.get_or_init(|| SmallSources::of(self))
     }
 
-    /// Irradiance over pi, without those.
+    /// This environment with its small sources cut out.
+    pub fn rest(&self) -> &Self {
+        self.parts().map_or(self, |[rest, _]| rest)
+    }
+
+    /// Its small sources alone, if it has any.
+    pub fn sources_alone(&self) -> Option<&Self> {
+        self.parts().map(|[_, sources]| sources)
+    }
+
+    fn parts(&self) -> Option<&[Self; 2]> {
+        let parts = self.parts.get_or_init(|| {
+            let SmallSources { list, pixels } = self.small_sources();
+            let part = |of_sources: bool| {
+                let kept =
+                    |(texel, is_source): (&[f32; 3], &bool)| if *is_source == of_sources { *texel } else { [0.0; 3] };
+                let texels = self.texels.iter().zip(pixels).map(kept).collect();
+                Self::new(self.name.clone(), self.width, self.height, texels, self.repaired)
+            };
+            (!list.is_empty()).then(|| Box::new([part(false), part(true)]))
+        });
+        parts.as_deref()
+    }
+
+    /// Irradiance over pi.
     pub fn irradiance(&self) -> &Pyramid {
-        self.irradiance.get_or_init(|| irradiance_map(self, self.small_sources()))
+        self.irradiance.get_or_init(|| irradiance_map(self))
     }
 
     /// The pyramid of vMF kernels of this environment: from the cache in `folder` or by `make` from the box-filtered one, once for all

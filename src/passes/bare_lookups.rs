@@ -1,6 +1,6 @@
 //! The floor of shading: as many trilinear lookups as a method makes, and nothing else.
 use super::FrameGraph;
-use super::shade::DevicePyramid;
+use super::light::DevicePyramid;
 use crate::Result;
 use crate::environment::Environment;
 use crate::graph::{Access, Buffer, BufferDesc};

@@ -1,8 +1,6 @@
 //! Pass 2 of the paper (section 4.2): the radiance of every listed pixel, by its partition of the sample threads.
-use super::background::check_map_size;
-use super::{CameraRays, Counters, FrameGraph, Tiles, View, clear, vmf_pyramid};
+use super::{CameraRays, Counters, DeviceLight, FrameGraph, Tiles, View, clear};
 use crate::brdf::{Brdf, half_vector_width};
-use crate::environment::{Environment, LightMap, Pyramid, Source, VmfPyramid};
 use crate::graph::{self, Access, BufferDesc, Image};
 use crate::method::Method;
 use crate::threads::{Sample, SliceTable, Threads};
@@ -12,7 +10,6 @@ use crate::vulkan::{
 use crate::{Error, Result};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
-use std::path::Path;
 use std::sync::Arc;
 
 /// `Material` in glsl/material.glsl.
@@ -36,12 +33,13 @@ pub struct DeviceMaterials {
     slices: Option<Buffer>,
     tables: vulkan::Image,
     table_sampler: Sampler,
-    /// Bit i: some material has model i.
+    /// Bit i: the BRDF of model i is evaluated.
     models_used: u32,
 }
 
 impl DeviceMaterials {
-    /// Uploads what `method` looks up of `materials`, in the order of the indices that objects have.
+    /// Uploads what `method` looks up of `materials`, in the order of the indices that objects have; their BRDFs only if it
+    /// `evaluates_brdf`.
     ///
     /// # Errors
     /// No device memory left, or more measured tables than a 3D image of the device holds.
@@ -52,6 +50,7 @@ impl DeviceMaterials {
         device: &Arc<Device>,
         method: Method,
         materials: impl IntoIterator<Item = (&'m Brdf, Option<&'m Threads>)>,
+        evaluates_brdf: bool,
     ) -> Result<Self> {
         let use_slices = method.shader()?.declares("Slices")?;
         let mut records = Vec::new();
@@ -61,11 +60,13 @@ impl DeviceMaterials {
         let mut models_used = 0;
         for (brdf, thread_table) in materials {
             let mut parameters = brdf.gpu_parameters();
-            if let Some(table) = brdf.table() {
+            if let Some(table) = brdf.table().filter(|_| evaluates_brdf) {
                 // glsl/brdf/merl.glsl reads its place in the atlas from a.xy.
                 parameters[..2].copy_from_slice(&tables.add(device, table.texels())?.map(|texels| texels as f32));
             }
-            models_used |= 1 << brdf.model_index();
+            if evaluates_brdf {
+                models_used |= 1 << brdf.model_index();
+            }
             if let Some(kind) = method.threads() {
                 assert_eq!(thread_table.map(Threads::kind), Some(kind), "threads of method {}", method.name());
             }
@@ -178,120 +179,6 @@ impl<'a> TableAtlas<'a> {
     }
 }
 
-/// What a method looks up of the environment, on the device.
-pub struct DeviceLight {
-    pyramid: Option<DevicePyramid>,
-    irradiance: Option<DevicePyramid>,
-    sources: Option<Buffer>,
-    map: Option<vulkan::Image>,
-    aliases: Option<Buffer>,
-    intensity: f32,
-}
-
-/// Uploads the sources of `environment`, their power over `scale`: `Sources` in glsl/methods/fitted.glsl.
-fn source_buffer(device: &Arc<Device>, environment: &Environment, scale: f32) -> Result<Buffer> {
-    let sources = &environment.small_sources().list;
-    // The count, and what aligns the structures to 16 bytes.
-    let mut words = vec![sources.len() as u32, 0, 0, 0];
-    for Source { direction, width_rad, power } in sources {
-        let power = power.as_vec3() / scale;
-        words.extend(direction.as_vec3().extend(*width_rad as f32).to_array().map(f32::to_bits));
-        words.extend(power.extend(0.0).to_array().map(f32::to_bits));
-    }
-    // A buffer cannot be empty, nor its array.
-    words.resize(words.len().max(12), 0);
-    let storage = vk::BufferUsageFlags::STORAGE_BUFFER;
-    Ok(Buffer::with_contents(device, "light sources", storage, bytemuck::cast_slice(&words))?)
-}
-
-/// The environment's pyramid on the device.
-pub(super) struct DevicePyramid {
-    pub(super) image: vulkan::Image,
-    pub(super) sampler: Sampler,
-    face_size: u32,
-    /// Radiance of a texel of value 1: what keeps suns within half floats.
-    scale: f32,
-}
-
-impl DeviceLight {
-    /// Makes and uploads what `method` looks up of `environment`; what takes long is kept in `cache_folder`.
-    ///
-    /// # Errors
-    /// No device memory left, or a map wider or higher than the device's images can be.
-    pub fn new(
-        device: &Arc<Device>,
-        cache: &PipelineCache,
-        cache_folder: Option<&Path>,
-        method: Method,
-        environment: &Environment,
-        intensity: f64,
-    ) -> Result<Self> {
-        let shader = method.shader()?;
-        let mut light = Self {
-            pyramid: None,
-            irradiance: None,
-            sources: None,
-            map: None,
-            aliases: None,
-            intensity: intensity as f32,
-        };
-        if shader.declares("irradiance_map")? {
-            let VmfPyramid { levels } =
-                environment.vmf_filtered(cache_folder, |source| vmf_pyramid(device, cache, source))?;
-            let scale = levels.radiance_scale();
-            light.pyramid = Some(DevicePyramid::new(device, "environment pyramid", levels, scale)?);
-            light.irradiance = Some(DevicePyramid::new(device, "irradiance map", environment.irradiance(), scale)?);
-            light.sources = Some(source_buffer(device, environment, light.pyramid.as_ref().map_or(1.0, |p| p.scale))?);
-        } else if shader.declares("environment_pyramid")? {
-            let pyramid = environment.box_filtered();
-            let scale = pyramid.radiance_scale();
-            light.pyramid = Some(DevicePyramid::new(device, "environment pyramid", pyramid, scale)?);
-        }
-        if shader.declares("environment_map")? {
-            check_map_size(device, environment, "scale it down, or use --method filtered")?;
-            let map = LightMap::new(environment);
-            let shape = ImageShape::plane(vk::Format::R32G32B32A32_SFLOAT, map.width as u32, map.height as u32);
-            let texels = bytemuck::cast_slice(&map.texels).to_vec();
-            light.map = Some(vulkan::Image::with_texels(device, "environment map", shape, &[texels])?);
-            if shader.declares("LightAliases")? {
-                let (aliases, storage) = (map.aliases(), vk::BufferUsageFlags::STORAGE_BUFFER);
-                let aliases = bytemuck::cast_slice(&aliases);
-                light.aliases = Some(Buffer::with_contents(device, "light aliases", storage, aliases)?);
-            }
-        }
-        Ok(light)
-    }
-}
-
-impl DevicePyramid {
-    /// Uploads `pyramid`, as half floats of radiance over `scale` where they hold it.
-    pub(super) fn new(device: &Arc<Device>, name: &str, pyramid: &Pyramid, scale: f32) -> Result<Self> {
-        let single = vk::Format::R32G32B32A32_SFLOAT;
-        let use_single = !pyramid.fits_half() && device.filters_linearly(single);
-        let level = |level| -> Vec<u8> {
-            if use_single {
-                bytemuck::cast_slice(&pyramid.texels_rgba32f(level, scale)).to_vec()
-            } else {
-                bytemuck::cast_slice(&pyramid.texels_rgba16f(level, scale)).to_vec()
-            }
-        };
-        let levels: Vec<_> = (0..pyramid.levels.len()).map(level).collect();
-        let face_size = pyramid.face_size as u32;
-        let shape = ImageShape {
-            format: if use_single { single } else { vk::Format::R16G16B16A16_SFLOAT },
-            extent: [face_size, face_size, 1],
-            levels: levels.len() as u32,
-            kind: ImageKind::Cube,
-        };
-        Ok(Self {
-            image: vulkan::Image::with_texels(device, name, shape, &levels)?,
-            sampler: Sampler::new(device, name, SamplerKind::Trilinear)?,
-            face_size,
-            scale,
-        })
-    }
-}
-
 /// How a method samples: nothing that would need another shader.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Sampling {
@@ -384,22 +271,8 @@ pub fn shade<'a>(
             .sampled("brdf_tables", &materials.tables, &materials.table_sampler)
             .buffer("all_lookups", resources.buffer(lookups));
         // The rest as the method declares it.
-        if let Some(pyramid) = &light.pyramid {
-            bindings = bindings.sampled("environment_pyramid", &pyramid.image, &pyramid.sampler);
-        }
-        if let Some(map) = &light.irradiance {
-            bindings = bindings.sampled("irradiance_map", &map.image, &map.sampler);
-        }
-        if let Some(map) = &light.map {
-            bindings = bindings.image("environment_map", map);
-        }
-        let buffers = [
-            ("LightAliases", &light.aliases),
-            ("Sources", &light.sources),
-            ("Threads", &materials.threads),
-            ("Slices", &materials.slices),
-        ];
-        for (name, buffer) in buffers {
+        bindings = light.bind(bindings);
+        for (name, buffer) in [("Threads", &materials.threads), ("Slices", &materials.slices)] {
             if let Some(buffer) = buffer {
                 bindings = bindings.buffer(name, buffer);
             }
@@ -409,9 +282,9 @@ pub fn shade<'a>(
                 camera: view.camera_rays(),
                 size_px: [view.width, view.height],
                 kind,
-                face_size: light.pyramid.as_ref().map_or(0.0, |pyramid| pyramid.face_size as f32),
+                face_size: light.face_size(),
                 rotation: view.rotation(),
-                radiance_scale: light.intensity * light.pyramid.as_ref().map_or(1.0, |pyramid| pyramid.scale),
+                radiance_scale: light.radiance_scale(),
                 sample_count: sampling.count,
                 seed: [sampling.seed as u32, (sampling.seed >> 32) as u32],
             };

@@ -1,11 +1,11 @@
 //! Fitted threads. Twin of glsl/methods/fitted.glsl, by functions of the same names.
-use std::f32::consts::{FRAC_1_PI, FRAC_PI_2, SQRT_2, TAU};
+use std::f32::consts::{FRAC_PI_2, PI};
 
-use glam::{Mat3, Vec3};
+use glam::{DVec3, IVec2, Vec3};
 
-use super::{Point, any_tangent};
-use crate::brdf::half_vector_width;
-use crate::environment::Source;
+use super::{BlurredLight, Point, Surface};
+use crate::environment::sources::{CLEAR, clearance};
+use crate::environment::{LightMap, Source};
 use crate::threads::Threads;
 use crate::threads::fitted::kernel::FINEST_WIDTH_RAD;
 
@@ -14,50 +14,107 @@ fn finest_level(face_size: usize) -> f32 {
     (1024.0 / face_size as f32).log2()
 }
 
+/// Twin of `variance_of_level` in glsl/vmf_pyramid.glsl.
+fn variance_of_level(level: f32) -> f32 {
+    let whole = level.floor();
+    if level < 0.0 { level + 1.0 } else { (2.0 * whole).exp2() * (1.0 + 3.0 * (level - whole)) }
+}
+
+/// Twin of `level_of_variance` in glsl/vmf_pyramid.glsl.
+fn level_of_variance(variance: f32) -> f32 {
+    if variance < 1.0 {
+        return variance - 1.0;
+    }
+    let whole = (0.5 * variance.log2()).floor();
+    whole + (variance * (-2.0 * whole).exp2() - 1.0) / 3.0
+}
+
 /// Twin of `level_within_pixel` in glsl/vmf_pyramid.glsl.
 fn level_within_pixel(level: f32, normal_variance: f32) -> f32 {
-    let width = FINEST_WIDTH_RAD as f32 * level.exp2();
-    level + 0.5 * (1.0 + 4.0 * normal_variance / (width * width)).log2()
+    let added = 4.0 * normal_variance / (FINEST_WIDTH_RAD * FINEST_WIDTH_RAD) as f32;
+    if added > 0.0 { level_of_variance(variance_of_level(level) + added) } else { level }
 }
 
-/// Twin of `vmf`.
-fn vmf(away: f32, kappa: f32) -> f32 {
-    kappa / (TAU * (1.0 - (-2.0 * kappa).exp())) * (-kappa * away).exp()
+/// Twin of `sharp_radiance` in glsl/vmf_pyramid.glsl.
+fn sharp_radiance(map: &LightMap, direction: Vec3, sources: f32) -> Vec3 {
+    let mut sum = Vec3::ZERO;
+    for (weight, texel) in map.corners(direction) {
+        sum += weight * if texel.w > 0.0 { sources } else { 1.0 } * texel.truncate();
+    }
+    sum
 }
 
-/// Twin of `blurred_kappa`.
-fn blurred_kappa(level: f32, source_width: f32) -> f32 {
-    let width = FINEST_WIDTH_RAD as f32 * level.exp2();
-    1.0 / (width * width + source_width * source_width)
+/// Twin of `blurred_radiance` in glsl/vmf_pyramid.glsl.
+fn blurred_radiance(light: &BlurredLight, direction: Vec3, level: f32, sources: f32) -> Vec3 {
+    let finest = finest_level(light.rest.levels.face_size);
+    let sharp = if level < finest { 1.0 - variance_of_level(level) / variance_of_level(finest) } else { 0.0 };
+    let mut radiance = Vec3::ZERO;
+    if sharp < 1.0 {
+        let pyramid_level = (level - finest).max(0.0);
+        radiance = (1.0 - sharp) * light.rest.levels.lookup(direction, pyramid_level);
+        if let Some(pyramid) = light.sources.filter(|_| sources > 0.0) {
+            radiance += (1.0 - sharp) * sources * pyramid.levels.lookup(direction, pyramid_level);
+        }
+    }
+    if sharp > 0.0 {
+        radiance += sharp * sharp_radiance(&light.map, direction, sources);
+    }
+    radiance
 }
 
-/// Twin of `kernel_at`.
-fn kernel_at(direction: Vec3, level: f32, to_source: Vec3, source_width: f32) -> f32 {
-    let away = 0.5 * (direction - to_source).length_squared();
-    let whole = level.floor();
-    let finer = vmf(away, blurred_kappa(whole, source_width));
-    let coarser = vmf(away, blurred_kappa(whole + 1.0, source_width));
-    finer + (level - whole) * (coarser - finer)
-}
-
-/// f cos and cos at a source. Twin of `at_source`.
-fn at_source(point: &Point, to_source: Vec3, source_width: f32, w_o: Vec3) -> (Vec3, f32) {
-    let x = any_tangent(to_source);
-    let y = to_source.cross(x);
-    let side = |offset: Vec3| {
-        let w_i = (to_source + SQRT_2 * source_width * offset).normalize();
-        if w_i.z > 0.0 { (point.brdf(w_i, w_o) * w_i.z, w_i.z) } else { (Vec3::ZERO, 0.0) }
-    };
-    let add = |sum: (Vec3, f32), side: (Vec3, f32)| (sum.0 + 0.25 * side.0, sum.1 + 0.25 * side.1);
-    [x, y, -x, -y].map(side).into_iter().fold((Vec3::ZERO, 0.0), add)
-}
-
-/// Twin of `replaced`.
-fn replaced(lobe_width: f32, to_source: Vec3, source_width: f32, w_o: Vec3) -> f32 {
-    let mirror = Vec3::new(-w_o.x, -w_o.y, w_o.z);
-    let lobe = 2.6 * lobe_width;
-    let x = (((to_source.distance(mirror) + 4.0 * lobe) / (2.0 * source_width) - 1.5) / 1.5).clamp(0.0, 1.0);
+fn smoothstep([from, to]: [f32; 2], x: f32) -> f32 {
+    let x = ((x - from) / (to - from)).clamp(0.0, 1.0);
     x * x * (3.0 - 2.0 * x)
+}
+
+/// Twin of `share_of_brdf`.
+fn share_of_brdf(lobe_width: f32, sources: &[Source], mirror: Vec3, least_width: f32) -> f32 {
+    let share = |source: &Source| {
+        let away = source.direction.as_vec3().distance(mirror);
+        smoothstep(CLEAR, clearance(away, (source.width_rad() as f32).max(least_width), lobe_width))
+    };
+    sources.iter().map(share).fold(1.0, f32::min)
+}
+
+/// Twin of `mirrored`.
+fn mirrored(surface: &Surface, w_o: Vec3) -> Vec3 {
+    surface.frame * Vec3::new(-w_o.x, -w_o.y, w_o.z)
+}
+
+/// Twin of `needs_subpixels`.
+pub(super) fn needs_subpixels(point: &Point) -> bool {
+    let Some(light) = &point.twin.blurred else { return false };
+    let blur = 2.0 * point.surface.normal_variance.sqrt();
+    let mirror = mirrored(&point.surface, point.surface.view_direction());
+    share_of_brdf(point.lobe_width(), light.source_list, mirror, blur) < 1.0
+}
+
+/// Twin of `at_sources`: powers of all sources times f cos, and times cos.
+fn at_sources(point: &Point, sources: &[Source], w_o: Vec3, mirror: Vec3) -> (Vec3, Vec3) {
+    let (mut f_cos, mut cosine) = (Vec3::ZERO, Vec3::ZERO);
+    for source in sources {
+        let away = source.direction.as_vec3().distance(mirror);
+        let from_afar = clearance(away, source.width_rad() as f32, point.lobe_width()) > 16.0;
+        let side = if from_afar { 1 } else { 3 };
+        for i in 0..side * side {
+            let place = IVec2::new(i % side, i / side) - side / 2;
+            let at = (3.0 * 0.6_f32).sqrt() * place.as_vec2();
+            let weight = |place: i32| match (side, place) {
+                (1, _) => 1.0,
+                (_, 0) => 4.0 / 9.0,
+                _ => 2.5 / 9.0,
+            };
+            let [x, y] = source.axes.map(DVec3::as_vec3);
+            let towards = source.direction.as_vec3() + at.x * x + at.y * y;
+            let w_i = (point.surface.frame.transpose() * towards).normalize();
+            if w_i.z > 0.0 {
+                let power = weight(place.x) * weight(place.y) * w_i.z * source.power.as_vec3();
+                f_cos += power * point.brdf(w_i, w_o);
+                cosine += power;
+            }
+        }
+    }
+    (f_cos, cosine)
 }
 
 /// Twin of `estimate`.
@@ -67,37 +124,27 @@ fn replaced(lobe_width: f32, to_source: Vec3, source_width: f32, w_o: Vec3) -> f
 pub(super) fn estimate(point: &Point) -> Vec3 {
     let Some(Threads::Fitted(threads)) = &point.material().threads else { panic!("fitted threads are there") };
     let surface = &point.surface;
-    let pyramid = point.twin.vmf_pyramid.expect("the method declares the pyramid");
-    let irradiance = point.twin.irradiance.expect("the method declares the map");
+    let light = point.twin.blurred.as_ref().expect("the method declares the pyramid");
     let row = (surface.theta_o * (threads.rows as f32 / FRAC_PI_2)).min((threads.rows - 1) as f32);
     let (below, t) = (row as usize, row.fract());
     let above = (below + 1).min(threads.rows - 1);
     let [a, b] = [below, above].map(|row| Vec3::from(threads.cosine_part[row]));
     let cosine_part = a.lerp(b, t);
-    let w_o = surface.view_direction();
-    let lobe_width = half_vector_width(&point.material().brdf) as f32;
-    let to_frame: Mat3 = surface.frame.transpose();
     let mut sum = Vec3::ZERO;
-    let mut sources = Vec::new();
-    for &Source { direction, width_rad, power } in point.twin.sources {
-        let (to_source, width, power) = (to_frame * direction.as_vec3(), width_rad as f32, power.as_vec3());
-        let part = replaced(lobe_width, to_source, width, w_o);
-        let (f_cos, cosine) = at_source(point, to_source, width, w_o);
-        let of_cosine = cosine_part * (cosine * FRAC_1_PI);
-        sum += power * of_cosine.lerp(f_cos, part);
-        sources.push((to_source, width, part * power));
+    let mut of_kernels = 0.0;
+    if !light.source_list.is_empty() {
+        let w_o = surface.view_direction();
+        let mirror = mirrored(surface, w_o);
+        of_kernels = 1.0 - share_of_brdf(point.lobe_width(), light.source_list, mirror, 0.0);
+        let (f_cos, cosine) = at_sources(point, light.source_list, w_o, mirror);
+        sum = f_cos.lerp(cosine * cosine_part / PI, of_kernels);
     }
-    let finest = finest_level(pyramid.levels.face_size);
     for k in (point.first as usize..threads.count).step_by(point.stride) {
         let [a, b] = [below, above].map(|row| threads.row(row)[k].unpack());
-        let direction = a.direction.lerp(b.direction, t).normalize();
-        let level = level_within_pixel(a.level + t * (b.level - a.level), surface.normal_variance).max(finest);
-        let mut radiance = pyramid.levels.lookup(surface.frame * direction, level - finest);
-        for &(to_source, width, power) in &sources {
-            radiance -= kernel_at(direction, level, to_source, width) * power;
-        }
-        sum += a.weight.lerp(b.weight, t) * radiance;
+        let direction = surface.frame * a.direction.lerp(b.direction, t).normalize();
+        let level = level_within_pixel(a.level + t * (b.level - a.level), surface.normal_variance);
+        sum += a.weight.lerp(b.weight, t) * blurred_radiance(light, direction, level, of_kernels);
     }
-    sum += cosine_part * irradiance.lookup(surface.frame.z_axis, 0.0);
+    sum += cosine_part * light.irradiance.lookup(surface.frame.z_axis, 0.0);
     sum.max(Vec3::ZERO)
 }

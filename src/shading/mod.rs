@@ -3,7 +3,8 @@
 //! It starts from the texels of the geometry cache, so that the two can be compared pixel by pixel. BRDFs are evaluated
 //! in double precision; everything else follows the shader line by line.
 use crate::Result;
-use crate::environment::{Alias, LightMap, Pyramid, Source, VmfPyramid};
+use crate::brdf::half_vector_width;
+use crate::environment::{Alias, Environment, LightMap, Pyramid, Source, VmfPyramid};
 use crate::method::Method;
 use crate::packing::{octahedral_decode, unpack_snorm_2x16};
 use crate::passes::SMOOTH_DEG;
@@ -98,14 +99,35 @@ const SHARED_VARIANCE: f32 = 1e-4;
 pub struct Twin<'a> {
     prepared: &'a Prepared,
     pyramid: Option<&'a Pyramid>,
-    vmf_pyramid: Option<&'a VmfPyramid>,
-    /// Where the method corrects its answer to them.
-    sources: &'a [Source],
-    irradiance: Option<&'a Pyramid>,
+    blurred: Option<BlurredLight<'a>>,
     map: Option<LightMap>,
     aliases: Vec<Alias>,
     /// One for each material, for methods that draw by them.
     slices: Vec<SliceTable>,
+    /// `half_vector_width` of each material.
+    lobe_widths: Vec<f32>,
+}
+
+/// What fitted threads look up.
+struct BlurredLight<'a> {
+    rest: &'a VmfPyramid,
+    sources: Option<&'a VmfPyramid>,
+    source_list: &'a [Source],
+    irradiance: &'a Pyramid,
+    map: LightMap,
+}
+
+impl<'a> BlurredLight<'a> {
+    fn new(environment: &'a Environment) -> Result<Self> {
+        let blurred = |part: &'a Environment| part.vmf_filtered(None, |source| Ok(VmfPyramid::new(source)));
+        Ok(Self {
+            rest: blurred(environment.rest())?,
+            sources: environment.sources_alone().map(blurred).transpose()?,
+            source_list: &environment.small_sources().list,
+            irradiance: environment.rest().irradiance(),
+            map: LightMap::with_sources_marked(environment),
+        })
+    }
 }
 
 impl<'a> Twin<'a> {
@@ -116,21 +138,18 @@ impl<'a> Twin<'a> {
     pub fn new(prepared: &'a Prepared) -> Result<Self> {
         let shader = prepared.method.shader()?;
         let environment = &prepared.environment;
-        let blurred = shader.declares("irradiance_map")?;
-        let vmf_pyramid =
-            blurred.then(|| environment.vmf_filtered(None, |source| Ok(VmfPyramid::new(source)))).transpose()?;
-        let pyramid = (shader.declares("environment_pyramid")? && !blurred).then(|| environment.box_filtered());
-        let map = shader.declares("environment_map")?.then(|| LightMap::new(environment));
+        let is_blurred = shader.declares("irradiance_map")?;
+        let pyramid = (shader.declares("environment_pyramid")? && !is_blurred).then(|| environment.box_filtered());
+        let map = (shader.declares("environment_map")? && !is_blurred).then(|| LightMap::new(environment));
         let aliases = map.as_ref().filter(|_| shader.declares("LightAliases").unwrap_or(false));
         let mut twin = Self {
             prepared,
             pyramid,
-            vmf_pyramid,
-            irradiance: blurred.then(|| environment.irradiance()),
-            sources: if blurred { &environment.small_sources().list } else { &[] },
+            blurred: is_blurred.then(|| BlurredLight::new(environment)).transpose()?,
             aliases: aliases.map(LightMap::aliases).unwrap_or_default(),
             map,
             slices: vec![],
+            lobe_widths: prepared.materials.iter().map(|material| half_vector_width(&material.brdf) as f32).collect(),
         };
         if shader.declares("Slices")? {
             twin.slices = prepared.materials.iter().map(|material| SliceTable::new(&material.brdf)).collect();
@@ -150,33 +169,34 @@ impl<'a> Twin<'a> {
         let normals = normal_sum(texels);
         let normal_variance = if interior { (1.0 - normals.length() / texels.len() as f32).max(0.0) } else { 0.0 };
         let may_share = self.prepared.method.shares_surface();
-        let shares_surface = interior && may_share && normal_variance < SHARED_VARIANCE;
-        let partitioned = interior && !may_share;
-        let normal_variance = if shares_surface || partitioned { normal_variance } else { 0.0 };
-        let surface_at = |position: Vec2, normal: Vec3| {
+        let surface_at = |position: Vec2, normal: Vec3, normal_variance: f32| {
             let w_o = -rays.ray(position).normalize();
             Surface { normal_variance, ..Surface::new(to_environment(normal), to_environment(w_o)) }
         };
+        let axis = to_environment(rays.right());
+        let first_texel = texels.first().copied().and_then(unpack_geometry);
+        let middle = (interior && may_share && normal_variance < SHARED_VARIANCE).then_some(first_texel).flatten();
+        let middle = middle.map(|(_, material)| {
+            let position = (pixel.as_vec2() + 0.5) / UVec2::new(view.width, view.height).as_vec2();
+            let surface = surface_at(position, normals.normalize(), normal_variance);
+            Point { twin: self, surface, axis, material, subpixel: pixel * view.subpixels, first: 0, stride: 1 }
+        });
+        if let Some(middle) = middle.filter(|middle| !fitted::needs_subpixels(middle)) {
+            return (middle.estimate() * self.prepared.intensity as f32).extend(1.0);
+        }
+        let partitioned = interior && !may_share;
+        let normal_variance = if partitioned { normal_variance } else { 0.0 };
         let mut sum = Vec3::ZERO;
         let mut covered = 0;
         for (j, texel) in texels.iter().enumerate() {
             let Some((normal, material)) = unpack_geometry(*texel) else { continue };
             covered += 1;
             let subpixel = pixel * view.subpixels + UVec2::new(j as u32 % view.subpixels, j as u32 / view.subpixels);
-            let axis = to_environment(rays.right());
-            if shares_surface {
-                if j == 0 {
-                    let position = (pixel.as_vec2() + 0.5) / UVec2::new(view.width, view.height).as_vec2();
-                    let surface = surface_at(position, normals.normalize());
-                    sum = Point { twin: self, surface, axis, material, subpixel, first: 0, stride: 1 }.estimate();
-                }
-                continue;
-            }
-            let surface = surface_at((subpixel.as_vec2() + 0.5) / size.as_vec2(), normal);
+            let surface = surface_at((subpixel.as_vec2() + 0.5) / size.as_vec2(), normal, normal_variance);
             let (first, stride) = if partitioned { (j as u32, texels.len()) } else { (0, 1) };
             sum += Point { twin: self, surface, axis, material, subpixel, first, stride }.estimate();
         }
-        if !shares_surface && !partitioned {
+        if !partitioned {
             sum /= texels.len() as f32;
         }
         (sum * self.prepared.intensity as f32).extend(covered as f32 / texels.len() as f32)
@@ -214,6 +234,10 @@ impl Point<'_> {
 
     fn material(&self) -> &PreparedMaterial {
         &self.twin.prepared.materials[self.material]
+    }
+
+    fn lobe_width(&self) -> f32 {
+        self.twin.lobe_widths[self.material]
     }
 
     fn sample_count(&self) -> u32 {

@@ -21,21 +21,21 @@
 //!
 //! The words of a fitted thread: its direction, octahedral, x and y as 16-bit signed normalised numbers, x in the low half; level and
 //! red weight as half floats, level in the low half; green and blue weight as half floats, green in the low half. The level says
-//! by which von Mises-Fisher kernel the environment is to be blurred: of width 2^level / 256 radians if it is whole, and
-//! otherwise by the linear blend of the two kernels of whole levels beside it.
+//! by which von Mises-Fisher kernel the environment is to be blurred: of width 2^level / 256 radians if it is whole, by none at
+//! level -1, and otherwise by the linear blend of the two kernels of whole levels beside it.
 use std::f32::consts::FRAC_PI_2;
 use std::io::Write;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::fitted::kernel::WIDEST_LEVEL;
+use super::fitted::kernel::{SHARPEST_LEVEL, WIDEST_LEVEL};
 use super::fitted::{FittedTable, PackedKernel, UnpackedKernel};
 use super::{Kind, Sample, ThreadTable, Threads};
 use crate::error::{Error, Result};
 
 /// Version of the file format and of the threads in it: to be raised when either changes, since caches depend on it.
-pub const FORMAT_VERSION: u32 = 4;
+pub const FORMAT_VERSION: u32 = 5;
 
 const MAGIC: &[u8; 8] = b"THREADS\0";
 const DIGEST_BYTES: usize = blake3::OUT_LEN;
@@ -145,7 +145,9 @@ fn fitted_threads(of_rows: &[u32], of_threads: &[u32]) -> Result<FittedTable, St
     }
     let is_usable = |kernel: &PackedKernel| {
         let UnpackedKernel { level, weight, .. } = kernel.unpack();
-        (0.0..=WIDEST_LEVEL as f32).contains(&level) && weight.min_element() >= 0.0 && weight.is_finite()
+        (SHARPEST_LEVEL as f32..=WIDEST_LEVEL as f32).contains(&level)
+            && weight.min_element() >= 0.0
+            && weight.is_finite()
     };
     if !kernels.iter().all(is_usable) {
         return Err("holds a thread whose level or weight is none".into());

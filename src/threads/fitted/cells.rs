@@ -1,7 +1,7 @@
 //! Where a fit starts: the slice's mass divided into cells, and each cell's moments.
 use glam::DVec3;
 
-use super::kernel::{FINEST_WIDTH_RAD, WIDEST_LEVEL};
+use super::kernel::{FINEST_WIDTH_RAD, SHARPEST_LEVEL, WIDEST_LEVEL};
 use super::solve::Kernel;
 use crate::threads::slice::Slice;
 
@@ -34,7 +34,7 @@ pub fn cells(slice: &Slice, count: usize) -> Vec<Kernel> {
                 let mean = sum / number.max(1) as f64;
                 // For a narrow kernel the length of the mean is 1 - sigma^2.
                 let variance = (1.0 - mean.length()).max(0.0);
-                let level = (variance.sqrt() / FINEST_WIDTH_RAD).max(1.0).log2().min(WIDEST_LEVEL);
+                let level = (variance.sqrt() / FINEST_WIDTH_RAD).log2().clamp(SHARPEST_LEVEL, WIDEST_LEVEL);
                 let direction = mean.try_normalize().unwrap_or(*centre);
                 Kernel { direction, level, weight: mass }
             })

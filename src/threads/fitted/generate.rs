@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use glam::{DVec3, dvec3};
 
 use super::cells::cells;
-use super::kernel::FINEST_WIDTH_RAD;
+use super::kernel::scale_rad;
 use super::lights::TestLights;
 use super::solve::{Effort, Fit, Kernel};
 use super::table::FittedTable;
@@ -87,7 +87,7 @@ fn carried(kernels: &[Kernel], from: f64, to: f64) -> Vec<Kernel> {
     let carry = |kernel: &Kernel| {
         let h = (kernel.direction + w_from).normalize();
         let mirrored = (2.0 * w_to.dot(h) * h - w_to).normalize();
-        let width = FINEST_WIDTH_RAD * kernel.level.exp2();
+        let width = scale_rad(kernel.level);
         let follows = width < FOLLOWS_BELOW_RAD && mirrored.z > -width;
         Kernel { direction: if follows { mirrored } else { kernel.direction }, ..*kernel }
     };

@@ -2,7 +2,7 @@
 //!
 //! vMF(w; d, kappa) = kappa / (2 pi (1 - exp(-2 kappa))) exp(kappa (w . d - 1)); its width is sigma = 1 / sqrt(kappa). Level l of a
 //! pyramid holds the environment convolved with the kernel of width [`FINEST_WIDTH_RAD`] 2^l, and a lookup between two levels has a
-//! linear blend of their kernels.
+//! linear blend of their kernels. Level -1 is the environment as it is.
 use std::f64::consts::PI;
 
 use glam::DVec3;
@@ -10,12 +10,22 @@ use glam::DVec3;
 /// Width of the kernel of level 0 in radians: 0.22 degrees, two texels in the middle of a face of 1024.
 pub const FINEST_WIDTH_RAD: f64 = 1.0 / 256.0;
 
+/// The sharpest level: no blur, for lobes that are mirrors.
+pub const SHARPEST_LEVEL: f64 = -1.0;
+
 /// The widest level: there the kernel has a width of one radian.
 pub const WIDEST_LEVEL: f64 = 8.0;
 
-/// kappa of the kernel of whole or fractional `level`.
+/// kappa of the kernel of a whole `level`.
 pub fn kappa_of_level(level: f64) -> f64 {
-    (FINEST_WIDTH_RAD * level.exp2()).powi(-2)
+    // For none at all a width of 0.002 degrees: far narrower than any light or pixel, and its square is no trouble to f64.
+    const SHARP_KAPPA: f64 = 1e9;
+    if level < 0.0 { SHARP_KAPPA } else { (FINEST_WIDTH_RAD * level.exp2()).powi(-2) }
+}
+
+/// A length on the scale of a kernel of `level`: its width; for those sharper than level 0, as if widths went on halving.
+pub fn scale_rad(level: f64) -> f64 {
+    FINEST_WIDTH_RAD * level.exp2()
 }
 
 /// vMF around a direction at `cos` from `w`, in 1/sr.
@@ -87,7 +97,7 @@ mod tests {
 
     #[test]
     fn overlap_is_the_integral_of_the_product() {
-        for (a, b) in [(1.0, 1.0), (4.0, 100.0), (300.0, 200.0), (5000.0, 2.0)] {
+        for (a, b) in [(1.0, 1.0), (4.0, 100.0), (300.0, 200.0), (5000.0, 2.0), (kappa_of_level(-1.0), 300.0)] {
             for angle in [0.0f64, 0.05, 0.3, 1.0, 3.0] {
                 let d = DVec3::Z;
                 let c = DVec3::new(angle.sin(), 0.0, angle.cos());

@@ -2,7 +2,7 @@
 use glam::{DVec3, dvec3};
 use nalgebra::{Cholesky, DMatrix, DVector};
 
-use super::kernel::{FINEST_WIDTH_RAD, Pair, WIDEST_LEVEL, kappa_of_level, overlap};
+use super::kernel::{Pair, SHARPEST_LEVEL, WIDEST_LEVEL, kappa_of_level, overlap, scale_rad};
 use super::lights::{SCALES, TestLights, light_kappa};
 
 /// A thread in one row: a kernel of the environment's pyramid, and the radiance it gives under light of radiance 1.
@@ -10,7 +10,7 @@ use super::lights::{SCALES, TestLights, light_kappa};
 pub struct Kernel {
     /// Where it looks, unit, in the shading frame.
     pub direction: DVec3,
-    /// Level of the pyramid, 0 to [`WIDEST_LEVEL`]: its width.
+    /// Level of the pyramid, [`SHARPEST_LEVEL`] to [`WIDEST_LEVEL`]: its width.
     pub level: f64,
     /// Linear Rec. 709, not negative.
     pub weight: DVec3,
@@ -25,18 +25,19 @@ pub fn cosine_part(kernels: &[Kernel], albedo: DVec3) -> DVec3 {
 fn pairs() -> &'static [[Pair; SCALES]] {
     static PAIRS: std::sync::OnceLock<Vec<[Pair; SCALES]>> = std::sync::OnceLock::new();
     PAIRS.get_or_init(|| {
-        let levels = 0..=WIDEST_LEVEL as usize;
+        let levels = SHARPEST_LEVEL as i32..=WIDEST_LEVEL as i32;
         levels
-            .map(|level| std::array::from_fn(|scale| Pair::new(kappa_of_level(level as f64), light_kappa(scale))))
+            .map(|level| std::array::from_fn(|scale| Pair::new(kappa_of_level(level.into()), light_kappa(scale))))
             .collect()
     })
 }
 
 /// How a kernel answers a light, and the derivatives by the cosine between them and by the level.
 fn answer(direction: DVec3, level: f64, light: DVec3, scale: usize) -> (f64, f64, f64) {
-    let finer = (level as usize).min(WIDEST_LEVEL as usize - 1);
-    let t = level - finer as f64;
+    let from_sharpest = level - SHARPEST_LEVEL;
     let pairs = pairs();
+    let finer = (from_sharpest as usize).min(pairs.len() - 2);
+    let t = from_sharpest - finer as f64;
     let cos = direction.dot(light);
     let (a, a_cos) = overlap(cos, &pairs[finer][scale]);
     let (b, b_cos) = overlap(cos, &pairs[finer + 1][scale]);
@@ -100,8 +101,7 @@ impl<'a> Fit<'a> {
     fn prior_cost(&self, kernels: &[Kernel]) -> f64 {
         let Some((before, strength)) = self.prior else { return 0.0 };
         let cost = kernels.iter().zip(before).map(|(kernel, before)| {
-            let width = FINEST_WIDTH_RAD * before.level.exp2();
-            (kernel.direction - before.direction).length_squared() / (width * width)
+            (kernel.direction - before.direction).length_squared() / scale_rad(before.level).powi(2)
                 + (kernel.level - before.level).powi(2)
         });
         strength * cost.sum::<f64>()
@@ -197,10 +197,9 @@ impl<'a> Fit<'a> {
         }
         if let Some((before, strength)) = self.prior {
             for (k, (kernel, before)) in kernels.iter().zip(before).enumerate() {
-                let width = FINEST_WIDTH_RAD * before.level.exp2();
                 let (x, y) = kernel.direction.any_orthonormal_pair();
                 let away = kernel.direction - before.direction;
-                let scale = strength / (width * width);
+                let scale = strength / scale_rad(before.level).powi(2);
                 for (p, (gradient_part, scale)) in [
                     (x.dot(away) * scale, scale),
                     (y.dot(away) * scale, scale),
@@ -226,9 +225,8 @@ fn step(kernels: &[Kernel], hessian: &DMatrix<f64>, gradient: &DVector<f64>, dam
     let largest = (0..6 * m).map(|i| hessian[(i, i)]).fold(0.0, f64::max);
     let frozen = |i: usize| i < 3 * m && kernels[i % m].weight[i / m] <= 0.0 && gradient[i] > 0.0;
     let floor = |k: usize| {
-        let width = FINEST_WIDTH_RAD * kernels[k].level.exp2();
         // Kernels without weight have no gradient in direction and level: they stay where they are.
-        1e-10 * largest / (width * width)
+        1e-10 * largest / scale_rad(kernels[k].level).powi(2)
     };
     for i in 0..6 * m {
         matrix[(i, i)] += damping * hessian[(i, i)] + if i < 3 * m { 1e-12 * largest } else { floor((i - 3 * m) / 3) };
@@ -249,14 +247,14 @@ fn step(kernels: &[Kernel], hessian: &DMatrix<f64>, gradient: &DVector<f64>, dam
         .map(|(k, kernel)| {
             let (x, y) = kernel.direction.any_orthonormal_pair();
             let at = 3 * m + 3 * k;
-            let width = FINEST_WIDTH_RAD * kernel.level.exp2();
+            let width = scale_rad(kernel.level);
             // The model of a kernel's answer is linear over about its own width.
             let limit = |value: f64, most: f64| value.clamp(-most, most);
             let tangent = limit(change[at], 2.0 * width) * x + limit(change[at + 1], 2.0 * width) * y;
             let weight = dvec3(change[k], change[m + k], change[2 * m + k]);
             Kernel {
                 direction: (kernel.direction + tangent).normalize(),
-                level: (kernel.level + limit(change[at + 2], 1.0)).clamp(0.0, WIDEST_LEVEL),
+                level: (kernel.level + limit(change[at + 2], 1.0)).clamp(SHARPEST_LEVEL, WIDEST_LEVEL),
                 weight: (kernel.weight + weight).max(DVec3::ZERO),
             }
         })

@@ -15,7 +15,7 @@ pub struct PackedKernel(pub [u32; 3]);
 pub struct UnpackedKernel {
     /// Where it looks, unit, in the shading frame.
     pub direction: Vec3,
-    /// Its width: [`super::kernel::FINEST_WIDTH_RAD`] 2^level.
+    /// Its width: see [`super::kernel`].
     pub level: f32,
     /// Linear Rec. 709.
     pub weight: Vec3,
@@ -63,6 +63,11 @@ impl FittedTable {
     /// The kernels of `row`, one per thread.
     pub fn row(&self, row: usize) -> &[PackedKernel] {
         &self.kernels[row * self.count..][..self.count]
+    }
+
+    /// The level of the sharpest kernel.
+    pub fn sharpest_level(&self) -> f32 {
+        self.kernels.iter().map(|kernel| kernel.unpack().level).fold(f32::INFINITY, f32::min)
     }
 
     /// Packs rows of kernels, with the albedo and the relative error of each.

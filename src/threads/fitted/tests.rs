@@ -3,7 +3,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use glam::DVec3;
 
-use super::kernel::WIDEST_LEVEL;
+use super::kernel::{SHARPEST_LEVEL, WIDEST_LEVEL};
 use super::solve::Kernel;
 use super::{FittedTable, MAX_COUNT, PackedKernel, generate};
 use crate::brdf::Brdf;
@@ -25,7 +25,7 @@ fn check(name: &str, table: &FittedTable) {
     for packed in &table.kernels {
         let kernel = packed.unpack();
         assert!((kernel.direction.length() - 1.0).abs() < 1e-6, "{name}: {kernel:?}");
-        assert!((0.0..=WIDEST_LEVEL as f32).contains(&kernel.level), "{name}: {kernel:?}");
+        assert!((SHARPEST_LEVEL as f32..=WIDEST_LEVEL as f32).contains(&kernel.level), "{name}: {kernel:?}");
         assert!(kernel.weight.is_finite() && kernel.weight.min_element() >= 0.0, "{name}: {kernel:?}");
     }
     assert!(table.cosine_part.as_flattened().iter().all(|value| value.is_finite()), "{name}");
@@ -39,7 +39,7 @@ fn packing_keeps_kernels_to_its_rounding() {
         let direction = DVec3::new((6.0 * uv.y).cos(), (6.0 * uv.y).sin(), 0.0) * (1.0 - z * z).sqrt() + z * DVec3::Z;
         let kernel = Kernel {
             direction: direction.normalize(),
-            level: WIDEST_LEVEL * uv.y,
+            level: SHARPEST_LEVEL + (WIDEST_LEVEL - SHARPEST_LEVEL) * uv.y,
             weight: DVec3::new(uv.x, 1e-3 * uv.y, i as f64),
         };
         let unpacked = PackedKernel::new(&kernel).unpack();
@@ -48,7 +48,7 @@ fn packing_keeps_kernels_to_its_rounding() {
         // Half floats have eleven bits; numbers below 6e-5 are whole multiples of 6e-8.
         let error = (unpacked.weight.as_dvec3() - kernel.weight).abs();
         assert!(error.cmple(kernel.weight / 2048.0 + 3e-8).all(), "{kernel:?} {unpacked:?}");
-        assert!((f64::from(unpacked.level) - kernel.level).abs() <= kernel.level / 2048.0 + 3e-8);
+        assert!((f64::from(unpacked.level) - kernel.level).abs() <= kernel.level.abs() / 2048.0 + 3e-8);
         let again = Kernel {
             direction: unpacked.direction.as_dvec3(),
             level: unpacked.level.into(),
