@@ -48,6 +48,8 @@ pub mod prepare;
 pub mod scene;
 pub mod shading;
 pub mod threads;
+#[cfg(feature = "viewer")]
+pub mod view;
 #[allow(unsafe_code)]
 pub mod vulkan;
 

@@ -104,7 +104,7 @@ impl Renderer {
         let Prepared { view, intensity, environment, .. } = prepared;
         let cache = PipelineCache::new(device, cache_folder)?;
         let geometry_cache = upload_geometry(device, &cache, prepared)?;
-        let brdfs = prepared.materials.iter().map(|material| (&material.brdf, material.threads.as_ref()));
+        let brdfs = prepared.materials.iter().map(|material| (&material.brdf, material.threads.as_deref()));
         let materials = DeviceMaterials::new(device, method, brdfs)?;
         let light = DeviceLight::new(device, &cache, cache_folder, method, environment, *intensity)?;
         Ok(Self {

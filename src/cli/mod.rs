@@ -13,8 +13,6 @@ use clap::{Parser, Subcommand};
 use std::io::IsTerminal;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
-use threadlight::brdf::Brdf;
-use threadlight::scene::MaterialSource;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -85,18 +83,6 @@ pub fn start_logging(verbose: u8) {
         .without_time()
         .with_target(false)
         .init();
-}
-
-/// The material that `text` names: built in, or a file (`./name` for one that is called like a built-in). A name that is
-/// neither, and looks like no file, is an unknown built-in rather than a missing file.
-fn material_of(text: &str) -> MaterialSource {
-    let path = PathBuf::from(text);
-    let is_builtin = Brdf::builtin_names().any(|name| name == text);
-    if !is_builtin && (path.extension().is_some() || path.exists()) {
-        MaterialSource::File(path)
-    } else {
-        MaterialSource::Builtin(text.to_owned())
-    }
 }
 
 /// The folder that threads, blurred environments and pipelines are cached in; none with `--no-cache`.

@@ -1,6 +1,6 @@
 //! `threadlight render`: a picture of a scene.
 use super::progress::Progress;
-use super::{cache_folder, material_of, number};
+use super::{cache_folder, number};
 use anyhow::Context;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::value_parser;
@@ -12,8 +12,7 @@ use threadlight::output::{self, ExrHeader, Format};
 use threadlight::pipeline::{Renderer, Rendering, Wanted};
 use threadlight::prepare::{Prepared, prepare};
 use threadlight::scene::{
-    Background, EXPOSURE, GAMMA, MAX_SAMPLES, MAX_SIZE_PX, MAX_SUBPIXELS, MaterialSettings, ObjectSettings, Scene,
-    Source, mesh,
+    Background, EXPOSURE, GAMMA, MAX_SAMPLES, MAX_SIZE_PX, MAX_SUBPIXELS, MaterialSource, Scene, Source, mesh,
 };
 use threadlight::threads::CacheState;
 use threadlight::vulkan::{Device, Instance};
@@ -242,13 +241,10 @@ impl Render {
             None => Scene::default(),
         };
         if let Some(material) = &self.material {
-            scene.materials = vec![MaterialSettings { name: material.clone(), source: material_of(material) }];
-            scene.objects.iter_mut().for_each(|object| object.material.clone_from(material));
+            scene.use_material(material, MaterialSource::named(material));
         }
         if let Some(mesh) = &self.mesh {
-            let mesh = Source::named(mesh, mesh::builtin_names());
-            let material = scene.objects.first().map(|object| object.material.clone()).unwrap_or_default();
-            scene.objects = vec![ObjectSettings::new(mesh, &material)];
+            scene.use_mesh(Source::named(mesh, mesh::builtin_names()));
         }
         if let Some(name) = &self.environment {
             scene.environment.source = Source::named(name, environment::builtin_names());

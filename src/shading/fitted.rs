@@ -65,7 +65,9 @@ fn replaced(lobe_width: f32, to_source: Vec3, source_width: f32, w_o: Vec3) -> f
 /// # Panics
 /// A scene prepared for another method has other threads.
 pub(super) fn estimate(point: &Point) -> Vec3 {
-    let Some(Threads::Fitted(threads)) = &point.material().threads else { panic!("fitted threads are there") };
+    let Some(Threads::Fitted(threads)) = point.material().threads.as_deref() else {
+        panic!("fitted threads are there")
+    };
     let surface = &point.surface;
     let pyramid = point.twin.vmf_pyramid.expect("the method declares the pyramid");
     let irradiance = point.twin.irradiance.expect("the method declares the map");

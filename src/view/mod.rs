@@ -1,0 +1,13 @@
+//! The interactive viewer (feature `viewer`).
+//!
+//! | what | module | |
+//! |---|---|---|
+//! | what the user does, as data | [`input`] | pure |
+//! | the camera's orbit | [`orbit`] | pure |
+//! | the scene being edited, and what a change asks for | [`session`] | pure |
+//! | loading and making in the background | [`jobs`] | threads |
+
+pub mod input;
+pub mod jobs;
+pub mod orbit;
+pub mod session;
