@@ -1,5 +1,5 @@
 //! Puts the environment behind the surface.
-use super::{CameraRays, FrameGraph, View, tiles_of};
+use super::{CameraRays, FrameGraph, Identity, View, tiles_of};
 use crate::Result;
 use crate::environment::Environment;
 use crate::graph::{Access, Image};
@@ -17,6 +17,7 @@ pub struct Background {
     map: vulkan::Image,
     sampler: Sampler,
     radiance_scale: f32,
+    identity: Identity,
 }
 
 #[repr(C)]
@@ -46,6 +47,7 @@ impl Background {
             map: vulkan::Image::with_texels(device, "environment map", shape, &[bytes])?,
             sampler: Sampler::new(device, "environment map", SamplerKind::WrappedLinear)?,
             radiance_scale: intensity as f32,
+            identity: Identity::new(),
         })
     }
 }
@@ -70,16 +72,17 @@ pub fn background<'a>(
 ) -> Image {
     let mut pass = graph.pass("background");
     let radiance = pass.modify(radiance, Access::StorageWriteCompute);
+    let push = Push {
+        camera: view.camera_rays(),
+        size_px: [view.width, view.height],
+        rotation: view.rotation(),
+        radiance_scale: background.radiance_scale,
+    };
+    pass.depends_on(&background.identity).depends_on(&bytemuck::bytes_of(&push));
     pass.record(Box::new(move |commands, resources| {
-        let Background { pipeline, map, sampler, radiance_scale } = background;
+        let Background { pipeline, map, sampler, .. } = background;
         let bindings =
             Bindings::new().image("radiance", resources.image(radiance)).sampled("environment_map", map, sampler);
-        let push = Push {
-            camera: view.camera_rays(),
-            size_px: [view.width, view.height],
-            rotation: view.rotation(),
-            radiance_scale: *radiance_scale,
-        };
         commands.dispatch(pipeline, &bindings, bytemuck::bytes_of(&push), Groups::Direct(tiles_of(view)))
     }));
     radiance

@@ -1,6 +1,6 @@
 //! Pass 2 of the paper (section 4.2): the radiance of every listed pixel, by its partition of the sample threads.
 use super::background::check_map_size;
-use super::{CameraRays, Counters, FrameGraph, Tiles, View, clear, vmf_pyramid};
+use super::{CameraRays, Counters, FrameGraph, Identity, Tiles, View, clear, vmf_pyramid};
 use crate::brdf::{Brdf, half_vector_width};
 use crate::environment::{Environment, LightMap, Pyramid, Source, VmfPyramid};
 use crate::graph::{self, Access, BufferDesc, Image};
@@ -308,6 +308,7 @@ pub struct Shade {
     light: DeviceLight,
     /// How many threads or samples, and which random numbers.
     pub sampling: Sampling,
+    identity: Identity,
 }
 
 #[repr(C)]
@@ -339,7 +340,7 @@ impl Shade {
     ) -> Result<Self> {
         let constants = [("SUBPIXELS", subpixels), ("MODELS_USED", materials.models_used)];
         let pipeline = ComputePipeline::new(device, cache, method.shader()?, &constants)?;
-        Ok(Self { pipeline, materials, light, sampling })
+        Ok(Self { pipeline, materials, light, sampling, identity: Identity::new() })
     }
 }
 
@@ -371,8 +372,19 @@ pub fn shade<'a>(
     pass.read(pixels, Access::StorageReadCompute);
     let radiance = pass.modify(radiance, Access::StorageWriteCompute);
     let lookups = pass.modify(lookups, Access::StorageWriteCompute);
+    let Shade { pipeline, materials, light, sampling, identity } = shade;
+    let push = Push {
+        camera: view.camera_rays(),
+        size_px: [view.width, view.height],
+        kind: 0,
+        face_size: light.pyramid.as_ref().map_or(0.0, |pyramid| pyramid.face_size as f32),
+        rotation: view.rotation(),
+        radiance_scale: light.intensity * light.pyramid.as_ref().map_or(1.0, |pyramid| pyramid.scale),
+        sample_count: sampling.count,
+        seed: [sampling.seed as u32, (sampling.seed >> 32) as u32],
+    };
+    pass.depends_on(identity).depends_on(&bytemuck::bytes_of(&push));
     pass.record(Box::new(move |commands, resources| {
-        let Shade { pipeline, materials, light, sampling } = shade;
         let counters = resources.buffer(counters);
         let mut bindings = Bindings::new()
             .image("geometry", resources.image(geometry))
@@ -405,16 +417,7 @@ pub fn shade<'a>(
             }
         }
         for kind in [0, 1] {
-            let push = Push {
-                camera: view.camera_rays(),
-                size_px: [view.width, view.height],
-                kind,
-                face_size: light.pyramid.as_ref().map_or(0.0, |pyramid| pyramid.face_size as f32),
-                rotation: view.rotation(),
-                radiance_scale: light.intensity * light.pyramid.as_ref().map_or(1.0, |pyramid| pyramid.scale),
-                sample_count: sampling.count,
-                seed: [sampling.seed as u32, (sampling.seed >> 32) as u32],
-            };
+            let push = Push { kind, ..push };
             let groups = Groups::Indirect(counters, Counters::arguments_of(kind));
             commands.dispatch(pipeline, &bindings, bytemuck::bytes_of(&push), groups)?;
         }

@@ -2,7 +2,7 @@
 use super::{FrameGraph, Readbacks, texels};
 use crate::Result;
 use crate::environment::{Kernel, Pyramid, Step, VmfPyramid};
-use crate::graph::{Access, BufferDesc, Executable};
+use crate::graph::{Access, BufferDesc, Executable, Object};
 use crate::vulkan::{Bindings, Buffer, ComputePipeline, Device, Frames, Groups, PipelineCache, compiled};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
@@ -56,7 +56,7 @@ pub fn vmf_pyramid(device: &Arc<Device>, cache: &PipelineCache, source: &Pyramid
     // The others have served.
     let levels = steps.iter().zip(maps).enumerate().filter(|(_, (step, _))| step.kernel == Kernel::Vmf);
     let mut readbacks = Readbacks::new(device, graph);
-    readbacks.imports.push((finest_handle, finest));
+    readbacks.imports.push((finest_handle.into(), Object::Buffer(finest)));
     let targets =
         levels.map(|(index, (step, map))| readbacks.buffer(&format!("read_map_{index}"), map, size_bytes_of(step)));
     let targets = targets.collect::<Result<Vec<_>>>()?;

@@ -72,8 +72,8 @@ pub struct DepthTarget<'a> {
 
 /// A command buffer being recorded.
 pub struct Commands {
-    device: Arc<Device>,
-    raw: vk::CommandBuffer,
+    pub(super) device: Arc<Device>,
+    pub(super) raw: vk::CommandBuffer,
     descriptor_pool: vk::DescriptorPool,
     queries: Option<vk::QueryPool>,
     timed: Vec<String>,
@@ -239,6 +239,25 @@ impl Commands {
         let region = [vk::BufferCopy::default().size(source.size_bytes.min(target.size_bytes))];
         // SAFETY: both are alive and large enough.
         unsafe { self.device.raw.cmd_copy_buffer(self.raw, source.raw, target.raw, &region) };
+    }
+
+    /// Scales level 0 of `source` to all of `target`, bilinearly where their sizes differ; formats are converted.
+    pub fn blit(&mut self, source: &Image, target: &Image) {
+        let corners = |image: &Image| {
+            let [x, y, _] = image.shape.extent.map(|size| size as i32);
+            [vk::Offset3D::default(), vk::Offset3D { x, y, z: 1 }]
+        };
+        let region = [vk::ImageBlit::default()
+            .src_subresource(source.shape.level(0))
+            .src_offsets(corners(source))
+            .dst_subresource(target.shape.level(0))
+            .dst_offsets(corners(target))];
+        let filter = if source.shape.extent == target.shape.extent { vk::Filter::NEAREST } else { vk::Filter::LINEAR };
+        let layouts = [vk::ImageLayout::TRANSFER_SRC_OPTIMAL, vk::ImageLayout::TRANSFER_DST_OPTIMAL];
+        // SAFETY: both are alive, the caller's barriers set the layouts.
+        unsafe {
+            self.device.raw.cmd_blit_image(self.raw, source.raw, layouts[0], target.raw, layouts[1], &region, filter);
+        }
     }
 
     /// Copies level 0 of `source`, in transfer-source layout, into `target`, tightly packed.
