@@ -6,7 +6,9 @@
 //! | the camera's orbit | [`orbit`] | pure |
 //! | the scene being edited, and what a change asks for | [`session`] | pure |
 //! | loading and making in the background | [`jobs`] | threads |
+//! | another picture of the same view, and the difference | [`comparison`] | |
 
+pub mod comparison;
 pub mod input;
 pub mod jobs;
 pub mod orbit;
