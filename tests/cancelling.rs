@@ -5,11 +5,15 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use threadlight::brdf::Brdf;
+use threadlight::environment::Environment;
 use threadlight::evaluate::reference::{ReferenceSettings, STAGES, progressive, reference};
+use threadlight::method::Method;
+use threadlight::passes::filter_environment;
 use threadlight::pipeline::render_geometry;
 use threadlight::prepare::Prepared;
 use threadlight::scene::{MaterialSource, Scene, Source};
 use threadlight::threads::{Kind, Observer, Settings, generate};
+use threadlight::vulkan::PipelineCache;
 use threadlight::{Error, Result};
 
 /// Longest time from the word to the end; a tenth of it or less where the processor has nothing else to do.
@@ -100,6 +104,33 @@ fn the_reference_stops_at_once_and_comes_in_stages() {
         }
     }
     assert_eq!(estimates.last().unwrap().radiance, truth.radiance);
+    gpu.finish();
+}
+
+#[test]
+fn an_environment_stops_being_blurred_at_once() {
+    let gpu = Validated::new();
+    let map = data().map(|data| data.join("env/studio_small_03_1k.hdr")).filter(|map| map.exists());
+    let load = || match &map {
+        Some(map) => Environment::load(map).unwrap(),
+        None => Environment::builtin("studio").unwrap(),
+    };
+    let cache = PipelineCache::new(&gpu.device, None).unwrap();
+    let start = Instant::now();
+    let environment = load();
+    println!("loaded in {:?}", start.elapsed());
+    environment.box_filtered();
+    println!("box-filtered after {:?}", start.elapsed());
+    environment.irradiance();
+    println!("irradiance after {:?}", start.elapsed());
+    for after in [20, 200, 1000].map(Duration::from_millis) {
+        let environment = load();
+        let blur = |flag: &Flag| filter_environment(&gpu.device, &cache, None, Method::Fitted, &environment, flag);
+        let time = time_to_stop(after, blur);
+        println!("blur, cancelled after {after:?}: {time:?}");
+        assert!(time < SOON, "cancelled after {after:?}: {time:?}");
+    }
+    drop(cache);
     gpu.finish();
 }
 

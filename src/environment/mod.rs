@@ -147,6 +147,12 @@ impl Environment {
         DVec3::new(theta.sin() * phi.sin(), theta.cos(), -theta.sin() * phi.cos())
     }
 
+    /// Where in a lat-long picture `direction` (any length but 0) is seen: parts of its width and height, 0 to 1.
+    pub fn lat_long(direction: DVec3) -> [f64; 2] {
+        let [phi, theta] = angles(direction);
+        [(phi / TAU).rem_euclid(1.0), theta / PI]
+    }
+
     /// The solid angle of one pixel of `row`, in sr; over the whole picture they sum to 4 pi.
     pub fn solid_angle(&self, row: usize) -> f64 {
         let edge = |row: usize| (PI * row as f64 / self.height as f64).cos();
@@ -188,10 +194,14 @@ impl Environment {
 
     /// Column and row of `direction`; whole numbers are pixel centres.
     fn pixel(&self, direction: DVec3) -> (f64, f64) {
-        let phi = direction.x.atan2(-direction.z);
-        let theta = direction.x.hypot(direction.z).atan2(direction.y);
+        let [phi, theta] = angles(direction);
         (phi / TAU * self.width as f64 - 0.5, theta / PI * self.height as f64 - 0.5)
     }
+}
+
+/// phi, -pi to pi, and theta of `direction`.
+fn angles(direction: DVec3) -> [f64; 2] {
+    [direction.x.atan2(-direction.z), direction.x.hypot(direction.z).atan2(direction.y)]
 }
 
 /// The integrals over `centre` +- `extent` / 2 of the tents max(0, 1 - |x - k|) around those whole k that reach into it.
@@ -242,6 +252,10 @@ pub(crate) mod tests {
             (2.0, 3.5, DVec3::NEG_Y),
         ] {
             assert!((sky.direction(column, row) - expected).length() < 1e-15, "{column} {row}");
+            let [u, v] = Environment::lat_long(expected);
+            assert!((v - (row + 0.5) / 4.0).abs() < 1e-15, "{column} {row}");
+            // At the poles every column is as good.
+            assert!(expected.y != 0.0 || (u - (column + 0.5) / 8.0).abs() < 1e-15, "{column} {row}");
         }
     }
 

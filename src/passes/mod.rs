@@ -24,7 +24,7 @@ pub use readback::{Readbacks, texels};
 pub use shade::{DeviceLight, DeviceMaterials, Sampling, Shade, Shaded, shade};
 pub use tone_map::{ToneMap, tone_map};
 pub use view::{CameraRays, View};
-pub use vmf_pyramid::vmf_pyramid;
+pub use vmf_pyramid::{filter_environment, vmf_pyramid};
 
 use crate::graph::{Graph, Work};
 

@@ -7,9 +7,11 @@
 //! | the scene being edited, and what a change asks for | [`session`] | pure |
 //! | loading and making in the background | [`jobs`] | threads |
 //! | another picture of the same view, and the difference | [`comparison`] | |
+//! | the threads of what is under the cursor | [`threads_seen`] | |
 
 pub mod comparison;
 pub mod input;
 pub mod jobs;
 pub mod orbit;
 pub mod session;
+pub mod threads_seen;
