@@ -6,6 +6,7 @@ use std::sync::OnceLock;
 use glam::DVec3;
 
 use crate::error::Result;
+use crate::threads::Observer;
 
 mod cache;
 pub mod cube;
@@ -76,7 +77,16 @@ impl Environment {
 
     /// The box-filtered pyramid of this environment, made once for all renderers.
     pub fn box_filtered(&self) -> &Pyramid {
-        self.box_filtered.get_or_init(|| Pyramid::box_filtered(self))
+        self.watched_box_filtered(&()).expect("nobody cancels")
+    }
+
+    /// The same; the only error is that `observer` cancels it.
+    pub fn watched_box_filtered(&self, observer: &dyn Observer) -> Result<&Pyramid> {
+        if let Some(pyramid) = self.box_filtered.get() {
+            return Ok(pyramid);
+        }
+        let pyramid = Pyramid::box_filtered_to(self, Pyramid::face_size_for(self), observer)?;
+        Ok(self.box_filtered.get_or_init(|| pyramid))
     }
 
     /// Its small bright sources.
@@ -86,17 +96,27 @@ impl Environment {
 
     /// Irradiance over pi, without those.
     pub fn irradiance(&self) -> &Pyramid {
-        self.irradiance.get_or_init(|| irradiance_map(self, self.small_sources()))
+        self.watched_irradiance(&()).expect("nobody cancels")
+    }
+
+    /// The same; the only error is that `observer` cancels it.
+    pub fn watched_irradiance(&self, observer: &dyn Observer) -> Result<&Pyramid> {
+        if let Some(map) = self.irradiance.get() {
+            return Ok(map);
+        }
+        let map = irradiance_map(self, self.small_sources(), observer)?;
+        Ok(self.irradiance.get_or_init(|| map))
     }
 
     /// The pyramid of vMF kernels of this environment: from the cache in `folder` or by `make` from the box-filtered one, once for all
     /// renderers.
     ///
     /// # Errors
-    /// Those of `make`.
+    /// Those of `make`; cancelled by `observer` before that.
     pub fn vmf_filtered(
         &self,
         folder: Option<&Path>,
+        observer: &dyn Observer,
         make: impl FnOnce(&Pyramid) -> Result<VmfPyramid>,
     ) -> Result<&VmfPyramid> {
         if let Some(pyramid) = self.vmf_filtered.get() {
@@ -107,8 +127,8 @@ impl Environment {
         let face_size = Pyramid::face_size_for(self);
         let finer = (4 * face_size).min(FEWEST);
         let pyramid = cache::load_or_make(self, folder, || match finer > face_size {
-            true => make(&Pyramid::box_filtered_to(self, finer)),
-            false => make(self.box_filtered()),
+            true => make(&Pyramid::box_filtered_to(self, finer, observer)?),
+            false => make(self.watched_box_filtered(observer)?),
         })?;
         Ok(self.vmf_filtered.get_or_init(|| pyramid))
     }

@@ -237,7 +237,7 @@ impl DeviceLight {
         };
         if shader.declares("irradiance_map")? {
             let VmfPyramid { levels } =
-                environment.vmf_filtered(cache_folder, |source| vmf_pyramid(device, cache, source, &()))?;
+                environment.vmf_filtered(cache_folder, &(), |source| vmf_pyramid(device, cache, source, &()))?;
             let scale = levels.radiance_scale();
             light.pyramid = Some(DevicePyramid::new(device, "environment pyramid", levels, scale)?);
             light.irradiance = Some(DevicePyramid::new(device, "irradiance map", environment.irradiance(), scale)?);

@@ -46,13 +46,10 @@ pub fn filter_environment(
 ) -> Result<()> {
     let shader = method.shader()?;
     if shader.declares("irradiance_map")? {
-        environment.vmf_filtered(cache_folder, |source| vmf_pyramid(device, cache, source, observer))?;
-        if observer.cancelled() {
-            return Err(Error::Cancelled);
-        }
-        environment.irradiance();
+        environment.vmf_filtered(cache_folder, observer, |source| vmf_pyramid(device, cache, source, observer))?;
+        environment.watched_irradiance(observer)?;
     } else if shader.declares("environment_pyramid")? {
-        environment.box_filtered();
+        environment.watched_box_filtered(observer)?;
     }
     Ok(())
 }

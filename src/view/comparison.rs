@@ -5,6 +5,8 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use serde::{Deserialize, Serialize};
+
 use crate::error::Result;
 use crate::evaluate::difference::heat_map;
 use crate::evaluate::reference::{Estimate, ReferenceImage, STAGES, progressive, tone_map};
@@ -53,7 +55,8 @@ impl Wipe {
 }
 
 /// What the picture is compared with.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Other {
     /// The same scene shaded so.
     Shading(ShadingSettings),
@@ -64,6 +67,8 @@ pub enum Other {
 /// Two pictures of one view, and how they differ.
 #[derive(Clone, Debug)]
 pub struct Compared {
+    /// What the picture is, for people.
+    pub own_name: String,
     /// What the other picture is, for people.
     pub name: String,
     /// Columns and rows of all pictures here.
@@ -106,7 +111,7 @@ pub fn compare_with(
             let scene = Scene { shading: shading.clone(), ..prepared.scene.clone() };
             let other = prepare_again(&scene, Some(prepared), cache, observer)?;
             let radiance = render(&other, device, cache)?;
-            let name = format!("{}, {}", other.method.name(), other.sampling.count);
+            let name = name_of(&other);
             publish(compared(prepared, name, &own, radiance, 1, None));
         }
         Other::Reference => {
@@ -125,6 +130,10 @@ pub fn compare_with(
 fn render(prepared: &Prepared, device: &Arc<Device>, cache: Option<&Path>) -> Result<Vec<[f32; 4]>> {
     let renderer = Renderer::of_objects(device, cache, prepared, prepared.method, prepared.sampling)?;
     Ok(renderer.render(Wanted { radiance: true, ..Wanted::default() }, 1)?.radiance)
+}
+
+fn name_of(prepared: &Prepared) -> String {
+    format!("{}, {}", prepared.method.name(), prepared.sampling.count)
 }
 
 /// Compares `own` with `other`, of which every `step`-th pixel along each axis counts.
@@ -149,6 +158,7 @@ fn compared(
     let heat_map = heat_map(&comparable(own, 1), &comparable(&other, 1), true);
     let image = ReferenceImage { radiance: other, ..ReferenceImage::default() };
     Compared {
+        own_name: name_of(prepared),
         name,
         size: [view.width, view.height],
         display: tone_map(&image.over_background(prepared), view),

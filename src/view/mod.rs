@@ -7,8 +7,10 @@
 //! | the scene being edited, and what a change asks for | [`session`] | pure |
 //! | loading and making in the background | [`jobs`] | threads |
 //! | another picture of the same view, and the difference | [`comparison`] | |
-//! | the threads of what is under the cursor | [`threads_seen`] | |
+//! | that in the window | [`comparer`] | egui |
+//! | the threads of what is under the cursor | [`threads_seen`] | egui |
 
+pub mod comparer;
 pub mod comparison;
 pub mod input;
 pub mod jobs;
