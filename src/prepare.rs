@@ -24,8 +24,6 @@ pub struct Prepared {
     pub view: View,
     /// Whether the environment is seen behind the objects.
     pub show_environment: bool,
-    /// Factor on the environment's radiance.
-    pub intensity: f64,
     /// The light.
     pub environment: Arc<Environment>,
     /// Each mesh once, however many objects have it.
@@ -149,30 +147,7 @@ pub fn prepare_again(
     for object in &objects {
         check_size(&meshes[object.mesh].0, world_sphere(&meshes, object))?;
     }
-    let camera = match scene.camera {
-        Some(camera) => camera,
-        None => {
-            let (center, radius) = bounding_sphere(&meshes, &objects);
-            let camera = Camera::framing(center, radius, image.aspect());
-            camera.validate().map_err(|problem| {
-                Error::input(
-                    "[camera]",
-                    format!("cannot be chosen: {problem}"),
-                    "give eye and target in the scene file",
-                )
-            })?;
-            camera
-        }
-    };
-    let view = View {
-        camera,
-        width: image.width,
-        height: image.height,
-        subpixels: image.subpixels,
-        rotation_deg: scene.environment.rotation_deg,
-        exposure: image.exposure as f32,
-        gamma: image.gamma as f32,
-    };
+    let view = view_of(scene, bounding_sphere(&meshes, &objects))?;
 
     let mut materials = Vec::new();
     let mut thread_time = Duration::ZERO;
@@ -212,13 +187,41 @@ pub fn prepare_again(
         sampling,
         view,
         show_environment: image.background == crate::scene::Background::Environment,
-        intensity: scene.environment.intensity,
         environment,
         meshes,
         objects,
         materials,
         thread_time,
         thread_cache,
+    })
+}
+
+/// The view of `scene`, whose objects are within a sphere of this centre and radius.
+///
+/// # Errors
+/// Objects that no camera can frame.
+pub fn view_of(scene: &Scene, (centre, radius): (DVec3, f64)) -> Result<View> {
+    let image = &scene.image;
+    let camera = match scene.camera {
+        Some(camera) => camera,
+        None => {
+            let camera = Camera::framing(centre, radius, image.aspect());
+            camera.validate().map_err(|problem| {
+                let problem = format!("cannot be chosen: {problem}");
+                Error::input("[camera]", problem, "give eye and target in the scene file")
+            })?;
+            camera
+        }
+    };
+    Ok(View {
+        camera,
+        width: image.width,
+        height: image.height,
+        subpixels: image.subpixels,
+        rotation_deg: scene.environment.rotation_deg,
+        intensity: scene.environment.intensity,
+        exposure: image.exposure as f32,
+        gamma: image.gamma as f32,
     })
 }
 

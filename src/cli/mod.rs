@@ -7,7 +7,10 @@ mod devices;
 mod materials;
 mod progress;
 mod render;
+mod scene_flags;
 mod threads;
+#[cfg(feature = "viewer")]
+mod view;
 
 use clap::{Parser, Subcommand};
 use std::io::IsTerminal;
@@ -39,6 +42,8 @@ pub struct Arguments {
 #[derive(Subcommand)]
 enum Command {
     Render(Box<render::Render>),
+    #[cfg(feature = "viewer")]
+    View(Box<view::View>),
     Compare(compare::Compare),
     Bench(bench::Bench),
     Threads(threads::Threads),
@@ -52,6 +57,8 @@ impl Arguments {
     pub fn run(self) -> anyhow::Result<()> {
         match self.command {
             Command::Render(render) => render.run(),
+            #[cfg(feature = "viewer")]
+            Command::View(view) => view.run(),
             Command::Compare(compare) => compare.run(),
             Command::Bench(bench) => bench.run(),
             Command::Threads(threads) => threads.run(),

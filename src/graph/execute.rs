@@ -1,7 +1,7 @@
 //! Execute: the plan's resources as Vulkan objects, its passes and barriers as commands.
 use super::{Barrier, Graph, Handle, Kept, Kind, MemoryRequirement, Plan, PlannedPass, ResourceInfo};
 use crate::Result;
-use crate::vulkan::{self, Commands, Device, Frames, ImageShape, Memory, PassTime, VulkanError};
+use crate::vulkan::{self, Commands, Device, Frames, ImageShape, Memory, PassTime, Semaphores, VulkanError};
 use ash::vk;
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -161,7 +161,15 @@ impl<'a> Executable<'a> {
     /// # Errors
     /// Whatever Vulkan refuses.
     pub fn execute(&self, frames: &mut Frames) -> Result<()> {
-        frames.record(|commands| {
+        self.execute_between(frames, Semaphores::default())
+    }
+
+    /// The same between two semaphores.
+    ///
+    /// # Errors
+    /// Whatever Vulkan refuses.
+    pub fn execute_between(&self, frames: &mut Frames, semaphores: Semaphores) -> Result<()> {
+        frames.record_between(semaphores, |commands| {
             for pass in &self.plan.passes {
                 self.record_pass(commands, pass)?;
             }
@@ -181,24 +189,25 @@ impl<'a> Executable<'a> {
             self.execute(frames)?;
             Ok(frames.pass_times()?)
         } else {
-            self.execute_pass_by_pass(frames)
+            self.execute_pass_by_pass(frames, Semaphores::default())
         }
     }
 
-    /// Submits one frame pass by pass, waiting for each, and times them from outside: for devices whose timestamps do
-    /// not tell.
+    /// Submits one frame pass by pass between two semaphores, waiting for each, and times them from outside: for devices whose
+    /// timestamps do not tell.
     ///
     /// # Errors
     /// Whatever Vulkan refuses.
-    fn execute_pass_by_pass(&self, frames: &mut Frames) -> Result<Vec<PassTime>> {
+    pub fn execute_pass_by_pass(&self, frames: &mut Frames, semaphores: Semaphores) -> Result<Vec<PassTime>> {
         let mut times = Vec::new();
         for pass in &self.plan.passes {
             let start = Instant::now();
-            frames.record(|commands| self.record_pass(commands, pass))?;
+            let semaphores = if times.is_empty() { semaphores.first() } else { Semaphores::default() };
+            frames.record_between(semaphores, |commands| self.record_pass(commands, pass))?;
             frames.wait()?;
             times.push(PassTime { name: pass.name.clone(), gpu_ms: start.elapsed().as_secs_f64() * 1e3 });
         }
-        frames.record(|commands| {
+        frames.record_between(semaphores.last(), |commands| {
             self.record_barriers(commands, &self.plan.final_barriers);
             Ok(())
         })?;

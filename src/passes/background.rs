@@ -16,7 +16,6 @@ pub struct Background {
     pipeline: ComputePipeline,
     map: vulkan::Image,
     sampler: Sampler,
-    radiance_scale: f32,
     identity: Identity,
 }
 
@@ -34,7 +33,7 @@ impl Background {
     ///
     /// # Errors
     /// No device memory left, or a map wider or higher than the device's images can be.
-    pub fn new(device: &Arc<Device>, cache: &PipelineCache, environment: &Environment, intensity: f64) -> Result<Self> {
+    pub fn new(device: &Arc<Device>, cache: &PipelineCache, environment: &Environment) -> Result<Self> {
         check_map_size(device, environment, "scale it down, or leave the background out with --background none")?;
         // A sun as bright as the largest half float is white on any display, so here, unlike in shading, it is cut off.
         let texel = |rgb: &[f32; 3]| [rgb[0], rgb[1], rgb[2], 1.0].map(|value| f16::from_f32(value.min(65504.0)));
@@ -46,7 +45,6 @@ impl Background {
             pipeline: ComputePipeline::new(device, cache, &compiled::BACKGROUND, &[])?,
             map: vulkan::Image::with_texels(device, "environment map", shape, &[bytes])?,
             sampler: Sampler::new(device, "environment map", SamplerKind::WrappedLinear)?,
-            radiance_scale: intensity as f32,
             identity: Identity::new(),
         })
     }
@@ -76,7 +74,7 @@ pub fn background<'a>(
         camera: view.camera_rays(),
         size_px: [view.width, view.height],
         rotation: view.rotation(),
-        radiance_scale: background.radiance_scale,
+        radiance_scale: view.intensity as f32,
     };
     pass.depends_on(&background.identity).depends_on(&bytemuck::bytes_of(&push));
     pass.record(Box::new(move |commands, resources| {

@@ -48,7 +48,7 @@ impl DeviceMesh {
 }
 
 /// A mesh in the scene.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Object {
     /// Which mesh.
     pub mesh: usize,

@@ -8,9 +8,13 @@ mod classify;
 mod clear;
 mod geometry_cache;
 mod identity;
+#[cfg(feature = "viewer")]
+mod present;
 mod readback;
 mod shade;
 mod tone_map;
+#[cfg(feature = "viewer")]
+mod ui;
 mod view;
 mod vmf_pyramid;
 
@@ -20,9 +24,13 @@ pub use classify::{Classify, Counters, SMOOTH_DEG, Tiles, classify};
 pub use clear::clear;
 pub use geometry_cache::{DeviceMesh, GeometryCache, Object, geometry_cache};
 pub use identity::Identity;
+#[cfg(feature = "viewer")]
+pub use present::{Area, present};
 pub use readback::{Readbacks, texels};
 pub use shade::{DeviceLight, DeviceMaterials, Sampling, Shade, Shaded, shade};
 pub use tone_map::{ToneMap, tone_map};
+#[cfg(feature = "viewer")]
+pub use ui::ui;
 pub use view::{CameraRays, View};
 pub use vmf_pyramid::{filter_environment, vmf_pyramid};
 

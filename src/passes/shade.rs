@@ -185,7 +185,6 @@ pub struct DeviceLight {
     sources: Option<Buffer>,
     map: Option<vulkan::Image>,
     aliases: Option<Buffer>,
-    intensity: f32,
 }
 
 /// Uploads the sources of `environment`, their power over `scale`: `Sources` in glsl/methods/fitted.glsl.
@@ -224,17 +223,9 @@ impl DeviceLight {
         cache_folder: Option<&Path>,
         method: Method,
         environment: &Environment,
-        intensity: f64,
     ) -> Result<Self> {
         let shader = method.shader()?;
-        let mut light = Self {
-            pyramid: None,
-            irradiance: None,
-            sources: None,
-            map: None,
-            aliases: None,
-            intensity: intensity as f32,
-        };
+        let mut light = Self { pyramid: None, irradiance: None, sources: None, map: None, aliases: None };
         if shader.declares("irradiance_map")? {
             let VmfPyramid { levels } =
                 environment.vmf_filtered(cache_folder, &(), |source| vmf_pyramid(device, cache, source, &()))?;
@@ -302,10 +293,13 @@ pub struct Sampling {
 }
 
 /// What the pass is made of.
+#[derive(Clone)]
 pub struct Shade {
-    pipeline: ComputePipeline,
-    materials: DeviceMaterials,
-    light: DeviceLight,
+    pipeline: Arc<ComputePipeline>,
+    /// What objects are made of.
+    pub materials: Arc<DeviceMaterials>,
+    /// What lights them.
+    pub light: Arc<DeviceLight>,
     /// How many threads or samples, and which random numbers.
     pub sampling: Sampling,
     identity: Identity,
@@ -335,11 +329,11 @@ impl Shade {
         method: Method,
         sampling: Sampling,
         subpixels: u32,
-        materials: DeviceMaterials,
-        light: DeviceLight,
+        materials: Arc<DeviceMaterials>,
+        light: Arc<DeviceLight>,
     ) -> Result<Self> {
         let constants = [("SUBPIXELS", subpixels), ("MODELS_USED", materials.models_used)];
-        let pipeline = ComputePipeline::new(device, cache, method.shader()?, &constants)?;
+        let pipeline = Arc::new(ComputePipeline::new(device, cache, method.shader()?, &constants)?);
         Ok(Self { pipeline, materials, light, sampling, identity: Identity::new() })
     }
 }
@@ -379,7 +373,7 @@ pub fn shade<'a>(
         kind: 0,
         face_size: light.pyramid.as_ref().map_or(0.0, |pyramid| pyramid.face_size as f32),
         rotation: view.rotation(),
-        radiance_scale: light.intensity * light.pyramid.as_ref().map_or(1.0, |pyramid| pyramid.scale),
+        radiance_scale: view.intensity as f32 * light.pyramid.as_ref().map_or(1.0, |pyramid| pyramid.scale),
         sample_count: sampling.count,
         seed: [sampling.seed as u32, (sampling.seed >> 32) as u32],
     };

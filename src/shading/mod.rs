@@ -179,7 +179,7 @@ impl<'a> Twin<'a> {
         if !shares_surface && !partitioned {
             sum /= texels.len() as f32;
         }
-        (sum * self.prepared.intensity as f32).extend(covered as f32 / texels.len() as f32)
+        (sum * self.prepared.view.intensity as f32).extend(covered as f32 / texels.len() as f32)
     }
 }
 

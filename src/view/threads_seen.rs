@@ -8,6 +8,7 @@ use glam::{DMat3, DVec2, DVec3, dvec3};
 
 use crate::environment::Environment;
 use crate::evaluate::Display;
+use crate::passes::View;
 use crate::prepare::Prepared;
 use crate::threads::Threads;
 
@@ -32,9 +33,8 @@ pub struct Surface {
 }
 
 impl Surface {
-    /// What of `prepared` is seen in column `x` and row `y` of its picture (pixel centres have halves); none for the background.
-    pub fn under(prepared: &Prepared, x: f64, y: f64) -> Option<Self> {
-        let view = &prepared.view;
+    /// What of `prepared` is seen in column `x` and row `y` of its picture from `view` (pixel centres have halves); none for the background.
+    pub fn under(prepared: &Prepared, view: &View, x: f64, y: f64) -> Option<Self> {
         let direction = view.camera.ray(x - 0.5, y - 0.5, view.width, view.height);
         let hits = prepared.objects.iter().filter_map(|object| {
             let to_object = object.to_world.inverse();
@@ -180,9 +180,9 @@ mod tests {
     fn the_surface_under_the_cursor_is_that_of_the_sphere() {
         let prepared = sphere("uniform");
         assert!((MAX_THETA_O_RAD.to_degrees() - MAX_THETA_O_DEG).abs() < 1e-9);
-        assert_eq!(Surface::under(&prepared, 1.0, 1.0), None);
+        assert_eq!(Surface::under(&prepared, &prepared.view, 1.0, 1.0), None);
         // In the middle the normal points at the eye.
-        let middle = Surface::under(&prepared, 320.0, 240.0).unwrap();
+        let middle = Surface::under(&prepared, &prepared.view, 320.0, 240.0).unwrap();
         assert!(middle.theta_o_rad < 0.01 && middle.material == 0, "{middle:?}");
         let to_eye = prepared.view.camera.eye.normalize();
         let turned = DMat3::from_rotation_y(-90_f64.to_radians()) * to_eye;
@@ -191,7 +191,7 @@ mod tests {
         // Towards the rim the view angle grows, and the eye stays where it is.
         let mut before = 0.0;
         for x in (330..600).step_by(20) {
-            let Some(surface) = Surface::under(&prepared, f64::from(x), 240.0) else { break };
+            let Some(surface) = Surface::under(&prepared, &prepared.view, f64::from(x), 240.0) else { break };
             assert!(surface.theta_o_rad > before && surface.theta_o_rad < FRAC_PI_2);
             before = surface.theta_o_rad;
             let ray = prepared.view.camera.ray(f64::from(x) - 0.5, 239.5, 640, 480);
@@ -231,7 +231,7 @@ mod tests {
     fn insets_draw_without_a_window() {
         let prepared = sphere("fitted");
         let threads = prepared.materials[0].threads.as_deref().unwrap();
-        let surface = Surface::under(&prepared, 400.0, 240.0);
+        let surface = Surface::under(&prepared, &prepared.view, 400.0, 240.0);
         let shapes = |surface: Option<&Surface>| {
             let context = egui::Context::default();
             let output = context.run(Default::default(), |context| {

@@ -114,6 +114,14 @@ impl Frames {
         self.device.wait_for(last)
     }
 
+    /// GPU time of each pass of the oldest frame, which must have left the GPU ([`Frames::wait_for_place`]); empty where there is none.
+    ///
+    /// # Errors
+    /// A lost device.
+    pub fn oldest_pass_times(&self) -> Result<Vec<PassTime>> {
+        self.times_of(&self.slots[self.next])
+    }
+
     /// GPU time of each pass of the frame recorded last, which is waited for. Empty where the device has no timestamps.
     ///
     /// # Errors
@@ -121,6 +129,11 @@ impl Frames {
     pub fn pass_times(&self) -> Result<Vec<PassTime>> {
         let slot = &self.slots[(self.next + self.slots.len() - 1) % self.slots.len()];
         self.device.wait_for(slot.finished_at)?;
+        self.times_of(slot)
+    }
+
+    /// Times of a frame that has left the GPU.
+    fn times_of(&self, slot: &Slot) -> Result<Vec<PassTime>> {
         let Some(queries) = slot.queries.filter(|_| !slot.timed.is_empty()) else { return Ok(Vec::new()) };
         let mut ticks = vec![0_u64; 2 * slot.timed.len()];
         let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;

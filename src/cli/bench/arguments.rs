@@ -1,5 +1,6 @@
 //! What the measurements have in common on the command line: what to measure, on which device, and where to write it.
-use crate::cli::render::{parse_size, processor};
+use crate::cli::render::processor;
+use crate::cli::scene_flags::parse_size;
 use crate::cli::{cache_folder, number, stem};
 use anyhow::Context;
 use clap::value_parser;

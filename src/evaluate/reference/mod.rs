@@ -126,7 +126,7 @@ impl ReferenceImage {
             }
             let (x, y) = (pixel as u32 % width, pixel as u32 / width);
             let ray = camera.ray(f64::from(x), f64::from(y), width, height);
-            let behind = prepared.environment.radiance(to_environment * ray) * prepared.intensity;
+            let behind = prepared.environment.radiance(to_environment * ray) * prepared.view.intensity;
             let sum = dvec3(r.into(), g.into(), b.into()) + (1.0 - f64::from(coverage)) * behind;
             sum.min(DVec3::splat(f32::MAX.into())).as_vec3().extend(1.0).to_array()
         });
@@ -174,7 +174,7 @@ pub fn reference(
         return Ok(ReferenceImage { seconds: start.elapsed().as_secs_f64(), cached: true, ..image });
     }
     let brdfs = prepared.materials.iter().map(|material| &material.brdf);
-    let integrator = Integrator::new(&prepared.environment, prepared.intensity, brdfs, prepared.view.subpixels);
+    let integrator = Integrator::new(&prepared.environment, prepared.view.intensity, brdfs, prepared.view.subpixels);
     let image = integrator.image(&prepared.view, &geometry, settings.tolerance, observer)?;
     let image = ReferenceImage { seconds: start.elapsed().as_secs_f64(), ..image };
     if let Some(folder) = &settings.cache {
