@@ -51,12 +51,14 @@ impl Comparer {
         self.jobs.progress()
     }
 
-    /// Takes what has been made meanwhile.
+    /// Takes what has been made meanwhile; gives whether there is anything new.
     ///
     /// # Errors
     /// It could not be made; nothing is compared then.
-    pub fn take(&mut self) -> Result<()> {
+    pub fn take(&mut self) -> Result<bool> {
+        let mut is_new = false;
         while let Some(result) = self.jobs.take() {
+            is_new = true;
             match result {
                 Ok(compared) => self.compared = Some(Arc::new(compared)),
                 Err(Error::Cancelled) => {}
@@ -66,7 +68,7 @@ impl Comparer {
                 }
             }
         }
-        Ok(())
+        Ok(is_new)
     }
 
     /// Begins anew if what is `shown` (all of which `prepared` has loaded) is not what was compared; not while it `is_moving`.

@@ -23,6 +23,8 @@ pub mod orbit;
 pub mod pace;
 mod panel;
 pub mod session;
+#[cfg(feature = "hot-reload")]
+mod shader_watch;
 pub mod stage;
 pub mod threads_seen;
 pub mod viewer;

@@ -81,6 +81,8 @@ pub struct Viewer {
     pace: Pace,
     last_motion: Option<Instant>,
     last_turn: Option<Instant>,
+    #[cfg(feature = "hot-reload")]
+    shaders: super::shader_watch::ShaderWatch,
     device: Arc<Device>,
     cache: Option<PathBuf>,
 }
@@ -95,6 +97,8 @@ impl Viewer {
     ) -> Self {
         let wake = Arc::new(wake);
         let wake_too = wake.clone();
+        #[cfg(feature = "hot-reload")]
+        let wake_for_shaders = wake.clone();
         let area = Area { left: 0, top: 0, width: scene.image.width, height: scene.image.height };
         let mut viewer = Self {
             session: Session::new(scene),
@@ -110,6 +114,8 @@ impl Viewer {
             pace: Pace::default(),
             last_motion: None,
             last_turn: None,
+            #[cfg(feature = "hot-reload")]
+            shaders: super::shader_watch::ShaderWatch::new(move || wake_for_shaders()),
             device: device.clone(),
             cache,
         };
@@ -301,11 +307,31 @@ impl Viewer {
         });
     }
 
+    /// Compiles the shaders anew, and everything that is made of them; if that fails, what is shown stays.
+    #[cfg(feature = "hot-reload")]
+    fn reload_shaders(&mut self) {
+        let scene = self.session.wanted().clone();
+        self.requested = Some(Self::needs(&scene));
+        let (before, device, cache) = (self.loaded.clone(), self.device.clone(), self.cache.clone());
+        self.loading.request(move |task| {
+            task.begin("shaders");
+            let known = before.as_ref().map(|before| &*before.prepared);
+            let prepared = prepare_again(&scene, known, cache.as_deref(), task)?;
+            let build = || Renderer::new(&device, cache.as_deref(), &prepared);
+            let renderer = Arc::new(crate::vulkan::hot_reload::reload(build)?);
+            Ok(Loaded { prepared: Arc::new(prepared), renderer })
+        });
+    }
+
     /// Shows what has been loaded meanwhile.
     ///
     /// # Errors
     /// The scene that the viewer was started with cannot be loaded.
     pub fn take_loaded(&mut self) -> Result<()> {
+        #[cfg(feature = "hot-reload")]
+        if self.shaders.take() {
+            self.reload_shaders();
+        }
         if let Err(error) = self.comparer.take() {
             self.tell_error(&error);
         }
