@@ -11,7 +11,8 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// A scene with all its files read and its threads made.
+/// A scene with all its files read and its threads made. Cheap to clone.
+#[derive(Clone)]
 pub struct Prepared {
     /// What it was prepared from.
     pub scene: Scene,
@@ -38,6 +39,7 @@ pub struct Prepared {
 }
 
 /// A material that some object has.
+#[derive(Clone)]
 pub struct PreparedMaterial {
     /// Name in the scene.
     pub name: String,

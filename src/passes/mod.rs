@@ -32,7 +32,7 @@ pub use tone_map::{ToneMap, tone_map};
 #[cfg(feature = "viewer")]
 pub use ui::ui;
 pub use view::{CameraRays, View};
-pub use vmf_pyramid::vmf_pyramid;
+pub use vmf_pyramid::{filter_environment, vmf_pyramid};
 
 use crate::graph::{Graph, Work};
 

@@ -228,7 +228,7 @@ impl DeviceLight {
         let mut light = Self { pyramid: None, irradiance: None, sources: None, map: None, aliases: None };
         if shader.declares("irradiance_map")? {
             let VmfPyramid { levels } =
-                environment.vmf_filtered(cache_folder, |source| vmf_pyramid(device, cache, source))?;
+                environment.vmf_filtered(cache_folder, &(), |source| vmf_pyramid(device, cache, source, &()))?;
             let scale = levels.radiance_scale();
             light.pyramid = Some(DevicePyramid::new(device, "environment pyramid", levels, scale)?);
             light.irradiance = Some(DevicePyramid::new(device, "irradiance map", environment.irradiance(), scale)?);

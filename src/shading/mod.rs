@@ -118,7 +118,7 @@ impl<'a> Twin<'a> {
         let environment = &prepared.environment;
         let blurred = shader.declares("irradiance_map")?;
         let vmf_pyramid =
-            blurred.then(|| environment.vmf_filtered(None, |source| Ok(VmfPyramid::new(source)))).transpose()?;
+            blurred.then(|| environment.vmf_filtered(None, &(), |source| Ok(VmfPyramid::new(source)))).transpose()?;
         let pyramid = (shader.declares("environment_pyramid")? && !blurred).then(|| environment.box_filtered());
         let map = shader.declares("environment_map")?.then(|| LightMap::new(environment));
         let aliases = map.as_ref().filter(|_| shader.declares("LightAliases").unwrap_or(false));

@@ -15,7 +15,9 @@
 //! | `{"resize": [800, 600]}` | gives the window's picture this size |
 //! | `{"minimise": true}`, `{"minimise": false}` | minimises and restores the window |
 //! | `{"set": {"exposure": 2}}` | changes a setting in the panel: any [`Change`] |
-//! | `{"wipe": 0.5}` | drags the line between two compared pictures: 0 is the left edge, 1 the right one; `{"wipe": null}` ends the comparison |
+//! | `{"compare": "reference"}`, `{"compare": {"shading": {"method": "paper", "threads": 64}}}` | compares the picture with the reference, or with another method or number of threads; `{"compare": null}` ends that |
+//! | `{"wipe": 0.5}` | drags the line between two compared pictures: 0 is the left edge, 1 the right one |
+//! | `{"heat_map": true}` | shows where the two differ in the place of the other picture, or no longer |
 //! | `"wait"` | waits until all background work is done and its frame drawn |
 //! | `{"save_picture": "x.png"}`, `{"save_scene": "x.toml"}` | saves |
 //! | `"quit"` | closes the window |
@@ -28,6 +30,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
+use super::comparison::Other;
 use super::orbit;
 use super::session::Change;
 use crate::error::{Error, Result};
@@ -53,8 +56,12 @@ pub enum Input {
     Minimise(bool),
     /// A setting was changed.
     Set(Change),
-    /// The line between two compared pictures is there, from 0 at the left edge to 1; none ends the comparison.
-    Wipe(Option<f64>),
+    /// Compare the picture with another one; none ends that.
+    Compare(Option<Other>),
+    /// The line between two compared pictures is there, from 0 at the left edge to 1.
+    Wipe(f64),
+    /// Show where the two differ in the place of the other picture, or no longer.
+    HeatMap(bool),
     /// Go on when all background work is done and has been drawn.
     Wait,
     /// Save the picture that is shown.

@@ -7,18 +7,26 @@
 //! | the scene being edited, and what a change asks for | [`session`] | pure |
 //! | how coarse a moving picture is | [`pace`] | pure |
 //! | loading and making in the background | [`jobs`] | threads |
+//! | another picture of the same view, and the difference | [`comparison`] | |
+//! | when that is made anew | [`comparer`] | |
+//! | the threads of what is under the cursor | [`threads_seen`] | egui |
 //! | what inputs do, and the frames that follow | [`viewer`] | |
 //! | what is shown and set beside the picture | `panel` | egui |
 //! | frames into the window | [`stage`] | Vulkan, by the frame graph |
 //! | the window | `window` | winit |
 
+pub mod comparer;
+pub mod comparison;
 pub mod input;
 pub mod jobs;
 pub mod orbit;
 pub mod pace;
 mod panel;
 pub mod session;
+#[cfg(feature = "hot-reload")]
+mod shader_watch;
 pub mod stage;
+pub mod threads_seen;
 pub mod viewer;
 mod window;
 

@@ -6,6 +6,7 @@ use crate::pipeline::{Renderer, declare};
 use crate::vulkan::{Device, Frames, PassTime, PresentMode, Presented, Surface, Swapchain, UiFrame, UiPainter};
 use egui::TexturesDelta;
 use std::sync::Arc;
+use std::time::Duration;
 
 /// Frames in flight.
 const FRAMES: usize = 2;
@@ -30,6 +31,16 @@ pub struct Drawn {
     pub counted: Option<(Counters, u64)>,
     /// What the window shows, if that was asked for: RGBA, 8 bits each, and its size.
     pub screenshot: Option<(Vec<u8>, [u32; 2])>,
+}
+
+impl Drawn {
+    /// What the picture took, without what a window of that size always takes; none if it is not known of this frame.
+    pub fn picture_time(&self) -> Option<Duration> {
+        let is_of_window = |pass: &&PassTime| ["clear_window", "present", "ui"].contains(&pass.name.as_str());
+        let ms: f64 =
+            self.passes.iter().filter(|pass| !is_of_window(pass) && !pass.is_readback()).map(|pass| pass.gpu_ms).sum();
+        self.passes.iter().any(|pass| pass.name == "shade").then(|| Duration::from_secs_f64(ms * 1e-3))
+    }
 }
 
 /// What a frame is to leave besides the picture in the window. Both wait for the GPU.

@@ -1,4 +1,6 @@
 //! The viewer: what inputs do to the session, and the frames that follow from it. Knows nothing of the window system.
+use super::comparer::Comparer;
+use super::comparison::Wipe;
 use super::input::{DragAction, Dropped, Input, change_of_dropped};
 use super::jobs::{Newest, Progress};
 use super::orbit::{Bounds, Orbit, environment_turn_deg};
@@ -6,11 +8,11 @@ use super::pace::Pace;
 use super::session::{Change, Session};
 use super::stage::{Drawn, Extras, Picture, Stage};
 use crate::output::{self, ExrHeader, Format};
-use crate::passes::{Area, Counters, View};
+use crate::passes::{Area, Counters, View, filter_environment};
 use crate::pipeline::{Renderer, Wanted};
 use crate::prepare::{Prepared, prepare_again, view_of};
 use crate::scene::{Background, Scene};
-use crate::vulkan::{Device, PassTime, UiFrame};
+use crate::vulkan::{Device, PassTime, PipelineCache, UiFrame};
 use crate::{Error, Result};
 use egui::TexturesDelta;
 use glam::DVec2;
@@ -85,6 +87,10 @@ pub struct Viewer {
     pub measured: Measured,
     /// Whether the camera turns by itself.
     pub turntable: bool,
+    /// What the picture is compared with.
+    pub comparer: Comparer,
+    /// Where the cursor is in the window, in pixels; none while it is elsewhere.
+    pub cursor: Option<[f64; 2]>,
     loaded: Option<Loaded>,
     loading: Newest<Loaded>,
     /// The scene whose preparation was asked for last, as [`Self::needs`] has it.
@@ -92,6 +98,8 @@ pub struct Viewer {
     pace: Pace,
     last_motion: Option<Instant>,
     last_turn: Option<Instant>,
+    #[cfg(feature = "hot-reload")]
+    shaders: super::shader_watch::ShaderWatch,
     device: Arc<Device>,
     cache: Option<PathBuf>,
 }
@@ -104,6 +112,10 @@ impl Viewer {
         cache: Option<PathBuf>,
         wake: impl Fn() + Send + Sync + 'static,
     ) -> Self {
+        let wake = Arc::new(wake);
+        let wake_too = wake.clone();
+        #[cfg(feature = "hot-reload")]
+        let wake_for_shaders = wake.clone();
         let area = Area { left: 0, top: 0, width: scene.image.width, height: scene.image.height };
         let mut viewer = Self {
             session: Session::new(scene),
@@ -112,11 +124,15 @@ impl Viewer {
             measured: Measured::default(),
             turntable: false,
             loaded: None,
-            loading: Newest::new("loading", wake),
+            comparer: Comparer::new(move || wake_too()),
+            cursor: None,
+            loading: Newest::new("loading", move || wake()),
             requested: None,
             pace: Pace::default(),
             last_motion: None,
             last_turn: None,
+            #[cfg(feature = "hot-reload")]
+            shaders: super::shader_watch::ShaderWatch::new(move || wake_for_shaders()),
             device: device.clone(),
             cache,
         };
@@ -139,9 +155,20 @@ impl Viewer {
         self.loading.progress()
     }
 
-    /// Whether something is being loaded or made.
-    pub fn is_busy(&self) -> bool {
+    /// Whether something is being loaded or made that frames wait for.
+    pub fn is_loading(&self) -> bool {
         self.loading.is_busy()
+    }
+
+    /// Whether anything is made in the background.
+    pub fn is_busy(&self) -> bool {
+        self.is_loading() || self.comparer.is_busy()
+    }
+
+    /// From where and how what is shown is looked at, at full resolution; none while nothing is.
+    pub fn shown_view(&self) -> Option<View> {
+        let loaded = self.loaded.as_ref()?;
+        view_of(self.session.shown(), loaded.prepared.bounding_sphere()).ok()
     }
 
     /// Does what the user asks for. Whatever goes wrong is told by a notice, and changes nothing.
@@ -186,10 +213,24 @@ impl Viewer {
                 self.tell(format!("saved {}", path.display()));
                 Ok(())
             }
-            // What the window itself does.
-            Input::Move(_) | Input::Resize(..) | Input::Minimise(_) | Input::Wipe(_) | Input::Wait | Input::Quit => {
+            Input::Move(at) => {
+                self.cursor = Some(*at);
                 Ok(())
             }
+            Input::Compare(other) => {
+                self.comparer.other.clone_from(other);
+                Ok(())
+            }
+            Input::Wipe(part) => {
+                self.comparer.wipe = Wipe::at(*part);
+                Ok(())
+            }
+            Input::HeatMap(shows) => {
+                self.comparer.shows_heat_map = *shows;
+                Ok(())
+            }
+            // What the window itself does.
+            Input::Resize(..) | Input::Minimise(_) | Input::Wait | Input::Quit => Ok(()),
         }
     }
 
@@ -270,6 +311,10 @@ impl Viewer {
             task.begin("threads");
             let known = before.as_ref().map(|before| &*before.prepared);
             let prepared = prepare_again(&scene, known, cache.as_deref(), task)?;
+            task.begin("environment");
+            let pipelines = PipelineCache::new(&device, cache.as_deref())?;
+            let Prepared { method, environment, .. } = &prepared;
+            filter_environment(&device, &pipelines, cache.as_deref(), *method, environment, task)?;
             task.begin("upload");
             let renderer = match &before {
                 Some(Loaded { prepared: known, renderer }) => renderer.again(cache.as_deref(), known, &prepared)?,
@@ -279,12 +324,35 @@ impl Viewer {
         });
     }
 
+    /// Compiles the shaders anew, and everything that is made of them; if that fails, what is shown stays.
+    #[cfg(feature = "hot-reload")]
+    fn reload_shaders(&mut self) {
+        let scene = self.session.wanted().clone();
+        self.requested = Some(Self::needs(&scene));
+        let (before, device, cache) = (self.loaded.clone(), self.device.clone(), self.cache.clone());
+        self.loading.request(move |task| {
+            task.begin("shaders");
+            let known = before.as_ref().map(|before| &*before.prepared);
+            let prepared = prepare_again(&scene, known, cache.as_deref(), task)?;
+            let build = || Renderer::new(&device, cache.as_deref(), &prepared);
+            let renderer = Arc::new(crate::vulkan::hot_reload::reload(build)?);
+            Ok(Loaded { prepared: Arc::new(prepared), renderer })
+        });
+    }
+
     /// Shows what has been loaded meanwhile; gives whether there is anything new.
     ///
     /// # Errors
     /// The scene that the viewer was started with cannot be loaded.
     pub fn take_loaded(&mut self) -> Result<bool> {
-        let mut is_new = false;
+        #[cfg(feature = "hot-reload")]
+        if self.shaders.take() {
+            self.reload_shaders();
+        }
+        let mut is_new = self.comparer.take().unwrap_or_else(|error| {
+            self.tell_error(&error);
+            true
+        });
         while let Some(result) = self.loading.take() {
             is_new = true;
             match result {
@@ -373,6 +441,9 @@ impl Viewer {
             Some(loaded) => Some(self.view(loaded, is_moving)?),
             None => None,
         };
+        if let Some(Loaded { prepared, .. }) = &loaded {
+            self.comparer.update(self.session.shown(), prepared, &self.device, self.cache.as_deref(), is_moving)?;
+        }
         let picture = loaded.as_ref().zip(view.as_ref()).map(|(loaded, view)| Picture {
             renderer: &loaded.renderer,
             view,
@@ -384,8 +455,9 @@ impl Viewer {
             let frame = start.elapsed();
             let size = [view.width, view.height];
             if drawn.ran.iter().any(|pass| pass == "shade") {
-                self.pace.drawn(size, frame);
+                self.pace.drawn(size, drawn.picture_time().unwrap_or(frame));
             }
+            tracing::debug!("{} x {} in {:.1} ms", size[0], size[1], frame.as_secs_f64() * 1e3);
             self.measured.frames += 1;
             (self.measured.frame, self.measured.size) = (frame, size);
             self.measured.ran.clone_from(&drawn.ran);

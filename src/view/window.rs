@@ -250,7 +250,10 @@ impl Open {
                 // Window systems need not do so, or tell; either way nothing is drawn meanwhile.
                 self.is_minimised = *minimise;
             }
-            Input::Move(at) => self.cursor = *at,
+            Input::Move(at) => {
+                self.cursor = *at;
+                self.viewer.handle(&input);
+            }
             input => self.viewer.handle(input),
         }
         self.script.replay.pop_front();
@@ -260,6 +263,7 @@ impl Open {
 
     fn drag(&mut self, to: [f64; 2]) {
         let from = std::mem::replace(&mut self.cursor, to);
+        self.viewer.cursor = Some(to);
         if let Some((button, start)) = self.held {
             let by = [to[0] - from[0], to[1] - from[1]];
             let (shift, control) =
@@ -294,6 +298,7 @@ impl Open {
                 self.redraw();
             }
             WindowEvent::ModifiersChanged(modifiers) => self.modifiers = modifiers.state(),
+            WindowEvent::CursorLeft { .. } => self.viewer.cursor = None,
             WindowEvent::CursorMoved { position, .. } => self.drag([position.x, position.y]),
             WindowEvent::MouseInput { state: ElementState::Released, .. } if self.held.take().is_some() => {
                 // Sharp again.

@@ -16,6 +16,8 @@ mod commands;
 mod device;
 mod error;
 mod frames;
+#[cfg(feature = "hot-reload")]
+pub mod hot_reload;
 mod instance;
 mod memory;
 mod pipeline;

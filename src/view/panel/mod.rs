@@ -1,4 +1,5 @@
 //! The panel: shows the scene that is asked for, and tells what the user would have changed. One file a group.
+mod comparison;
 mod display;
 mod light;
 mod material;
@@ -6,6 +7,7 @@ mod object;
 mod save;
 mod shading;
 mod statistics;
+mod threads;
 
 use super::input::Input;
 use super::session::Change;
@@ -22,6 +24,8 @@ pub struct Panel {
     light: light::State,
     object: object::State,
     save: save::State,
+    comparison: comparison::State,
+    threads: threads::State,
 }
 
 impl Panel {
@@ -38,10 +42,13 @@ impl Panel {
                 self.object.show(ui, viewer, &mut inputs);
                 shading::show(ui, viewer, &mut inputs);
                 display::show(ui, viewer, &mut inputs);
+                self.comparison.show(ui, viewer, &mut inputs);
+                self.threads.show(ui, viewer);
                 self.save.show(ui, &mut inputs);
                 statistics::show(ui, viewer);
             });
         });
+        self.comparison.draw(context, viewer, &mut inputs);
         notice(context, viewer);
         inputs
     }
@@ -49,10 +56,10 @@ impl Panel {
 
 /// What is being loaded or made, above all else, always of the same height so that nothing jumps.
 fn progress(ui: &mut Ui, viewer: &Viewer) {
-    let (share, what) = match viewer.progress().filter(|_| viewer.is_busy()) {
+    let (share, what) = match viewer.progress().filter(|_| viewer.is_loading()) {
         Some(progress) if progress.total > 0 => (progress.done as f32 / progress.total as f32, progress.what),
         Some(progress) => (0.0, progress.what),
-        None => (0.0, if viewer.is_busy() { "loading" } else { "ready" }.to_owned()),
+        None => (0.0, if viewer.is_loading() { "loading" } else { "ready" }.to_owned()),
     };
     let bar = egui::ProgressBar::new(share).text(what).corner_radius(2.0).desired_height(16.0);
     ui.add(bar).on_hover_text(
