@@ -438,7 +438,13 @@ impl Viewer {
         let is_moving = self.is_moving(is_held) && !screenshot;
         let loaded = self.loaded.clone();
         let view = match &loaded {
-            Some(loaded) => Some(self.view(loaded, is_moving)?),
+            Some(loaded) => {
+                let mut view = self.view(loaded)?;
+                if is_moving {
+                    [view.width, view.height] = self.pace.moving([view.width, view.height]);
+                }
+                Some(view)
+            }
             None => None,
         };
         if let Some(Loaded { prepared, .. }) = &loaded {
@@ -455,7 +461,8 @@ impl Viewer {
             let frame = start.elapsed();
             let size = [view.width, view.height];
             if drawn.ran.iter().any(|pass| pass == "shade") {
-                self.pace.drawn(size, drawn.picture_time().unwrap_or(frame));
+                let full = &self.session.shown().image;
+                self.pace.drawn(size, [full.width, full.height], drawn.picture_time().unwrap_or(frame));
             }
             tracing::debug!("{} x {} in {:.1} ms", size[0], size[1], frame.as_secs_f64() * 1e3);
             self.measured.frames += 1;
@@ -468,13 +475,10 @@ impl Viewer {
     }
 
     /// How the scene that is shown is looked at.
-    fn view(&self, loaded: &Loaded, is_moving: bool) -> Result<View> {
+    fn view(&self, loaded: &Loaded) -> Result<View> {
         let mut view = view_of(self.session.shown(), loaded.prepared.bounding_sphere())?;
         // Others have yet to be compiled.
         view.subpixels = loaded.renderer.view.subpixels;
-        if is_moving {
-            [view.width, view.height] = self.pace.moving([view.width, view.height]);
-        }
         Ok(view)
     }
 
@@ -486,7 +490,7 @@ impl Viewer {
             return Err(Error::input("the picture", "has not been loaded yet", "wait until it is shown"));
         };
         let mut renderer = (*loaded.renderer).clone();
-        renderer.view = self.view(&loaded, false)?;
+        renderer.view = self.view(&loaded)?;
         let wanted = Wanted { radiance: format == Format::Exr, display: format == Format::Png, geometry: false };
         let rendering = renderer.render(wanted, 1)?;
         let Prepared { method, sampling, environment, materials, .. } = &*loaded.prepared;
