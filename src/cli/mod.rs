@@ -81,7 +81,7 @@ pub fn mistake(error: &clap::Error) -> String {
 
 /// Sends the library's log to standard error; RUST_LOG overrides the flag.
 pub fn start_logging(verbose: u8) {
-    let level = ["warn", "threadlight=info", "threadlight=debug"][usize::from(verbose.min(2))];
+    let level = ["warn,winit=error", "threadlight=info", "threadlight=debug"][usize::from(verbose.min(2))];
     let filter = tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| level.into());
     tracing_subscriber::fmt()
         .with_env_filter(filter)

@@ -18,9 +18,6 @@ use crate::scene::{Scene, ShadingSettings};
 use crate::threads::Observer;
 use crate::vulkan::Device;
 
-/// The cursor takes hold of the line within so many pixels of it.
-const GRIP_PX: f64 = 6.0;
-
 /// Where the line between two pictures is: to its left the one, to its right the other.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Wipe(f64);
@@ -41,16 +38,6 @@ impl Wipe {
     /// Its part of the width, 0 to 1.
     pub fn part(self) -> f64 {
         self.0
-    }
-
-    /// The first column of a picture this wide that is right of it.
-    pub fn column(self, width: u32) -> u32 {
-        (self.0 * f64::from(width)).round() as u32
-    }
-
-    /// Whether a cursor in column `x` of a picture this wide takes hold of it.
-    pub fn is_held_at(self, x: f64, width: u32) -> bool {
-        (x - self.0 * f64::from(width)).abs() <= GRIP_PX
     }
 }
 
@@ -85,12 +72,6 @@ pub struct Compared {
     pub part: f64,
     /// Estimated error of the reference itself, RMS of display values.
     pub error_estimate: Option<f64>,
-}
-
-/// Whether a comparison with the reference made for `before` holds for `after`: only how the picture is shaded differs.
-pub fn same_truth(before: &Scene, after: &Scene) -> bool {
-    let shaded_alike = Scene { shading: before.shading.clone(), ..after.clone() };
-    *before == shaded_alike
 }
 
 /// Compares the picture of `prepared` with the `other`, and hands the result to `publish`: once, or for the reference after every stage.
@@ -172,32 +153,11 @@ fn compared(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::view::session::Change;
 
     #[test]
     fn the_line_stays_in_the_picture() {
         for (part, expected) in [(0.25, 0.25), (-1.0, 0.0), (7.0, 1.0), (f64::NAN, 0.5), (f64::INFINITY, 1.0)] {
             assert_eq!(Wipe::at(part).part(), expected);
-        }
-        assert_eq!((Wipe::at(0.0).column(640), Wipe::default().column(640), Wipe::at(1.0).column(640)), (0, 320, 640));
-        assert!(Wipe::default().is_held_at(325.0, 640) && !Wipe::default().is_held_at(330.0, 640));
-        assert!(!Wipe::default().is_held_at(f64::NAN, 640));
-    }
-
-    #[test]
-    fn only_how_it_is_shaded_leaves_the_truth_as_it_is() {
-        for (change, same) in [
-            (Change::Method("paper".into()), true),
-            (Change::Threads(Some(4)), true),
-            (Change::Seed(4), true),
-            (Change::Exposure(2.0), false),
-            (Change::Rotation(2.0), false),
-            (Change::Subpixels(1), false),
-            (Change::Camera(Some(crate::scene::Camera::framing(glam::DVec3::ONE, 1.0, 1.0))), false),
-        ] {
-            let mut scene = Scene::default();
-            change.apply(&mut scene).unwrap();
-            assert_eq!(same_truth(&Scene::default(), &scene), same, "{change:?}");
         }
     }
 }

@@ -44,7 +44,7 @@ pub struct Notice {
 /// What the last frames have shown of themselves.
 #[derive(Clone, Debug, Default)]
 pub struct Measured {
-    /// Time of each pass that ran.
+    /// Time of each pass of the frame when it last ran.
     pub passes: Vec<PassTime>,
     /// Names of the passes that ran in the last frame.
     pub ran: Vec<String>,
@@ -56,6 +56,23 @@ pub struct Measured {
     pub frames: u64,
     /// Columns and rows that the last frame shaded.
     pub size: [u32; 2],
+}
+
+impl Measured {
+    /// Takes the times of the passes that ran; those of the others stay.
+    fn time(&mut self, passes: &[PassTime]) {
+        for (index, pass) in passes.iter().enumerate() {
+            match self.passes.iter_mut().find(|known| known.name == pass.name) {
+                Some(known) => known.gpu_ms = pass.gpu_ms,
+                // Where it belongs: after the one that it ran after.
+                None => {
+                    let before = index.checked_sub(1).map(|before| &passes[before].name);
+                    let place = self.passes.iter().position(|known| Some(&known.name) == before);
+                    self.passes.insert(place.map_or(0, |place| place + 1), pass.clone());
+                }
+            }
+        }
+    }
 }
 
 /// The viewer.
@@ -323,19 +340,21 @@ impl Viewer {
         });
     }
 
-    /// Shows what has been loaded meanwhile.
+    /// Shows what has been loaded meanwhile; gives whether there is anything new.
     ///
     /// # Errors
     /// The scene that the viewer was started with cannot be loaded.
-    pub fn take_loaded(&mut self) -> Result<()> {
+    pub fn take_loaded(&mut self) -> Result<bool> {
         #[cfg(feature = "hot-reload")]
         if self.shaders.take() {
             self.reload_shaders();
         }
-        if let Err(error) = self.comparer.take() {
+        let mut is_new = self.comparer.take().unwrap_or_else(|error| {
             self.tell_error(&error);
-        }
+            true
+        });
         while let Some(result) = self.loading.take() {
+            is_new = true;
             match result {
                 Ok(loaded) => {
                     self.session.prepared(&loaded.prepared.scene);
@@ -350,7 +369,7 @@ impl Viewer {
                 }
             }
         }
-        Ok(())
+        Ok(is_new)
     }
 
     fn tell(&mut self, text: String) {
@@ -441,9 +460,7 @@ impl Viewer {
             self.measured.frames += 1;
             (self.measured.frame, self.measured.size) = (frame, size);
             self.measured.ran.clone_from(&drawn.ran);
-            if !drawn.passes.is_empty() {
-                self.measured.passes.clone_from(&drawn.passes);
-            }
+            self.measured.time(&drawn.passes);
             self.measured.counted = drawn.counted.or(self.measured.counted);
         }
         Ok(drawn)

@@ -25,6 +25,8 @@ pub struct Wake;
 
 /// A window that cannot be drawn on is tried again after this time.
 const RETRY: Duration = Duration::from_millis(100);
+/// How often the progress of background work is drawn.
+const PROGRESS_INTERVAL: Duration = Duration::from_millis(100);
 /// A window system has this long to give the window the size that a replay asks for.
 const RESIZE_PATIENCE: Duration = Duration::from_secs(2);
 
@@ -52,6 +54,7 @@ struct Open {
     textures: TexturesDelta,
     /// When a frame is due; none while nothing changes.
     due: Option<Instant>,
+    last_drawn: Instant,
     is_minimised: bool,
     cursor: [f64; 2],
     modifiers: ModifiersState,
@@ -119,6 +122,7 @@ impl App {
             window,
             textures: TexturesDelta::default(),
             due: Some(Instant::now()),
+            last_drawn: Instant::now(),
             is_minimised: false,
             cursor: [0.0; 2],
             modifiers: ModifiersState::empty(),
@@ -131,6 +135,7 @@ impl App {
 
     /// Ends the program, with `result` if it is the first.
     fn end(&mut self, event_loop: &ActiveEventLoop, result: Result<()>) {
+        tracing::debug!("closing");
         if self.result.is_ok() {
             self.result = result;
         }
@@ -161,7 +166,7 @@ impl Open {
     /// Draws a frame; gives whether the program is to end.
     fn draw(&mut self, settings: &Settings) -> Result<bool> {
         self.due = None;
-        self.viewer.take_loaded()?;
+        self.last_drawn = Instant::now();
         let raw = self.egui.take_egui_input(&self.window);
         let mut inputs = Vec::new();
         let (panel, viewer) = (&mut self.panel, &mut self.viewer);
@@ -363,8 +368,14 @@ impl ApplicationHandler<Wake> for App {
         }
     }
 
-    fn user_event(&mut self, _: &ActiveEventLoop, Wake: Wake) {
-        self.open.iter_mut().for_each(Open::redraw);
+    fn user_event(&mut self, event_loop: &ActiveEventLoop, Wake: Wake) {
+        let Some(open) = &mut self.open else { return };
+        match open.viewer.take_loaded() {
+            Ok(true) => open.redraw(),
+            // A bar that moves ten times a second is smooth enough, and leaves the processor to what it tells of.
+            Ok(false) => open.due_at(open.last_drawn + PROGRESS_INTERVAL),
+            Err(error) => self.end(event_loop, Err(error)),
+        }
     }
 
     fn window_event(&mut self, event_loop: &ActiveEventLoop, _: WindowId, event: WindowEvent) {

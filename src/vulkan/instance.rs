@@ -33,7 +33,8 @@ pub struct Instance {
     /// Whether it was made for a window system.
     #[cfg(feature = "viewer")]
     pub(super) presents: bool,
-    // Unloads the loader when dropped: last.
+    // Unloads the loader when dropped: last. Without windows it is only kept alive.
+    #[cfg_attr(not(feature = "viewer"), expect(dead_code))]
     pub(super) entry: ash::Entry,
 }
 

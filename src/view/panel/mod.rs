@@ -56,14 +56,13 @@ impl Panel {
 
 /// What is being loaded or made, above all else, always of the same height so that nothing jumps.
 fn progress(ui: &mut Ui, viewer: &Viewer) {
-    let bar = match viewer.progress().filter(|_| viewer.is_loading()) {
-        Some(progress) if progress.total > 0 => {
-            egui::ProgressBar::new(progress.done as f32 / progress.total as f32).text(progress.what)
-        }
-        Some(progress) => egui::ProgressBar::new(0.0).text(progress.what),
-        None => egui::ProgressBar::new(0.0).text(if viewer.is_loading() { "loading" } else { "ready" }),
+    let (share, what) = match viewer.progress().filter(|_| viewer.is_loading()) {
+        Some(progress) if progress.total > 0 => (progress.done as f32 / progress.total as f32, progress.what),
+        Some(progress) => (0.0, progress.what),
+        None => (0.0, if viewer.is_loading() { "loading" } else { "ready" }.to_owned()),
     };
-    ui.add(bar.desired_height(16.0)).on_hover_text(
+    let bar = egui::ProgressBar::new(share).text(what).corner_radius(2.0).desired_height(16.0);
+    ui.add(bar).on_hover_text(
         "What is made in the background: threads (one row for each view angle), uploads. The old picture stays until it is done.",
     );
     ui.separator();

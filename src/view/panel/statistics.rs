@@ -34,15 +34,17 @@ pub fn show(ui: &mut Ui, viewer: &Viewer) {
 
 /// A bar for each pass, as long as it takes.
 fn times(ui: &mut Ui, viewer: &Viewer) {
-    let passes = &viewer.measured.passes;
+    let (passes, ran) = (&viewer.measured.passes, &viewer.measured.ran);
     let longest = passes.iter().map(|pass| pass.gpu_ms).fold(1e-3, f64::max);
     for pass in passes.iter().filter(|pass| !pass.is_readback()) {
         let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), 15.0), Sense::hover());
         let share = (pass.gpu_ms / longest) as f32;
         let bar = Rect::from_min_size(rect.min, vec2(rect.width() * share, rect.height() - 2.0));
-        ui.painter().rect_filled(bar, 2.0, Color32::from_rgb(40, 78, 110));
+        let has_run = ran.contains(&pass.name);
+        let fill = if has_run { Color32::from_rgb(0, 92, 128) } else { Color32::from_gray(45) };
+        ui.painter().rect_filled(bar, 2.0, fill);
         let font = egui::FontId::proportional(11.0);
-        let color = ui.visuals().text_color();
+        let color = if has_run { ui.visuals().strong_text_color() } else { ui.visuals().weak_text_color() };
         ui.painter().text(
             rect.left_center(),
             egui::Align2::LEFT_CENTER,
@@ -50,8 +52,8 @@ fn times(ui: &mut Ui, viewer: &Viewer) {
             font.clone(),
             color,
         );
-        let ms = format!("{:.2} ms ", pass.gpu_ms);
+        let ms = if has_run { format!("{:.2} ms ", pass.gpu_ms) } else { "still good ".to_owned() };
         ui.painter().text(rect.right_center(), egui::Align2::RIGHT_CENTER, ms, font, color);
-        response.on_hover_text("Time of this pass on the GPU when it last ran in the frame that is shown.");
+        response.on_hover_text("Time of this pass on the GPU. What it makes is kept: it runs only when something that it depends on has changed.");
     }
 }
