@@ -12,11 +12,12 @@ use crate::evaluate::difference::heat_map;
 use crate::evaluate::reference::{Estimate, ReferenceImage, STAGES, progressive, tone_map};
 use crate::evaluate::{Comparable, Display, Metrics, compare};
 use crate::method::Method;
+use crate::passes::filter_environment;
 use crate::pipeline::{Renderer, Wanted, render_geometry};
 use crate::prepare::{Prepared, prepare_again};
 use crate::scene::{Scene, ShadingSettings};
 use crate::threads::Observer;
-use crate::vulkan::Device;
+use crate::vulkan::{Device, PipelineCache};
 
 /// Where the line between two pictures is: to its left the one, to its right the other.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -86,12 +87,12 @@ pub fn compare_with(
     observer: &dyn Observer,
     publish: &mut dyn FnMut(Compared),
 ) -> Result<()> {
-    let own = render(prepared, device, cache)?;
+    let own = render(prepared, device, cache, observer)?;
     match other {
         Other::Shading(shading) => {
             let scene = Scene { shading: shading.clone(), ..prepared.scene.clone() };
             let other = prepare_again(&scene, Some(prepared), cache, observer)?;
-            let radiance = render(&other, device, cache)?;
+            let radiance = render(&other, device, cache, observer)?;
             let name = name_of(&other);
             publish(compared(prepared, name, &own, radiance, 1, None));
         }
@@ -108,7 +109,14 @@ pub fn compare_with(
 }
 
 /// Linear radiance times coverage of the objects alone, and coverage.
-fn render(prepared: &Prepared, device: &Arc<Device>, cache: Option<&Path>) -> Result<Vec<[f32; 4]>> {
+fn render(
+    prepared: &Prepared,
+    device: &Arc<Device>,
+    cache: Option<&Path>,
+    observer: &dyn Observer,
+) -> Result<Vec<[f32; 4]>> {
+    let pipelines = PipelineCache::new(device, cache)?;
+    filter_environment(device, &pipelines, cache, prepared.method, &prepared.environment, observer)?;
     let renderer = Renderer::of_objects(device, cache, prepared, prepared.method, prepared.sampling)?;
     Ok(renderer.render(Wanted { radiance: true, ..Wanted::default() }, 1)?.radiance)
 }
