@@ -12,14 +12,12 @@ use crate::evaluate::difference::heat_map;
 use crate::evaluate::reference::{Estimate, ReferenceImage, STAGES, progressive, tone_map};
 use crate::evaluate::{Comparable, Display, Metrics, compare};
 use crate::method::Method;
+use crate::passes::filter_environment;
 use crate::pipeline::{Renderer, Wanted, render_geometry};
 use crate::prepare::{Prepared, prepare_again};
 use crate::scene::{Scene, ShadingSettings};
 use crate::threads::Observer;
-use crate::vulkan::Device;
-
-/// The cursor takes hold of the line within so many pixels of it.
-const GRIP_PX: f64 = 6.0;
+use crate::vulkan::{Device, PipelineCache};
 
 /// Where the line between two pictures is: to its left the one, to its right the other.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,16 +39,6 @@ impl Wipe {
     /// Its part of the width, 0 to 1.
     pub fn part(self) -> f64 {
         self.0
-    }
-
-    /// The first column of a picture this wide that is right of it.
-    pub fn column(self, width: u32) -> u32 {
-        (self.0 * f64::from(width)).round() as u32
-    }
-
-    /// Whether a cursor in column `x` of a picture this wide takes hold of it.
-    pub fn is_held_at(self, x: f64, width: u32) -> bool {
-        (x - self.0 * f64::from(width)).abs() <= GRIP_PX
     }
 }
 
@@ -87,12 +75,6 @@ pub struct Compared {
     pub error_estimate: Option<f64>,
 }
 
-/// Whether a comparison with the reference made for `before` holds for `after`: only how the picture is shaded differs.
-pub fn same_truth(before: &Scene, after: &Scene) -> bool {
-    let shaded_alike = Scene { shading: before.shading.clone(), ..after.clone() };
-    *before == shaded_alike
-}
-
 /// Compares the picture of `prepared` with the `other`, and hands the result to `publish`: once, or for the reference after every stage.
 ///
 /// # Errors
@@ -105,12 +87,12 @@ pub fn compare_with(
     observer: &dyn Observer,
     publish: &mut dyn FnMut(Compared),
 ) -> Result<()> {
-    let own = render(prepared, device, cache)?;
+    let own = render(prepared, device, cache, observer)?;
     match other {
         Other::Shading(shading) => {
             let scene = Scene { shading: shading.clone(), ..prepared.scene.clone() };
             let other = prepare_again(&scene, Some(prepared), cache, observer)?;
-            let radiance = render(&other, device, cache)?;
+            let radiance = render(&other, device, cache, observer)?;
             let name = name_of(&other);
             publish(compared(prepared, name, &own, radiance, 1, None));
         }
@@ -127,7 +109,14 @@ pub fn compare_with(
 }
 
 /// Linear radiance times coverage of the objects alone, and coverage.
-fn render(prepared: &Prepared, device: &Arc<Device>, cache: Option<&Path>) -> Result<Vec<[f32; 4]>> {
+fn render(
+    prepared: &Prepared,
+    device: &Arc<Device>,
+    cache: Option<&Path>,
+    observer: &dyn Observer,
+) -> Result<Vec<[f32; 4]>> {
+    let pipelines = PipelineCache::new(device, cache)?;
+    filter_environment(device, &pipelines, cache, prepared.method, &prepared.environment, observer)?;
     let renderer = Renderer::of_objects(device, cache, prepared, prepared.method, prepared.sampling)?;
     Ok(renderer.render(Wanted { radiance: true, ..Wanted::default() }, 1)?.radiance)
 }
@@ -172,32 +161,11 @@ fn compared(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::view::session::Change;
 
     #[test]
     fn the_line_stays_in_the_picture() {
         for (part, expected) in [(0.25, 0.25), (-1.0, 0.0), (7.0, 1.0), (f64::NAN, 0.5), (f64::INFINITY, 1.0)] {
             assert_eq!(Wipe::at(part).part(), expected);
-        }
-        assert_eq!((Wipe::at(0.0).column(640), Wipe::default().column(640), Wipe::at(1.0).column(640)), (0, 320, 640));
-        assert!(Wipe::default().is_held_at(325.0, 640) && !Wipe::default().is_held_at(330.0, 640));
-        assert!(!Wipe::default().is_held_at(f64::NAN, 640));
-    }
-
-    #[test]
-    fn only_how_it_is_shaded_leaves_the_truth_as_it_is() {
-        for (change, same) in [
-            (Change::Method("paper".into()), true),
-            (Change::Threads(Some(4)), true),
-            (Change::Seed(4), true),
-            (Change::Exposure(2.0), false),
-            (Change::Rotation(2.0), false),
-            (Change::Subpixels(1), false),
-            (Change::Camera(Some(crate::scene::Camera::framing(glam::DVec3::ONE, 1.0, 1.0))), false),
-        ] {
-            let mut scene = Scene::default();
-            change.apply(&mut scene).unwrap();
-            assert_eq!(same_truth(&Scene::default(), &scene), same, "{change:?}");
         }
     }
 }

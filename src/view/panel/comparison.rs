@@ -76,15 +76,19 @@ impl State {
         };
         label(&compared.own_name, Align2::RIGHT_TOP, -8.0);
         label(&compared.name, Align2::LEFT_TOP, 8.0);
-        let grip = Rect::from_min_max(pos2(x - GRIP, picture.top()), pos2(x + GRIP, picture.bottom()));
-        let area = egui::Area::new(Id::new("wipe")).fixed_pos(grip.min).constrain(false).order(Order::Middle);
-        let response = area.show(context, |ui| ui.allocate_response(grip.size(), Sense::drag())).inner;
-        let response = response.on_hover_and_drag_cursor(CursorIcon::ResizeHorizontal);
-        if let Some(cursor) = response.interact_pointer_pos().filter(|_| response.dragged()) {
-            let part = f64::from((cursor.x - picture.left()) / picture.width());
-            inputs.push(Input::Wipe(Wipe::at(part).part()));
-        }
+        inputs.extend(dragged_line(context, picture, x).map(Input::Wipe));
     }
+}
+
+/// Lets the line at `x` be dragged: gives to which part of the width of `picture`, while it is.
+fn dragged_line(context: &Context, picture: Rect, x: f32) -> Option<f64> {
+    let grip = Rect::from_min_max(pos2(x - GRIP, picture.top()), pos2(x + GRIP, picture.bottom()));
+    // Not of the background, so that the window knows that the camera is not meant.
+    let area = egui::Area::new(Id::new("wipe")).fixed_pos(grip.min).constrain(false).order(Order::Middle);
+    let response = area.show(context, |ui| ui.allocate_response(grip.size(), Sense::drag())).inner;
+    let response = response.on_hover_and_drag_cursor(CursorIcon::ResizeHorizontal);
+    let cursor = response.interact_pointer_pos().filter(|_| response.dragged())?;
+    Some(Wipe::at(f64::from((cursor.x - picture.left()) / picture.width())).part())
 }
 
 /// Where the picture is on the screen, in points.
@@ -164,5 +168,40 @@ fn metrics(ui: &mut Ui, compared: &Compared) {
         ui.weak(text).on_hover_text(
             "How many of its pixels are computed so far, and its estimate of its own error (RMS of display values).",
         );
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use egui::{Event, PointerButton, RawInput};
+
+    #[test]
+    fn the_line_follows_the_cursor_that_took_hold_of_it() {
+        let context = Context::default();
+        let picture = Rect::from_min_size(pos2(100.0, 0.0), vec2(200.0, 150.0));
+        let mut part = 0.5;
+        let mut frame = |events: Vec<Event>| {
+            let screen = Rect::from_min_size(pos2(0.0, 0.0), vec2(400.0, 300.0));
+            let input = RawInput { screen_rect: Some(screen), events, ..RawInput::default() };
+            let _ = context.run(input, |context| {
+                let x = picture.left() + part as f32 * picture.width();
+                part = dragged_line(context, picture, x).unwrap_or(part);
+            });
+            (part, context.wants_pointer_input())
+        };
+        let button = |pos, pressed| {
+            vec![Event::PointerButton { pos, button: PointerButton::Primary, pressed, modifiers: Default::default() }]
+        };
+        let (beside, on_line, to) = (pos2(250.0, 50.0), pos2(202.0, 50.0), pos2(150.0, 60.0));
+        frame(vec![]);
+        assert_eq!(frame(vec![Event::PointerMoved(beside)]), (0.5, false));
+        frame(vec![Event::PointerMoved(on_line)]);
+        assert_eq!(frame(vec![]), (0.5, true));
+        frame(button(on_line, true));
+        frame(vec![Event::PointerMoved(to)]);
+        frame(vec![]);
+        frame(button(to, false));
+        assert!((part - 0.25).abs() < 0.02, "{part}");
     }
 }
