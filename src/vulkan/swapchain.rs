@@ -233,7 +233,7 @@ impl Swapchain {
             .image_color_space(vk::ColorSpaceKHR::SRGB_NONLINEAR)
             .image_extent(extent)
             .image_array_layers(1)
-            .image_usage(Self::USAGE)
+            .image_usage(Self::USAGE & capabilities.supported_usage_flags)
             .pre_transform(capabilities.current_transform)
             .composite_alpha(composite)
             .present_mode(self.mode.raw())
@@ -266,7 +266,8 @@ impl Swapchain {
         Ok(true)
     }
 
-    /// The picture is blitted into its images, the panel is drawn over it.
+    /// The picture is blitted into its images, the panel is drawn over it. Only screenshots read them, and are all that a window
+    /// system without that use lacks.
     const USAGE: vk::ImageUsageFlags = vk::ImageUsageFlags::from_raw(
         vk::ImageUsageFlags::COLOR_ATTACHMENT.as_raw()
             | vk::ImageUsageFlags::TRANSFER_DST.as_raw()
