@@ -23,7 +23,7 @@ fn main() {
     let generated = out.join("glsl");
     write(&generated.join("brdf_models.glsl"), &brdf_switch());
 
-    let (mut table, mut names) = (String::new(), Vec::new());
+    let (mut table, mut recipes, mut names) = (String::new(), String::new(), Vec::new());
     for source in files(glsl) {
         let (stem, extension) = (text(source.file_stem()), text(source.extension()));
         let stage = match extension.as_str() {
@@ -39,17 +39,28 @@ fn main() {
                 let folder = out.join(format!("method_{method}"));
                 write(&folder.join("method.glsl"), &format!("#include \"methods/{method}.glsl\"\n"));
                 let name = format!("{stem}_{method}");
-                compile(&mut table, &source, &name, stage, &[glsl, &generated, &folder], &out);
+                let includes = [glsl, &generated, &folder];
+                compile(&mut table, &source, &name, stage, &includes, &out);
+                recipe(&mut recipes, &source, &name, &includes);
                 names.push(name.to_uppercase());
             }
         } else {
             let name = if stage == "Compute" { stem } else { format!("{stem}_{extension}") };
             compile(&mut table, &source, &name, stage, &[glsl, &generated], &out);
+            recipe(&mut recipes, &source, &name, &[glsl, &generated]);
             names.push(name.to_uppercase());
         }
     }
     let _ = writeln!(table, "/// All of them.\npub const ALL: &[Shader] = &[{}];", names.join(", "));
     write(&out.join("shaders.rs"), &table);
+    write(&out.join("recipes.rs"), &format!("const RECIPES: &[Recipe] = &[\n{recipes}];\n"));
+}
+
+/// Adds a line to what feature `hot-reload` compiles shaders by.
+fn recipe(recipes: &mut String, source: &Path, name: &str, includes: &[&Path]) {
+    let absolute = |path: &Path| std::path::absolute(path).expect("a current folder").display().to_string();
+    let (source, includes) = (absolute(source), includes.iter().map(|folder| absolute(folder)).collect::<Vec<_>>());
+    let _ = writeln!(recipes, "    Recipe {{ name: {name:?}, source: {source:?}, includes: &{includes:?} }},");
 }
 
 /// GLSL that includes every model and picks one by its id; models that no material of a scene uses are compiled out.

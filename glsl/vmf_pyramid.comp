@@ -24,6 +24,8 @@ layout(push_constant) uniform Push {
     uint size;
     uint from_kernel;
     uint kernel;
+    uint first_row;  // a dispatch makes these and what follows
+    uint first_face;
 } push;
 
 const float TEXELS_A_WIDTH = 2.0;
@@ -94,7 +96,7 @@ vec3 mean_of_four(uvec3 id) {
 }
 
 void main() {
-    uvec3 id = gl_GlobalInvocationID;
+    uvec3 id = gl_GlobalInvocationID + uvec3(0, push.first_row, push.first_face);
     if (any(greaterThanEqual(id.xy, uvec2(push.size)))) {
         return;
     }

@@ -23,6 +23,12 @@ pub enum Error {
     /// Vulkan refused something.
     #[error(transparent)]
     Vulkan(#[from] crate::vulkan::VulkanError),
+    /// The window system refused something, or there is none.
+    #[error("no window: {cause}; `threadlight render` needs none")]
+    Window {
+        /// What it said.
+        cause: String,
+    },
     /// The user, or the program on the user's behalf, stopped a long computation.
     #[error("cancelled")]
     Cancelled,

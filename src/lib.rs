@@ -16,6 +16,7 @@
 //!                          │
 //!                          v
 //!            geometry_cache ─> classify ─> shade ─> background ─> tone_map ─> PNG          each frame, on the GPU
+//!                                                      │              └─────> present ─> ui ─> window
 //!                                                      └──────────────────────> EXR
 //! ```
 //!
@@ -30,9 +31,10 @@
 //! | beyond it: fitted threads | [`threads::fitted`], `glsl/methods/fitted.glsl` |
 //! | tables 1 to 4, figures 10 to 13: how fast, how wrong | [`evaluate`] |
 //!
-//! Dependencies run downwards: `pipeline` and [`prepare`], then [`passes`], then [`graph`] (which passes run, in which order,
-//! with which barriers, in which memory) and [`vulkan`] (the only `unsafe` code) on one side, [`scene`], [`environment`],
-//! [`threads`] and [`brdf`] on the other. The method on one screen is `declare` in `pipeline.rs`.
+//! Dependencies run downwards: `view` (the interactive viewer), then `pipeline` and [`prepare`], then [`passes`], then [`graph`]
+//! (which passes run, in which order, with which barriers, in which memory, and what is kept between frames) and [`vulkan`] (the
+//! only `unsafe` code) on one side, [`scene`], [`environment`], [`threads`] and [`brdf`] on the other. The method on one screen
+//! is `declare` in `pipeline.rs`.
 
 pub mod brdf;
 pub mod environment;
@@ -48,6 +50,8 @@ pub mod prepare;
 pub mod scene;
 pub mod shading;
 pub mod threads;
+#[cfg(feature = "viewer")]
+pub mod view;
 #[allow(unsafe_code)]
 pub mod vulkan;
 

@@ -2,7 +2,7 @@
 use crate::graph::{Buffer, Executable, Image};
 use crate::method::Method;
 use crate::passes::*;
-use crate::prepare::Prepared;
+use crate::prepare::{Prepared, PreparedMaterial};
 use crate::vulkan::{Device, Frames, PassTime, PipelineCache};
 use crate::{Error, Result};
 use std::path::Path;
@@ -20,8 +20,7 @@ pub struct Wanted {
 }
 
 /// The frame: pass 1 and pass 2 of the paper and what surrounds them.
-fn declare<'a>(graph: &mut FrameGraph<'a>, renderer: &'a Renderer) -> Frame {
-    let view = &renderer.view;
+pub(crate) fn declare<'a>(graph: &mut FrameGraph<'a>, renderer: &'a Renderer, view: &'a View) -> Frame {
     let geometry = geometry_cache(graph, &renderer.geometry_cache, view); // pass 1 of the paper
     let tiles = classify(graph, &renderer.classify, geometry, view);
     let Shaded { radiance, lookups } = shade(graph, &renderer.shade, geometry, &tiles, view); // pass 2 of the paper
@@ -34,22 +33,24 @@ fn declare<'a>(graph: &mut FrameGraph<'a>, renderer: &'a Renderer) -> Frame {
 }
 
 /// What a frame leaves.
-struct Frame {
-    geometry: Image,
-    counters: Buffer,
-    lookups: Buffer,
-    radiance: Image,
-    display: Image,
+pub(crate) struct Frame {
+    pub geometry: Image,
+    pub counters: Buffer,
+    pub lookups: Buffer,
+    pub radiance: Image,
+    pub display: Image,
 }
 
 /// A scene on a device, ready to render.
+#[derive(Clone)]
 pub struct Renderer {
-    view: View,
-    geometry_cache: GeometryCache,
-    classify: Classify,
+    /// Where from and how it is looked at. Its number of sub-pixels is that which the shaders were compiled for.
+    pub view: View,
+    geometry_cache: Arc<GeometryCache>,
+    classify: Arc<Classify>,
     shade: Shade,
-    background: Option<Background>,
-    tone_map: ToneMap,
+    background: Option<Arc<Background>>,
+    tone_map: Arc<ToneMap>,
     device: Arc<Device>,
 }
 
@@ -85,7 +86,7 @@ impl Renderer {
         let mut renderer = Self::of_objects(device, cache_folder, prepared, prepared.method, prepared.sampling)?;
         if prepared.show_environment {
             let cache = PipelineCache::new(device, cache_folder)?;
-            renderer.background = Some(Background::new(device, &cache, &prepared.environment, prepared.intensity)?);
+            renderer.background = Some(Arc::new(Background::new(device, &cache, &prepared.environment)?));
         }
         Ok(renderer)
     }
@@ -101,23 +102,71 @@ impl Renderer {
         method: Method,
         sampling: Sampling,
     ) -> Result<Self> {
-        let Prepared { view, intensity, environment, .. } = prepared;
+        let Prepared { view, .. } = prepared;
         let cache = PipelineCache::new(device, cache_folder)?;
-        let geometry_cache = upload_geometry(device, &cache, prepared)?;
-        let brdfs = prepared.materials.iter().map(|material| (&material.brdf, material.threads.as_ref()));
-        let evaluates_brdf = method.evaluates_brdf(environment);
-        let materials = DeviceMaterials::new(device, method, brdfs, evaluates_brdf)?;
-        let light =
-            DeviceLight::new(device, &cache, cache_folder, method, environment, *intensity, &prepared.materials)?;
+        let geometry_cache = Arc::new(upload_geometry(device, &cache, prepared)?);
+        let materials = upload_materials(device, method, prepared)?;
+        let light = upload_light(device, &cache, cache_folder, method, prepared)?;
         Ok(Self {
             view: view.clone(),
             geometry_cache,
-            classify: Classify::new(device, &cache, view.subpixels)?,
+            classify: Arc::new(Classify::new(device, &cache, view.subpixels)?),
             shade: Shade::new(device, &cache, method, sampling, view.subpixels, materials, light)?,
             background: None,
-            tone_map: ToneMap::new(device, &cache)?,
+            tone_map: Arc::new(ToneMap::new(device, &cache)?),
             device: device.clone(),
         })
+    }
+
+    /// The same as this one, which was made for `before`, for `prepared`: what both have in common (see
+    /// [`crate::prepare::prepare_again`]) is neither uploaded nor compiled again, and passes of the same parts make the same.
+    ///
+    /// # Errors
+    /// No device memory left, or a limit of the device exceeded.
+    pub fn again(&self, cache_folder: Option<&Path>, before: &Prepared, prepared: &Prepared) -> Result<Self> {
+        let Prepared { method, sampling, environment, .. } = prepared;
+        let (device, cache) = (&self.device, PipelineCache::new(&self.device, cache_folder)?);
+        let mut renderer = self.clone();
+        renderer.view = prepared.view.clone();
+        let subpixels = renderer.view.subpixels;
+        check_size(device, &renderer.view)?;
+        let meshes =
+            |prepared: &Prepared| prepared.meshes.iter().map(|(_, mesh)| Arc::as_ptr(mesh)).collect::<Vec<_>>();
+        if meshes(before) != meshes(prepared) || before.objects != prepared.objects {
+            renderer.geometry_cache = Arc::new(upload_geometry(device, &cache, prepared)?);
+        }
+        let same_method = before.method == *method;
+        let same_environment = Arc::ptr_eq(&before.environment, environment);
+        let same_subpixels = self.view.subpixels == subpixels;
+        if !same_subpixels {
+            renderer.classify = Arc::new(Classify::new(device, &cache, subpixels)?);
+        }
+        let brdfs = |prepared: &Prepared| {
+            let of =
+                |material: &PreparedMaterial| (material.source.clone(), material.threads.as_ref().map(Arc::as_ptr));
+            prepared.materials.iter().map(of).collect::<Vec<_>>()
+        };
+        let same_use = method.evaluates_brdf(&before.environment) == method.evaluates_brdf(environment);
+        let same_materials = same_method && same_use && brdfs(before) == brdfs(prepared);
+        if !same_materials || !same_method || !same_environment || !same_subpixels {
+            let materials = match same_materials {
+                true => self.shade.materials.clone(),
+                false => upload_materials(device, *method, prepared)?,
+            };
+            let same_light = same_method && same_environment;
+            let light = match same_light && self.shade.light.serves(environment, &prepared.materials) {
+                true => self.shade.light.clone(),
+                false => upload_light(device, &cache, cache_folder, *method, prepared)?,
+            };
+            renderer.shade = Shade::new(device, &cache, *method, *sampling, subpixels, materials, light)?;
+        }
+        renderer.shade.sampling = *sampling;
+        if !prepared.show_environment {
+            renderer.background = None;
+        } else if renderer.background.is_none() || !same_environment {
+            renderer.background = Some(Arc::new(Background::new(device, &cache, environment)?));
+        }
+        Ok(renderer)
     }
 
     /// Starts the random numbers of later frames from `seed`: other noise, for methods that have any.
@@ -131,7 +180,7 @@ impl Renderer {
     /// Whatever Vulkan refuses.
     pub fn render(&self, wanted: Wanted, repeat: u32) -> Result<Rendering> {
         let mut graph = FrameGraph::new();
-        let frame = declare(&mut graph, self);
+        let frame = declare(&mut graph, self, &self.view);
         let mut readbacks = Readbacks::new(&self.device, graph);
         let counters = readbacks.buffer("read_counters", frame.counters, size_of::<Counters>() as u64)?;
         let lookups = readbacks.buffer("read_lookups", frame.lookups, size_of::<u64>() as u64)?;
@@ -184,15 +233,39 @@ impl PassTime {
 
 /// Uploads the meshes of `prepared`, where the geometry cache of its view is within what `device` can do.
 fn upload_geometry(device: &Arc<Device>, cache: &PipelineCache, prepared: &Prepared) -> Result<GeometryCache> {
-    let largest = device.limits().max_image_dimension2_d;
-    let [width, height] = prepared.view.cache_size();
-    if width.max(height) > largest {
-        let problem =
-            format!("needs {width} x {height} sub-pixels, this device's images have at most {largest} a side");
-        return Err(Error::input("image size", problem, "use a smaller --size or fewer --subpixels"));
-    }
+    check_size(device, &prepared.view)?;
     let meshes = prepared.meshes.iter().map(|(name, mesh)| DeviceMesh::new(device, name, mesh));
     GeometryCache::new(device, cache, meshes.collect::<Result<_>>()?, prepared.objects.clone())
+}
+
+/// An error for a view whose geometry cache is larger than images of `device` can be.
+fn check_size(device: &Device, view: &View) -> Result<()> {
+    let largest = device.limits().max_image_dimension2_d;
+    let [width, height] = view.cache_size();
+    if width.max(height) <= largest {
+        return Ok(());
+    }
+    let problem = format!("needs {width} x {height} sub-pixels, this device's images have at most {largest} a side");
+    Err(Error::input("image size", problem, "use a smaller --size or fewer --subpixels"))
+}
+
+/// Uploads what `method` looks up of the materials of `prepared`.
+fn upload_materials(device: &Arc<Device>, method: Method, prepared: &Prepared) -> Result<Arc<DeviceMaterials>> {
+    let brdfs = prepared.materials.iter().map(|material| (&material.brdf, material.threads.as_deref()));
+    let evaluates_brdf = method.evaluates_brdf(&prepared.environment);
+    Ok(Arc::new(DeviceMaterials::new(device, method, brdfs, evaluates_brdf)?))
+}
+
+/// Uploads what `method` looks up of the environment of `prepared`.
+fn upload_light(
+    device: &Arc<Device>,
+    cache: &PipelineCache,
+    cache_folder: Option<&Path>,
+    method: Method,
+    prepared: &Prepared,
+) -> Result<Arc<DeviceLight>> {
+    let Prepared { environment, materials, .. } = prepared;
+    Ok(Arc::new(DeviceLight::new(device, cache, cache_folder, method, environment, materials)?))
 }
 
 /// Only pass 1 of the paper: the texels of the geometry cache, as [`Rendering::geometry`] has them. Needs no threads.

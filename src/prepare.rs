@@ -8,10 +8,14 @@ use crate::threads::{self, CacheState, Observer, Threads};
 use crate::{Error, Result};
 use glam::{DAffine3, DVec3};
 use std::path::Path;
+use std::sync::Arc;
 use std::time::Duration;
 
-/// A scene with all its files read and its threads made.
+/// A scene with all its files read and its threads made. Cheap to clone.
+#[derive(Clone)]
 pub struct Prepared {
+    /// What it was prepared from.
+    pub scene: Scene,
     /// How to estimate radiance.
     pub method: Method,
     /// How many threads or samples, and which random numbers.
@@ -20,12 +24,10 @@ pub struct Prepared {
     pub view: View,
     /// Whether the environment is seen behind the objects.
     pub show_environment: bool,
-    /// Factor on the environment's radiance.
-    pub intensity: f64,
     /// The light.
-    pub environment: Environment,
+    pub environment: Arc<Environment>,
     /// Each mesh once, however many objects have it.
-    pub meshes: Vec<(String, Mesh)>,
+    pub meshes: Vec<(String, Arc<Mesh>)>,
     /// The objects.
     pub objects: Vec<Object>,
     /// Name, BRDF and threads of each material that an object has.
@@ -37,13 +39,16 @@ pub struct Prepared {
 }
 
 /// A material that some object has.
+#[derive(Clone)]
 pub struct PreparedMaterial {
     /// Name in the scene.
     pub name: String,
     /// Its BRDF.
     pub brdf: Brdf,
+    /// Where that comes from.
+    pub source: MaterialSource,
     /// Its threads, for methods that use them.
-    pub threads: Option<Threads>,
+    pub threads: Option<Arc<Threads>>,
 }
 
 /// Reads a material: a built-in's name, or a file.
@@ -87,10 +92,25 @@ pub fn load_threads(
 /// # Errors
 /// The first file or setting that cannot be used, or a cancelled generation.
 pub fn prepare(scene: &Scene, cache: Option<&Path>, observer: &dyn Observer) -> Result<Prepared> {
+    prepare_again(scene, None, cache, observer)
+}
+
+/// The same, taking from `before` what has not changed since: meshes, environment (with what was made of it) and materials of the
+/// same source, and threads of the same settings.
+///
+/// # Errors
+/// As for [`prepare`].
+pub fn prepare_again(
+    scene: &Scene,
+    before: Option<&Prepared>,
+    cache: Option<&Path>,
+    observer: &dyn Observer,
+) -> Result<Prepared> {
     let method = Method::from_name(&scene.shading.method)?;
     let count = scene.shading.threads.unwrap_or(method.default_count());
     check_count(method, count, scene.image.subpixels)?;
-    let mut meshes: Vec<(String, Mesh)> = Vec::new();
+    let sampling = Sampling { count, seed: scene.shading.seed };
+    let mut meshes: Vec<(String, Arc<Mesh>)> = Vec::new();
     let mut objects = Vec::new();
     let mut used_materials: Vec<&str> = Vec::new();
     for object in &scene.objects {
@@ -98,7 +118,13 @@ pub fn prepare(scene: &Scene, cache: Option<&Path>, observer: &dyn Observer) -> 
         let mesh = match meshes.iter().position(|(known, _)| *known == name) {
             Some(known) => known,
             None => {
-                meshes.push((name, object.load_mesh()?));
+                let known = before.and_then(|before| before.meshes.iter().find(|(known, _)| *known == name));
+                let mesh = match known {
+                    Some((_, mesh)) => mesh.clone(),
+                    None => Arc::new(object.load_mesh()?),
+                };
+                cancelled(observer)?;
+                meshes.push((name, mesh));
                 meshes.len() - 1
             }
         };
@@ -112,35 +138,16 @@ pub fn prepare(scene: &Scene, cache: Option<&Path>, observer: &dyn Observer) -> 
             to_world: DAffine3::from_mat4(object.transform().as_dmat4()),
         });
     }
-    let environment = scene.environment.load()?;
+    let environment = match before.filter(|before| before.scene.environment.source == scene.environment.source) {
+        Some(before) => before.environment.clone(),
+        None => Arc::new(scene.environment.load()?),
+    };
+    cancelled(observer)?;
     let image = &scene.image;
     for object in &objects {
         check_size(&meshes[object.mesh].0, world_sphere(&meshes, object))?;
     }
-    let camera = match scene.camera {
-        Some(camera) => camera,
-        None => {
-            let (center, radius) = bounding_sphere(&meshes, &objects);
-            let camera = Camera::framing(center, radius, image.aspect());
-            camera.validate().map_err(|problem| {
-                Error::input(
-                    "[camera]",
-                    format!("cannot be chosen: {problem}"),
-                    "give eye and target in the scene file",
-                )
-            })?;
-            camera
-        }
-    };
-    let view = View {
-        camera,
-        width: image.width,
-        height: image.height,
-        subpixels: image.subpixels,
-        rotation_deg: scene.environment.rotation_deg,
-        exposure: image.exposure as f32,
-        gamma: image.gamma as f32,
-    };
+    let view = view_of(scene, bounding_sphere(&meshes, &objects))?;
 
     let mut materials = Vec::new();
     let mut thread_time = Duration::ZERO;
@@ -148,27 +155,38 @@ pub fn prepare(scene: &Scene, cache: Option<&Path>, observer: &dyn Observer) -> 
     for name in used_materials {
         // The scene has checked that every material an object names is there.
         let Some(settings) = scene.materials.iter().find(|material| material.name == name) else { continue };
-        let brdf = load_material(&settings.source).map_err(|error| match settings.source {
-            MaterialSource::Model { .. } => error.within(format!("material \"{name}\"")),
-            _ => error,
-        })?;
-        let mut material = PreparedMaterial { name: name.to_owned(), brdf, threads: None };
-        let of = [count.into(), scene.shading.seed];
-        if let Some((threads, state, time)) = load_threads(method, &material.brdf, of, cache, observer)? {
+        let known = before.and_then(|before| before.material(&settings.source));
+        let brdf = match known {
+            Some(known) => known.brdf.clone(),
+            None => load_material(&settings.source).map_err(|error| match settings.source {
+                MaterialSource::Model { .. } => error.within(format!("material \"{name}\"")),
+                _ => error,
+            })?,
+        };
+        cancelled(observer)?;
+        let source = settings.source.clone();
+        let mut material = PreparedMaterial { name: name.to_owned(), brdf, source, threads: None };
+        let same_threads =
+            |before: &&Prepared| (before.method.threads(), before.sampling) == (method.threads(), sampling);
+        if let Some(known) = before.filter(same_threads).and(known) {
+            material.threads.clone_from(&known.threads);
+        } else if let Some((threads, state, time)) =
+            load_threads(method, &material.brdf, [count.into(), sampling.seed], cache, observer)?
+        {
             thread_time += time;
             if state == CacheState::Miss {
                 thread_cache = CacheState::Miss;
             }
-            material.threads = Some(threads.of_material(name));
+            material.threads = Some(Arc::new(threads.of_material(name)));
         }
         materials.push(material);
     }
     Ok(Prepared {
+        scene: scene.clone(),
         method,
-        sampling: Sampling { count, seed: scene.shading.seed },
+        sampling,
         view,
         show_environment: image.background == crate::scene::Background::Environment,
-        intensity: scene.environment.intensity,
         environment,
         meshes,
         objects,
@@ -178,8 +196,54 @@ pub fn prepare(scene: &Scene, cache: Option<&Path>, observer: &dyn Observer) -> 
     })
 }
 
+/// The view of `scene`, whose objects are within a sphere of this centre and radius.
+///
+/// # Errors
+/// Objects that no camera can frame.
+pub fn view_of(scene: &Scene, (centre, radius): (DVec3, f64)) -> Result<View> {
+    let image = &scene.image;
+    let camera = match scene.camera {
+        Some(camera) => camera,
+        None => {
+            let camera = Camera::framing(centre, radius, image.aspect());
+            camera.validate().map_err(|problem| {
+                let problem = format!("cannot be chosen: {problem}");
+                Error::input("[camera]", problem, "give eye and target in the scene file")
+            })?;
+            camera
+        }
+    };
+    Ok(View {
+        camera,
+        width: image.width,
+        height: image.height,
+        subpixels: image.subpixels,
+        rotation_deg: scene.environment.rotation_deg,
+        intensity: scene.environment.intensity,
+        exposure: image.exposure as f32,
+        gamma: image.gamma as f32,
+    })
+}
+
+impl Prepared {
+    /// Centre and radius of a sphere that holds all objects.
+    pub fn bounding_sphere(&self) -> (DVec3, f64) {
+        bounding_sphere(&self.meshes, &self.objects)
+    }
+
+    /// The material that comes from `source`, if there is one.
+    fn material(&self, source: &MaterialSource) -> Option<&PreparedMaterial> {
+        self.materials.iter().find(|material| material.source == *source)
+    }
+}
+
+/// [`Error::Cancelled`] if `observer` has had enough.
+fn cancelled(observer: &dyn Observer) -> Result<()> {
+    if observer.cancelled() { Err(Error::Cancelled) } else { Ok(()) }
+}
+
 /// An error for more threads than a table holds, or more samples than shaders may loop over.
-fn check_count(method: Method, count: u32, subpixels: u32) -> Result<()> {
+pub(crate) fn check_count(method: Method, count: u32, subpixels: u32) -> Result<()> {
     // A pixel at an edge takes all samples in each sub-pixel. lavapipe silently leaves loops after 65535 iterations in all.
     const MOST_ITERATIONS: u32 = 65_000;
     let most = match method.threads() {
@@ -198,7 +262,7 @@ fn check_count(method: Method, count: u32, subpixels: u32) -> Result<()> {
 }
 
 /// Centre and radius of a sphere in world space that holds `object`.
-fn world_sphere(meshes: &[(String, Mesh)], object: &Object) -> (DVec3, f64) {
+fn world_sphere(meshes: &[(String, Arc<Mesh>)], object: &Object) -> (DVec3, f64) {
     let (center, radius) = meshes[object.mesh].1.bounding_sphere();
     let m = object.to_world.matrix3;
     let scale = m.x_axis.length().max(m.y_axis.length()).max(m.z_axis.length());
@@ -220,7 +284,7 @@ fn check_size(mesh: &str, (center, radius): (DVec3, f64)) -> Result<()> {
 }
 
 /// A sphere around the bounding spheres of all objects: centre of their box, and the radius that reaches the farthest.
-fn bounding_sphere(meshes: &[(String, Mesh)], objects: &[Object]) -> (DVec3, f64) {
+fn bounding_sphere(meshes: &[(String, Arc<Mesh>)], objects: &[Object]) -> (DVec3, f64) {
     let spheres: Vec<_> = objects.iter().map(|object| world_sphere(meshes, object)).collect();
     let low = spheres.iter().fold(DVec3::INFINITY, |low, (center, radius)| low.min(*center - *radius));
     let high = spheres.iter().fold(DVec3::NEG_INFINITY, |high, (center, radius)| high.max(*center + *radius));

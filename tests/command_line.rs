@@ -7,6 +7,7 @@ use std::fs;
 use std::path::Path;
 use tempfile::TempDir;
 use threadlight::output::{Picture, read_image};
+use threadlight::scene::{ImageSettings, MaterialSource, Scene, ShadingSettings, Source};
 use threadlight::threads::Threads;
 
 /// What makes a render quick: few pixels, few threads, and an environment that takes no time.
@@ -273,6 +274,39 @@ fn a_scene_file_with_two_objects_and_two_materials_renders() {
         assert_eq!((pixel[1 - channel], pixel[2], pixel[3]), (0.0, 0.0, 1.0));
     }
     assert_eq!(at(&image, 32, 16), [0.0; 4]);
+}
+
+#[test]
+fn a_saved_scene_renders_to_the_same_bits() {
+    let folder = workplace();
+    write_two_spheres(&folder);
+    // What the flags say, said by a scene that was saved, in the same folder and in another.
+    let flags = "--size 96x72 --threads 8 --environment map.hdr --material copper --method paper --rotation 33.3 --exposure 0.7 --gamma 1.9 --subpixels 3 --seed 5";
+    printed(&mut render(&folder, &format!("{flags} -o flags.exr")));
+    printed(&mut render(&folder, &format!("{flags} -o flags.png")));
+    let mut scene = Scene::default();
+    let source = MaterialSource::Builtin("copper".into());
+    scene.use_material("copper", source);
+    scene.environment.source = Source::File(folder.path().join("map.hdr"));
+    scene.environment.rotation_deg = 33.3;
+    scene.image = ImageSettings { width: 96, height: 72, subpixels: 3, exposure: 0.7, gamma: 1.9, ..scene.image };
+    scene.shading = ShadingSettings { method: "paper".into(), threads: Some(8), seed: 5 };
+    let two_spheres = Scene::load(&folder.path().join("scene/scene.toml")).unwrap();
+    printed(&mut render(&folder, "scene/scene.toml -o two.exr"));
+    fs::create_dir(folder.path().join("elsewhere")).unwrap();
+    for place in ["", "elsewhere/"] {
+        for (scene, picture_before) in [(&scene, "flags.exr"), (&two_spheres, "two.exr")] {
+            let saved = format!("{place}saved.toml");
+            scene.save(&folder.path().join(&saved)).unwrap();
+            assert_eq!(Scene::load(&folder.path().join(&saved)).unwrap(), *scene);
+            printed(&mut render(&folder, &format!("{saved} -o saved.exr")));
+            let [before, after] = [picture_before, "saved.exr"].map(|name| picture(&folder, name).rgba);
+            assert!(before == after, "{picture_before} and {saved}");
+        }
+    }
+    scene.save(&folder.path().join("saved.toml")).unwrap();
+    printed(&mut render(&folder, "saved.toml -o saved.png"));
+    assert_eq!(bytes(&folder, "flags.png"), bytes(&folder, "saved.png"));
 }
 
 #[test]

@@ -107,7 +107,7 @@ fn every_estimator_agrees_with_its_cpu_twin() {
 /// Equation (1) in the pixels that see a surface, with their indices.
 fn reference(prepared: &Prepared, geometry: &[[u32; 2]]) -> Vec<(usize, DVec3)> {
     let brdfs = prepared.materials.iter().map(|material| &material.brdf);
-    let integrator = Integrator::new(&prepared.environment, prepared.intensity, brdfs, prepared.view.subpixels);
+    let integrator = Integrator::new(&prepared.environment, prepared.view.intensity, brdfs, prepared.view.subpixels);
     let width = prepared.view.width as usize;
     let pixel = |index: usize| {
         let points = integrator.points(&prepared.view, geometry, index % width, index / width);

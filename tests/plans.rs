@@ -509,3 +509,185 @@ fn empty_sizes_double_names_and_idle_passes_are_errors() {
     });
     assert_eq!(text, "`stray` uses a handle that is not of this graph");
 }
+
+/// What a frame in a window depends on.
+#[derive(Clone, Copy)]
+struct Looked {
+    camera: u32,
+    threads: u32,
+    exposure: u32,
+    width: u32,
+}
+
+const LOOKED: Looked = Looked { camera: 0, threads: 0, exposure: 0, width: 640 };
+
+/// The frame of the viewer: that of the renderer, then the picture and the panel into the window's image.
+fn window_frame(looked: Looked) -> Graph<()> {
+    let Looked { camera, threads, exposure, width } = looked;
+    let image = |format, scale: u32| ImageDesc { format, width: scale * width, height: scale * 480 };
+    let mut graph = Graph::new();
+    let geometry = graph.kept_image("geometry", image(vk::Format::R32G32_UINT, 2));
+    let tiles = graph.buffer("tiles", SMALL);
+    let radiance = graph.kept_image("radiance", image(vk::Format::R32G32B32A32_SFLOAT, 1));
+    let display = graph.kept_image("display", image(vk::Format::R8G8B8A8_UNORM, 1));
+    let window = ImageDesc { format: vk::Format::B8G8R8A8_UNORM, width: 940, height: 480 };
+    let window = graph.import_image("window", window, None, Some(Access::Present));
+
+    let mut pass = graph.pass("geometry_cache");
+    let geometry = pass.write(geometry, Access::ColorAttachment);
+    pass.depends_on(&camera).record(());
+
+    let mut pass = graph.pass("classify");
+    pass.read(geometry, Access::SampledCompute);
+    let tiles = pass.write(tiles, Access::StorageWriteCompute);
+    let radiance = pass.write(radiance, Access::StorageWriteCompute);
+    pass.depends_on(&()).record(());
+
+    let mut pass = graph.pass("shade");
+    pass.read(geometry, Access::SampledCompute).read(tiles, Access::StorageReadCompute);
+    let radiance = pass.modify(radiance, Access::StorageWriteCompute);
+    pass.depends_on(&camera).depends_on(&threads).record(());
+
+    let mut pass = graph.pass("tone_map");
+    pass.read(radiance, Access::StorageReadCompute);
+    let display = pass.write(display, Access::StorageWriteCompute);
+    pass.depends_on(&exposure).record(());
+
+    let mut pass = graph.pass("present");
+    pass.read(display, Access::TransferRead);
+    let window = pass.write(window, Access::TransferWrite);
+    pass.record(());
+
+    let mut pass = graph.pass("ui");
+    let window = pass.modify(window, Access::ColorAttachment);
+    pass.record(());
+    graph.output(window);
+    graph
+}
+
+/// The plan of a frame after another, which left `kept`.
+fn after(kept: &Kept, graph: Graph<()>) -> Plan<()> {
+    graph.compile_keeping(kept, &mut memory).expect("a valid graph")
+}
+
+/// Names of the passes that run.
+fn names(plan: &Plan<()>) -> Vec<&str> {
+    plan.passes.iter().map(|pass| pass.name.as_str()).collect()
+}
+
+const ALL: [&str; 6] = ["geometry_cache", "classify", "shade", "tone_map", "present", "ui"];
+
+#[test]
+fn the_first_frame_in_a_window_makes_everything_and_the_next_keeps_it() {
+    let first = after(&Kept::default(), window_frame(LOOKED));
+    assert_eq!(names(&first), ALL);
+    assert_text(&first, include_str!("plans/window_first.txt"));
+    let next = after(&first.kept, window_frame(LOOKED));
+    assert_eq!(names(&next), ["present", "ui"]);
+    assert_text(&next, include_str!("plans/window_unchanged.txt"));
+    // And so it stays.
+    assert_eq!(names(&after(&next.kept, window_frame(LOOKED))), ["present", "ui"]);
+}
+
+#[test]
+fn another_exposure_runs_neither_geometry_nor_shading() {
+    let first = after(&Kept::default(), window_frame(LOOKED));
+    let brighter = after(&first.kept, window_frame(Looked { exposure: 1, ..LOOKED }));
+    assert_eq!(names(&brighter), ["tone_map", "present", "ui"]);
+    assert_text(&brighter, include_str!("plans/window_exposure.txt"));
+}
+
+#[test]
+fn other_threads_keep_the_geometry_and_another_camera_or_size_keeps_nothing() {
+    let first = after(&Kept::default(), window_frame(LOOKED));
+    let shaded = after(&first.kept, window_frame(Looked { threads: 1, ..LOOKED }));
+    assert_eq!(names(&shaded), ALL[1..]);
+    assert_eq!(names(&after(&first.kept, window_frame(Looked { camera: 1, ..LOOKED }))), ALL);
+    let larger = after(&first.kept, window_frame(Looked { width: 641, ..LOOKED }));
+    assert_eq!(names(&larger), ALL);
+    // What was before the change is forgotten with it.
+    assert_eq!(names(&after(&larger.kept, window_frame(LOOKED))), ALL);
+}
+
+#[test]
+fn a_frame_without_a_store_makes_kept_images_transient() {
+    let plan = plan(window_frame(LOOKED));
+    assert_eq!(names(&plan), ALL);
+    assert!(plan.resources.iter().all(|resource| resource.imported || resource.placement.is_some()));
+}
+
+#[test]
+fn a_pass_that_does_not_say_what_it_depends_on_runs_each_time() {
+    let frame = || {
+        let mut graph = Graph::new();
+        let image = graph.kept_image("image", COLOR);
+        let image = write(&mut graph, "draw", image, Access::ColorAttachment);
+        read(&mut graph, "look", &[(image.into(), Access::SampledCompute)]);
+        graph
+    };
+    let first = after(&Kept::default(), frame());
+    assert_eq!(names(&after(&first.kept, frame())), ["draw", "look"]);
+}
+
+#[test]
+fn what_another_result_of_a_pass_needs_is_made_anew_from_its_start() {
+    // `count` makes a kept image and a transient buffer, which somebody wants in the second frame.
+    let frame = |counts: bool| {
+        let mut graph = Graph::new();
+        let (image, buffer) = (graph.kept_image("image", COLOR), graph.buffer("buffer", SMALL));
+        let mut pass = graph.pass("draw");
+        let image = pass.write(image, Access::StorageWriteCompute);
+        pass.depends_on(&()).record(());
+        let mut pass = graph.pass("count");
+        let image = pass.modify(image, Access::StorageWriteCompute);
+        let buffer = pass.write(buffer, Access::StorageWriteCompute);
+        pass.depends_on(&()).record(());
+        read(&mut graph, "look", &[(image.into(), Access::SampledCompute)]);
+        if counts {
+            read(&mut graph, "read", &[(buffer.into(), Access::StorageReadCompute)]);
+        }
+        graph
+    };
+    let first = after(&Kept::default(), frame(false));
+    assert_eq!(names(&first), ["draw", "count", "look"]);
+    assert_eq!(names(&after(&first.kept, frame(false))), ["look"]);
+    assert_eq!(names(&after(&first.kept, frame(true))), ["draw", "count", "look", "read"]);
+}
+
+#[test]
+fn a_kept_image_that_is_to_be_used_in_another_way_is_made_anew_once() {
+    let frame = |save: bool| {
+        let mut graph = Graph::new();
+        let image = graph.kept_image("image", COLOR);
+        let mut pass = graph.pass("draw");
+        let image = pass.write(image, Access::StorageWriteCompute);
+        pass.depends_on(&()).record(());
+        read(&mut graph, "look", &[(image.into(), Access::SampledCompute)]);
+        if save {
+            let result = graph.import_buffer("file", SMALL, None, Some(Access::HostRead));
+            let mut pass = graph.pass("save");
+            pass.read(image, Access::TransferRead);
+            let result = pass.write(result, Access::TransferWrite);
+            pass.record(());
+            graph.output(result);
+        }
+        graph
+    };
+    let first = after(&Kept::default(), frame(false));
+    let saved = after(&first.kept, frame(true));
+    assert_eq!(names(&saved), ["draw", "look", "save"]);
+    let next = after(&saved.kept, frame(false));
+    assert_eq!(names(&next), ["look"]);
+    assert_eq!(names(&after(&next.kept, frame(true))), ["look", "save"]);
+}
+
+#[test]
+fn what_is_kept_waits_for_its_last_use_in_the_frame_before() {
+    let first = after(&Kept::default(), window_frame(LOOKED));
+    // `present` of the frame before read it; that frame's tone mapping need not be waited for again.
+    let brighter = after(&first.kept, window_frame(Looked { exposure: 1, ..LOOKED }));
+    assert_eq!(waits(&brighter, "tone_map", "display"), ["transfer -> compute(write), undefined => general"]);
+    assert!(waits(&brighter, "tone_map", "radiance").is_empty());
+    let moved = after(&first.kept, window_frame(Looked { camera: 1, ..LOOKED }));
+    assert_eq!(waits(&moved, "geometry_cache", "geometry"), ["compute -> color output(write), undefined => color"]);
+}

@@ -49,7 +49,7 @@ fn sixteen_threads(gpu: &Validated, prepared: &Prepared) -> Result<ReferencePict
     let mut own = ready(&sphere(grey(), "white", 1, (1, 1)));
     (own.view, own.environment, own.show_environment) = (prepared.view.clone(), prepared.environment.clone(), false);
     own.materials[0].brdf = material.brdf.clone();
-    own.materials[0].threads = Some(threads);
+    own.materials[0].threads = Some(threads.into());
     own.sampling.count = 16;
     own.method = Method::Paper;
     let rendering = gpu.render(&own, Wanted { radiance: true, ..Wanted::default() });

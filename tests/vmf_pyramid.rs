@@ -29,7 +29,7 @@ fn the_device_makes_the_same_maps_as_the_cpu() {
     let gpu = Validated::new();
     let environment = environment();
     let cache = PipelineCache::new(&gpu.device, None).unwrap();
-    let found = vmf_pyramid(&gpu.device, &cache, environment.box_filtered()).unwrap();
+    let found = vmf_pyramid(&gpu.device, &cache, environment.box_filtered(), &()).unwrap();
     let expected = VmfPyramid::new(environment.box_filtered());
     assert_eq!(found.levels.levels.len(), expected.levels.levels.len());
     for (map, (found, expected)) in found.levels.levels.iter().zip(&expected.levels.levels).enumerate() {

@@ -12,3 +12,8 @@ materials! {
     "gold" "silver" "copper" "aluminium" "chrome" "tungsten" "titanium-nitride"
     "red-plastic" "blue-plastic" "white-plastic" "billiard-ball" "clay"
 }
+
+/// The TOML text of the built-in material `name`, if there is one.
+pub(super) fn text(name: &str) -> Option<&'static str> {
+    MATERIALS.iter().find(|(known, _)| *known == name).map(|(_, text)| *text)
+}

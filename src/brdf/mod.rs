@@ -16,7 +16,7 @@ mod parameters;
 
 pub use lobe::half_vector_width;
 pub use microfacet::{Distribution, fresnel_conductor, fresnel_dielectric};
-pub use parameters::Parameters;
+pub use parameters::{Domain, Parameter, Parameters};
 
 /// What every model offers; [`Brdf`] dispatches to it.
 pub trait Model: Sized {
@@ -89,8 +89,8 @@ impl Brdf {
         match path.extension().and_then(|extension| extension.to_str()) {
             Some("binary") => Ok(Brdf::MerlTable(MerlTable::load(path)?)),
             Some("toml") => {
-                let text = std::fs::read_to_string(path).map_err(|cause| Error::unreadable(path, cause))?;
-                Brdf::from_toml(&text).map_err(|error| error.within(path.display()))
+                let (model, parameters) = Brdf::load_model(path)?;
+                Brdf::from_parameters(&model, parameters).map_err(|error| error.within(path.display()))
             }
             _ => Err(Error::in_file(path, "is not a material file", "name a MERL .binary or a .toml with a model")),
         }
@@ -105,23 +105,31 @@ impl Brdf {
         Ok(brdf)
     }
 
-    /// A BRDF from the text of a material's TOML file.
-    fn from_toml(text: &str) -> Result<Brdf> {
-        let mut table: toml::Table = text.parse().map_err(|error: toml::de::Error| {
-            Error::input("TOML", error.message().replace('\n', " "), "correct the file's syntax")
-        })?;
-        let models = Brdf::MODELS.join(", ");
-        match table.remove("model") {
-            Some(toml::Value::String(model)) => Brdf::from_parameters(&model, table),
-            Some(_) => Err(Error::input("model", "is not a string", format!("name one of {models}"))),
-            None => Err(Error::input("model", "is missing", format!("name one of {models}"))),
-        }
+    /// What `model` reads from a table of its parameters, and what each of them may be.
+    ///
+    /// # Errors
+    /// The table is not sound: see [`Self::from_parameters`].
+    pub fn parameters(model: &str, table: &toml::Table) -> Result<Vec<Parameter>> {
+        let mut parameters = Parameters::new(table.clone());
+        Brdf::read_model(model, &mut parameters)?;
+        Ok(parameters.read())
+    }
+
+    /// The model that a material file (`.toml`) names, and its parameters, not yet checked.
+    pub fn load_model(path: &Path) -> Result<(String, toml::Table)> {
+        let text = std::fs::read_to_string(path).map_err(|cause| Error::unreadable(path, cause))?;
+        model_of(&text).map_err(|error| error.within(path.display()))
+    }
+
+    /// The model of the built-in material `name`, and its parameters.
+    pub fn builtin_model(name: &str) -> Option<(String, toml::Table)> {
+        Some(model_of(builtin::text(name)?).expect("built-in materials are read by a test"))
     }
 
     /// The built-in material `name`, if there is one.
     pub fn builtin(name: &str) -> Option<Brdf> {
-        let (_, text) = builtin::MATERIALS.iter().find(|(known, _)| *known == name)?;
-        Some(Brdf::from_toml(text).expect("built-in materials are read by a test"))
+        let (model, parameters) = Brdf::builtin_model(name)?;
+        Some(Brdf::from_parameters(&model, parameters).expect("built-in materials are read by a test"))
     }
 
     /// Names of the built-in materials, in the order in which to list them.
@@ -182,6 +190,19 @@ impl Brdf {
             }
         }
         sum
+    }
+}
+
+/// The model that the text of a material's TOML file names, and the other keys.
+fn model_of(text: &str) -> Result<(String, toml::Table)> {
+    let mut table: toml::Table = text.parse().map_err(|error: toml::de::Error| {
+        Error::input("TOML", error.message().replace('\n', " "), "correct the file's syntax")
+    })?;
+    let models = Brdf::MODELS.join(", ");
+    match table.remove("model") {
+        Some(toml::Value::String(model)) => Ok((model, table)),
+        Some(_) => Err(Error::input("model", "is not a string", format!("name one of {models}"))),
+        None => Err(Error::input("model", "is missing", format!("name one of {models}"))),
     }
 }
 

@@ -9,23 +9,49 @@ use crate::error::{Error, Result};
 /// The parameters of one material that have not been read yet.
 pub struct Parameters {
     table: Table,
+    read: Vec<Parameter>,
+}
+
+/// What a model reads, and what it takes: what a slider needs to know.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Parameter {
+    /// Its key in a scene or material file.
+    pub key: String,
+    /// What it may be.
+    pub domain: Domain,
+}
+
+/// What a parameter may be.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Domain {
+    /// A number of this range.
+    Number(RangeInclusive<f64>),
+    /// Linear Rec. 709, each channel of this range.
+    Colour(RangeInclusive<f64>),
+    /// One of these words.
+    Choice(Vec<String>),
 }
 
 impl Parameters {
     /// All entries of `table` are parameters.
     pub fn new(table: Table) -> Self {
-        Self { table }
+        Self { table, read: Vec::new() }
+    }
+
+    /// Those that have been read, in the order in which they were.
+    pub fn read(self) -> Vec<Parameter> {
+        self.read
     }
 
     /// The number `key`, within `range` (NaN and infinities never are).
     pub fn number(&mut self, key: &str, range: RangeInclusive<f64>) -> Result<f64> {
-        let value = self.take(key, "a number")?;
+        let value = self.take(key, "a number", Domain::Number(range.clone()))?;
         in_range(key, as_number(&value), &range)
     }
 
     /// The RGB colour `key`, each channel within `range`; a single number stands for a grey.
     pub fn colour(&mut self, key: &str, range: RangeInclusive<f64>) -> Result<DVec3> {
-        let value = self.take(key, "three numbers [r, g, b]")?;
+        let value = self.take(key, "three numbers [r, g, b]", Domain::Colour(range.clone()))?;
         let channels = match &value {
             Value::Array(array) => array.iter().map(as_number).collect::<Vec<_>>(),
             single => vec![as_number(single); 3],
@@ -39,7 +65,8 @@ impl Parameters {
     /// The value that the string `key` stands for among `choices`.
     pub fn choice<T: Copy>(&mut self, key: &str, choices: &[(&str, T)]) -> Result<T> {
         let names = choices.iter().map(|(name, _)| format!("\"{name}\"")).collect::<Vec<_>>().join(" or ");
-        let value = self.take(key, &names)?;
+        let words = choices.iter().map(|(name, _)| name.to_string()).collect();
+        let value = self.take(key, &names, Domain::Choice(words))?;
         let chosen = choices.iter().find(|(name, _)| value.as_str() == Some(name));
         chosen
             .map(|(_, choice)| *choice)
@@ -56,7 +83,8 @@ impl Parameters {
         }
     }
 
-    fn take(&mut self, key: &str, what: &str) -> Result<Value> {
+    fn take(&mut self, key: &str, what: &str, domain: Domain) -> Result<Value> {
+        self.read.push(Parameter { key: key.into(), domain });
         self.table.remove(key).ok_or_else(|| Error::input(key, "is missing", format!("give {what}")))
     }
 }

@@ -9,7 +9,8 @@ fn direction(theta_deg: f64, phi_deg: f64) -> DVec3 {
 }
 
 fn from_toml(text: &str) -> Result<Brdf> {
-    Brdf::from_toml(text)
+    let (model, parameters) = model_of(text)?;
+    Brdf::from_parameters(&model, parameters)
 }
 
 fn conductor(distribution: &str, alpha: f64) -> Brdf {
@@ -354,5 +355,24 @@ fn fingerprints_tell_brdfs_apart() {
     for (i, a) in all.iter().enumerate() {
         assert_eq!(a.fingerprint(), a.clone().fingerprint());
         assert!(all[..i].iter().all(|b| b.fingerprint() != a.fingerprint()), "{a:?}");
+    }
+}
+
+#[test]
+fn a_model_tells_what_it_reads() {
+    for name in Brdf::builtin_names() {
+        let (model, table) = Brdf::builtin_model(name).unwrap();
+        let parameters = Brdf::parameters(&model, &table).unwrap();
+        assert_eq!(parameters.len(), table.len(), "{name}");
+        for Parameter { key, domain } in &parameters {
+            let (outside, of) = match domain {
+                Domain::Number(range) | Domain::Colour(range) => (toml::Value::Float(2.0 * range.end() + 1.0), key),
+                Domain::Choice(words) => (toml::Value::String(words.concat()), key),
+            };
+            let mut wrong = table.clone();
+            wrong.insert(key.clone(), outside);
+            let error = Brdf::from_parameters(&model, wrong).unwrap_err().to_string();
+            assert!(error.contains(of), "{name}: {error}");
+        }
     }
 }

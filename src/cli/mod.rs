@@ -7,14 +7,15 @@ mod devices;
 mod materials;
 mod progress;
 mod render;
+mod scene_flags;
 mod threads;
+#[cfg(feature = "viewer")]
+mod view;
 
 use clap::{Parser, Subcommand};
 use std::io::IsTerminal;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
-use threadlight::brdf::Brdf;
-use threadlight::scene::MaterialSource;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -41,6 +42,8 @@ pub struct Arguments {
 #[derive(Subcommand)]
 enum Command {
     Render(Box<render::Render>),
+    #[cfg(feature = "viewer")]
+    View(Box<view::View>),
     Compare(compare::Compare),
     Bench(bench::Bench),
     Threads(threads::Threads),
@@ -54,6 +57,8 @@ impl Arguments {
     pub fn run(self) -> anyhow::Result<()> {
         match self.command {
             Command::Render(render) => render.run(),
+            #[cfg(feature = "viewer")]
+            Command::View(view) => view.run(),
             Command::Compare(compare) => compare.run(),
             Command::Bench(bench) => bench.run(),
             Command::Threads(threads) => threads.run(),
@@ -76,7 +81,7 @@ pub fn mistake(error: &clap::Error) -> String {
 
 /// Sends the library's log to standard error; RUST_LOG overrides the flag.
 pub fn start_logging(verbose: u8) {
-    let level = ["warn", "threadlight=info", "threadlight=debug"][usize::from(verbose.min(2))];
+    let level = ["warn,winit=error", "threadlight=info", "threadlight=debug"][usize::from(verbose.min(2))];
     let filter = tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| level.into());
     tracing_subscriber::fmt()
         .with_env_filter(filter)
@@ -85,18 +90,6 @@ pub fn start_logging(verbose: u8) {
         .without_time()
         .with_target(false)
         .init();
-}
-
-/// The material that `text` names: built in, or a file (`./name` for one that is called like a built-in). A name that is
-/// neither, and looks like no file, is an unknown built-in rather than a missing file.
-fn material_of(text: &str) -> MaterialSource {
-    let path = PathBuf::from(text);
-    let is_builtin = Brdf::builtin_names().any(|name| name == text);
-    if !is_builtin && (path.extension().is_some() || path.exists()) {
-        MaterialSource::File(path)
-    } else {
-        MaterialSource::Builtin(text.to_owned())
-    }
 }
 
 /// The folder that threads, blurred environments and pipelines are cached in; none with `--no-cache`.

@@ -1,23 +1,21 @@
 //! `threadlight render`: a picture of a scene.
+use super::number;
 use super::progress::Progress;
-use super::{cache_folder, material_of, number};
+use super::scene_flags::{MachineFlags, SceneFlags};
 use anyhow::Context;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::value_parser;
 use std::io::Write;
 use std::path::PathBuf;
+use threadlight::Error;
 use threadlight::evaluate::reference::{self, Processor, ReferenceImage, ReferenceSettings};
 use threadlight::method::Method;
 use threadlight::output::{self, ExrHeader, Format};
 use threadlight::pipeline::{Renderer, Rendering, Wanted};
 use threadlight::prepare::{Prepared, prepare};
-use threadlight::scene::{
-    Background, EXPOSURE, GAMMA, MAX_SAMPLES, MAX_SIZE_PX, MAX_SUBPIXELS, MaterialSettings, ObjectSettings, Scene,
-    Source, mesh,
-};
+use threadlight::scene::Background;
 use threadlight::threads::CacheState;
 use threadlight::vulkan::{Device, Instance};
-use threadlight::{Error, environment};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -33,24 +31,8 @@ Examples:
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES, allow_negative_numbers = true)]
 pub struct Render {
-    /// Scene file (TOML); without one, the built-in scene: a gold sphere in a studio.
-    scene: Option<PathBuf>,
-    /// Mesh in place of the scene's objects: a built-in name or an OBJ file.
-    #[arg(long, value_name = "NAME|FILE")]
-    mesh: Option<String>,
-    /// Material of every object: a built-in name, a MERL .binary, or a .toml with a model and its parameters.
-    #[arg(long, value_name = "NAME|FILE")]
-    material: Option<String>,
-    /// Light from all directions: a built-in name, a Radiance .hdr or an .exr, latitude-longitude.
-    #[arg(long, value_name = "NAME|FILE")]
-    environment: Option<String>,
-    /// Shading method.
-    #[arg(long, value_name = "NAME", value_parser = methods())]
-    method: Option<String>,
-    /// Sample threads per pixel: fitted 1 to 128 (default 16), paper 1 to 1024 (default 100); or samples per pixel of methods that
-    /// have none, 1 to 10000 (default 100).
-    #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=i64::from(MAX_SAMPLES)))]
-    threads: Option<u32>,
+    #[command(flatten)]
+    scene: SceneFlags,
     /// Method `reference` goes on until its estimated error of display values is below this: each pixel's on the
     /// CPU (default 2e-4), their RMS over the picture on the GPU (default 1e-3).
     #[arg(long, value_name = "X", value_parser = number(f64::MIN_POSITIVE..=1.0, "a positive number up to 1"))]
@@ -59,33 +41,8 @@ pub struct Render {
     /// samples or more (default cpu).
     #[arg(long, value_name = "cpu|gpu", value_parser = processor(), hide_possible_values = true)]
     reference_on: Option<Processor>,
-    /// Sub-pixels per axis, 1 to 4.
-    #[arg(long, value_name = "S", value_parser = value_parser!(u32).range(1..=i64::from(MAX_SUBPIXELS)))]
-    subpixels: Option<u32>,
-    /// Size of the picture in pixels, each side 1 to 16384.
-    #[arg(long, value_name = "WxH", value_parser = parse_size)]
-    size: Option<(u32, u32)>,
-    /// Factor on radiance before display.
-    #[arg(long, value_name = "X", value_parser = number(EXPOSURE, "a finite number that is not negative"))]
-    exposure: Option<f64>,
-    /// Display values are radiance to the power of 1/X.
-    #[arg(long, value_name = "X", value_parser = number(GAMMA, "a finite number above 0"))]
-    gamma: Option<f64>,
-    /// What is seen behind the objects.
-    #[arg(long, value_name = "environment|none", value_parser = background(), hide_possible_values = true)]
-    background: Option<Background>,
-    /// Turns the environment about the vertical axis, counter-clockwise seen from above, in degrees.
-    #[arg(long, value_name = "DEG", value_parser = number(f64::MIN..=f64::MAX, "a finite number"))]
-    rotation: Option<f64>,
-    /// Seed of everything random; the same seed gives the same bytes.
-    #[arg(long, value_name = "N")]
-    seed: Option<u64>,
-    /// Vulkan device: its index or part of its name, as `threadlight devices` lists them.
-    #[arg(long, value_name = "NAME|INDEX")]
-    device: Option<String>,
-    /// Turn on Vulkan's validation layer, with synchronisation validation; any message is a failure.
-    #[arg(long)]
-    validate: bool,
+    #[command(flatten)]
+    machine: MachineFlags,
     /// Render this often; times are medians.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = value_parser!(u32).range(1..))]
     repeat: u32,
@@ -95,9 +52,6 @@ pub struct Render {
     /// Print the plan of the frame: passes, barriers, what was culled, memory.
     #[arg(long)]
     print_plan: bool,
-    /// Neither read nor write cached threads, blurred environments and pipelines.
-    #[arg(long)]
-    no_cache: bool,
     /// Picture to write: .png (8 bit, display values) or .exr (32-bit float, linear radiance).
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -160,8 +114,8 @@ impl Render {
         for path in self.output.iter().chain(&self.stats) {
             output::check_writable(path)?;
         }
-        let scene = self.scene()?;
-        let cache = cache_folder(self.no_cache);
+        let scene = self.scene.scene()?;
+        let cache = self.machine.cache();
         let is_reference = scene.shading.method == Method::Reference.name();
         let useless = [
             ("--tolerance", self.tolerance.is_some() && !is_reference),
@@ -176,9 +130,9 @@ impl Render {
         let prepared = prepare(&scene, cache.as_deref(), &progress)?;
         progress.finish();
 
-        let instance = Instance::new(self.validate).map_err(Error::from)?;
+        let instance = Instance::new(self.machine.validate).map_err(Error::from)?;
         let messages = instance.messages();
-        let device = Device::new(&instance, self.device.as_deref()).map_err(Error::from)?;
+        let device = Device::new(&instance, self.machine.device.as_deref()).map_err(Error::from)?;
         drop(instance);
         let device_name = device.description().name.clone();
         let (rendering, reference) = if prepared.method == Method::Reference {
@@ -233,43 +187,6 @@ impl Render {
             anyhow::bail!("validation: {} messages, the first: {}", messages.len(), first.replace('\n', " "));
         }
         Ok(())
-    }
-
-    /// The scene file, or the built-in scene, with the flags laid over it.
-    fn scene(&self) -> threadlight::Result<Scene> {
-        let mut scene = match &self.scene {
-            Some(path) => Scene::load(path)?,
-            None => Scene::default(),
-        };
-        if let Some(material) = &self.material {
-            scene.materials = vec![MaterialSettings { name: material.clone(), source: material_of(material) }];
-            scene.objects.iter_mut().for_each(|object| object.material.clone_from(material));
-        }
-        if let Some(mesh) = &self.mesh {
-            let mesh = Source::named(mesh, mesh::builtin_names());
-            let material = scene.objects.first().map(|object| object.material.clone()).unwrap_or_default();
-            scene.objects = vec![ObjectSettings::new(mesh, &material)];
-        }
-        if let Some(name) = &self.environment {
-            scene.environment.source = Source::named(name, environment::builtin_names());
-        }
-        if let Some((width, height)) = self.size {
-            (scene.image.width, scene.image.height) = (width, height);
-        }
-        fn lay<T: Clone>(flag: &Option<T>, setting: &mut T) {
-            if let Some(value) = flag {
-                *setting = value.clone();
-            }
-        }
-        lay(&self.method, &mut scene.shading.method);
-        scene.shading.threads = self.threads.or(scene.shading.threads);
-        lay(&self.seed, &mut scene.shading.seed);
-        lay(&self.subpixels, &mut scene.image.subpixels);
-        lay(&self.exposure, &mut scene.image.exposure);
-        lay(&self.gamma, &mut scene.image.gamma);
-        lay(&self.background, &mut scene.image.background);
-        lay(&self.rotation, &mut scene.environment.rotation_deg);
-        Ok(scene)
     }
 
     fn exr_header(&self, prepared: &Prepared, rendering: &Rendering, device: &str) -> ExrHeader {
@@ -328,24 +245,6 @@ fn rendering_of(image: &ReferenceImage, prepared: &Prepared, device_memory_bytes
     };
     rendering.counters.covered_subpixels = image.covered_subpixels as u32;
     rendering
-}
-
-/// `640x480`.
-pub fn parse_size(text: &str) -> Result<(u32, u32), String> {
-    let side = |text: &str| text.parse().ok().filter(|side| (1..=MAX_SIZE_PX).contains(side));
-    let sides = text.split_once(['x', 'X']).and_then(|(width, height)| Some((side(width)?, side(height)?)));
-    sides.ok_or_else(|| format!("use width x height in pixels, each 1 to {MAX_SIZE_PX}, such as 640x480"))
-}
-
-/// The name of a method.
-fn methods() -> PossibleValuesParser {
-    PossibleValuesParser::new(Method::ALL.iter().map(|method| method.name()))
-}
-
-/// `environment` or `none`.
-fn background() -> impl TypedValueParser<Value = Background> {
-    PossibleValuesParser::new(["environment", "none"])
-        .map(|name| if name == "none" { Background::None } else { Background::Environment })
 }
 
 /// `cpu` or `gpu`.

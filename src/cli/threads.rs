@@ -1,6 +1,6 @@
 //! `threadlight threads`: makes, writes and draws the sample threads of a material.
 use super::progress::Progress;
-use super::{cache_folder, material_of, stem};
+use super::{cache_folder, stem};
 use std::path::PathBuf;
 use threadlight::Error;
 use threadlight::method::Method;
@@ -57,7 +57,7 @@ impl Threads {
         for path in self.output.iter().chain(&self.plot) {
             output::check_writable(path)?;
         }
-        let source = material_of(&self.material);
+        let source = MaterialSource::named(&self.material);
         let name = match &source {
             MaterialSource::File(path) => stem(path),
             _ => self.material.clone(),

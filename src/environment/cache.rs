@@ -137,9 +137,9 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let blur = |source: &Pyramid| Ok(VmfPyramid::new(source));
         let first = map(1.0);
-        first.vmf_filtered(Some(folder.path()), blur).unwrap();
+        first.vmf_filtered(Some(folder.path()), &(), blur).unwrap();
         let second = map(1.0);
-        second.vmf_filtered(Some(folder.path()), |_| unreachable!("it is on disk")).unwrap();
+        second.vmf_filtered(Some(folder.path()), &(), |_| unreachable!("it is on disk")).unwrap();
         assert!(second.box_filtered.get().is_none());
     }
 

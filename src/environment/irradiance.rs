@@ -7,6 +7,8 @@ use rayon::prelude::*;
 
 use super::cube::{direction_of, face_of};
 use super::{Environment, Pyramid};
+use crate::error::{Error, Result};
+use crate::threads::Observer;
 
 /// Texels along the edge of a face: bilinear between them is good to h^2 / 4, 2.4e-4 of the largest value, without small sources.
 const FACE_SIZE: usize = 64;
@@ -27,10 +29,13 @@ struct Cell {
     centroid: Vec3,
 }
 
-/// Irradiance over pi for every normal: a cube map of one level.
-pub fn irradiance_map(environment: &Environment) -> Pyramid {
-    let cells = gather(environment);
+/// Irradiance over pi for every normal: a cube map of one level. The only error is that `observer` cancels it.
+pub fn irradiance_map(environment: &Environment, observer: &dyn Observer) -> Result<Pyramid> {
+    let cells = gather(environment, observer)?;
     let irradiance = |texel: usize| {
+        if observer.cancelled() {
+            return Err(Error::Cancelled);
+        }
         let middle = |index: usize| (index as f64 + 0.5) / FACE_SIZE as f64;
         let (face, row, column) = (texel / FACE_SIZE / FACE_SIZE, texel / FACE_SIZE % FACE_SIZE, texel % FACE_SIZE);
         let n = direction_of(face, middle(column), middle(row)).as_vec3();
@@ -40,19 +45,22 @@ pub fn irradiance_map(environment: &Environment) -> Pyramid {
             cosines += n.dot(cell.middle).max(0.0) * cell.solid_angle;
         }
         // Over what a constant gives, which is pi but for the size of the cells: constants stay as they are.
-        (sum / cosines).to_array()
+        Ok((sum / cosines).to_array())
     };
-    let texels = (0..6 * FACE_SIZE * FACE_SIZE).into_par_iter().map(irradiance).collect();
-    Pyramid { face_size: FACE_SIZE, levels: vec![texels] }
+    let texels = (0..6 * FACE_SIZE * FACE_SIZE).into_par_iter().map(irradiance).collect::<Result<_>>()?;
+    Ok(Pyramid { face_size: FACE_SIZE, levels: vec![texels] })
 }
 
 /// The light of `environment` in cells.
-fn gather(environment: &Environment) -> Vec<Cell> {
+fn gather(environment: &Environment, observer: &dyn Observer) -> Result<Vec<Cell>> {
     let mut cells = vec![Cell::default(); 6 * CELLS_SIZE * CELLS_SIZE];
     // At least 2: radiance is bilinear between the centres of pixels, so these alone would not tell how wide it is.
     let times = FEWEST_COLUMNS.div_ceil(environment.width.min(2 * environment.height)).max(2);
     let edge = |row: usize| (std::f64::consts::PI * row as f64 / (times * environment.height) as f64).cos();
     for row in 0..times * environment.height {
+        if observer.cancelled() {
+            return Err(Error::Cancelled);
+        }
         let solid_angle = std::f64::consts::TAU / (times * environment.width) as f64 * (edge(row) - edge(row + 1));
         for column in 0..times * environment.width {
             let place = |index: usize| (index as f64 + 0.5) / times as f64 - 0.5;
@@ -73,7 +81,7 @@ fn gather(environment: &Environment) -> Vec<Cell> {
         // Where there is no light, any place will do.
         cell.centroid = cell.centroid.try_normalize().unwrap_or(cell.middle);
     });
-    cells
+    Ok(cells)
 }
 
 #[cfg(test)]
@@ -87,7 +95,7 @@ mod tests {
     fn a_constant_stays_as_it_is_however_few_pixels_it_has() {
         for (width, height) in [(1, 1), (3, 2), (64, 32)] {
             let map = environment(width, height, |_, _| [1.0, 0.1, 7.0]);
-            let irradiance = irradiance_map(&map);
+            let irradiance = irradiance_map(&map, &()).unwrap();
             for texel in &irradiance.levels[0] {
                 assert!((Vec3::from(*texel) / Vec3::new(1.0, 0.1, 7.0) - 1.0).abs().max_element() < 1e-5, "{texel:?}");
             }

@@ -6,6 +6,7 @@ use std::sync::OnceLock;
 use glam::DVec3;
 
 use crate::error::Result;
+use crate::threads::Observer;
 
 mod cache;
 pub mod cube;
@@ -79,7 +80,16 @@ impl Environment {
 
     /// The box-filtered pyramid of this environment, made once for all renderers.
     pub fn box_filtered(&self) -> &Pyramid {
-        self.box_filtered.get_or_init(|| Pyramid::box_filtered(self))
+        self.watched_box_filtered(&()).expect("nobody cancels")
+    }
+
+    /// The same; the only error is that `observer` cancels it.
+    pub fn watched_box_filtered(&self, observer: &dyn Observer) -> Result<&Pyramid> {
+        if let Some(pyramid) = self.box_filtered.get() {
+            return Ok(pyramid);
+        }
+        let pyramid = Pyramid::box_filtered_to(self, Pyramid::face_size_for(self), observer)?;
+        Ok(self.box_filtered.get_or_init(|| pyramid))
     }
 
     /// Its small bright sources.
@@ -113,17 +123,27 @@ impl Environment {
 
     /// Irradiance over pi.
     pub fn irradiance(&self) -> &Pyramid {
-        self.irradiance.get_or_init(|| irradiance_map(self))
+        self.watched_irradiance(&()).expect("nobody cancels")
+    }
+
+    /// The same; the only error is that `observer` cancels it.
+    pub fn watched_irradiance(&self, observer: &dyn Observer) -> Result<&Pyramid> {
+        if let Some(map) = self.irradiance.get() {
+            return Ok(map);
+        }
+        let map = irradiance_map(self, observer)?;
+        Ok(self.irradiance.get_or_init(|| map))
     }
 
     /// The pyramid of vMF kernels of this environment: from the cache in `folder` or by `make` from the box-filtered one, once for all
     /// renderers.
     ///
     /// # Errors
-    /// Those of `make`.
+    /// Those of `make`; cancelled by `observer` before that.
     pub fn vmf_filtered(
         &self,
         folder: Option<&Path>,
+        observer: &dyn Observer,
         make: impl FnOnce(&Pyramid) -> Result<VmfPyramid>,
     ) -> Result<&VmfPyramid> {
         if let Some(pyramid) = self.vmf_filtered.get() {
@@ -134,8 +154,8 @@ impl Environment {
         let face_size = Pyramid::face_size_for(self);
         let finer = (4 * face_size).min(FEWEST);
         let pyramid = cache::load_or_make(self, folder, || match finer > face_size {
-            true => make(&Pyramid::box_filtered_to(self, finer)),
-            false => make(self.box_filtered()),
+            true => make(&Pyramid::box_filtered_to(self, finer, observer)?),
+            false => make(self.watched_box_filtered(observer)?),
         })?;
         Ok(self.vmf_filtered.get_or_init(|| pyramid))
     }
@@ -172,6 +192,12 @@ impl Environment {
         let phi = TAU * (column + 0.5) / self.width as f64;
         let theta = PI * (row + 0.5) / self.height as f64;
         DVec3::new(theta.sin() * phi.sin(), theta.cos(), -theta.sin() * phi.cos())
+    }
+
+    /// Where in a lat-long picture `direction` (any length but 0) is seen: parts of its width and height, 0 to 1.
+    pub fn lat_long(direction: DVec3) -> [f64; 2] {
+        let [phi, theta] = angles(direction);
+        [(phi / TAU).rem_euclid(1.0), theta / PI]
     }
 
     /// The solid angle of one pixel of `row`, in sr; over the whole picture they sum to 4 pi.
@@ -215,10 +241,14 @@ impl Environment {
 
     /// Column and row of `direction`; whole numbers are pixel centres.
     fn pixel(&self, direction: DVec3) -> (f64, f64) {
-        let phi = direction.x.atan2(-direction.z);
-        let theta = direction.x.hypot(direction.z).atan2(direction.y);
+        let [phi, theta] = angles(direction);
         (phi / TAU * self.width as f64 - 0.5, theta / PI * self.height as f64 - 0.5)
     }
+}
+
+/// phi, -pi to pi, and theta of `direction`.
+fn angles(direction: DVec3) -> [f64; 2] {
+    [direction.x.atan2(-direction.z), direction.x.hypot(direction.z).atan2(direction.y)]
 }
 
 /// The integrals over `centre` +- `extent` / 2 of the tents max(0, 1 - |x - k|) around those whole k that reach into it.
@@ -269,6 +299,10 @@ pub(crate) mod tests {
             (2.0, 3.5, DVec3::NEG_Y),
         ] {
             assert!((sky.direction(column, row) - expected).length() < 1e-15, "{column} {row}");
+            let [u, v] = Environment::lat_long(expected);
+            assert!((v - (row + 0.5) / 4.0).abs() < 1e-15, "{column} {row}");
+            // At the poles every column is as good.
+            assert!(expected.y != 0.0 || (u - (column + 0.5) / 8.0).abs() < 1e-15, "{column} {row}");
         }
     }
 

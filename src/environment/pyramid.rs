@@ -8,6 +8,8 @@ use rayon::prelude::*;
 
 use super::cube::{self, direction_of, exact_texel_solid_angle, face_of, point_of};
 use super::{Environment, to_dvec3};
+use crate::error::{Error, Result};
+use crate::threads::Observer;
 
 /// Level 0 is no finer than this: 6 x 1024^2 texels of 16 bytes are 96 MiB.
 pub(super) const MAX_FACE_SIZE: usize = 1024;
@@ -28,7 +30,7 @@ impl Pyramid {
     /// The means of [`Environment::radiance`] over the solid angles of the texels. Constants stay constant to the bit,
     /// and the energy of a single bright pixel arrives to 3e-3 wherever it is (5e-4 RMS).
     pub fn box_filtered(environment: &Environment) -> Self {
-        Self::box_filtered_to(environment, Self::face_size_for(environment))
+        Self::box_filtered_to(environment, Self::face_size_for(environment), &()).expect("nobody cancels")
     }
 
     /// Texels along the edge of a face, such that one at its middle, 2 / face_size rad, is no larger than a pixel at the equator,
@@ -38,13 +40,17 @@ impl Pyramid {
         pixels.next_power_of_two().clamp(1, MAX_FACE_SIZE)
     }
 
-    /// The same with faces of this size, a power of two.
-    pub(super) fn box_filtered_to(environment: &Environment, face_size: usize) -> Self {
-        let mut levels = vec![finest_level(environment, face_size)];
+    /// The same with faces of this size, a power of two; the only error is that `observer` cancels it.
+    pub(super) fn box_filtered_to(
+        environment: &Environment,
+        face_size: usize,
+        observer: &dyn Observer,
+    ) -> Result<Self> {
+        let mut levels = vec![finest_level(environment, face_size, observer)?];
         for size in (0..face_size.ilog2()).rev().map(|log2| 1 << log2) {
             levels.push(coarser_level(levels.last().expect("there is level 0"), size));
         }
-        Self { face_size, levels }
+        Ok(Self { face_size, levels })
     }
 
     /// Texels along the edge of a face at `level`.
@@ -132,7 +138,7 @@ impl Pyramid {
 /// Level 0: for each texel the mean of a grid of samples, each itself the exact mean of the bilinear environment over a box
 /// in theta and phi as large as the sample's share of the texel. Point samples would miss the energy of a single bright
 /// pixel by per cents, and near the poles, where pixels are slivers, altogether.
-fn finest_level(environment: &Environment, face_size: usize) -> Vec<[f32; 3]> {
+fn finest_level(environment: &Environment, face_size: usize, observer: &dyn Observer) -> Result<Vec<[f32; 3]>> {
     let row_rad = PI / environment.height as f64;
     let texel_rad = 2.0 / face_size as f64;
     // As many as there are rows in the texel, half as many again as there are columns, which get narrow towards the poles, and
@@ -148,6 +154,9 @@ fn finest_level(environment: &Environment, face_size: usize) -> Vec<[f32; 3]> {
     (0..6 * face_size * face_size)
         .into_par_iter()
         .map(|texel| {
+            if observer.cancelled() {
+                return Err(Error::Cancelled);
+            }
             let (face, row, column) = (texel / face_size / face_size, texel / face_size % face_size, texel % face_size);
             let middle = |index: usize| (index as f64 + 0.5) / face_size as f64;
             let axes = [
@@ -167,7 +176,7 @@ fn finest_level(environment: &Environment, face_size: usize) -> Vec<[f32; 3]> {
                 sum += solid_angle * environment.mean_over_box(point, theta_rad, phi_rad);
                 weight_sum += solid_angle;
             }
-            (sum / weight_sum).as_vec3().to_array()
+            Ok((sum / weight_sum).as_vec3().to_array())
         })
         .collect()
 }

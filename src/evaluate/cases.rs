@@ -1,5 +1,6 @@
 //! What evaluations go through: every material in every environment in every scene, by every method at every count.
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use super::metrics::Display;
 use crate::error::{Error, Result};
@@ -74,7 +75,7 @@ impl Cases {
         let mut environments = Vec::new();
         for (name, source) in &self.environments {
             let settings = EnvironmentSettings { source: source.clone(), ..EnvironmentSettings::default() };
-            environments.push((name, settings.load()?));
+            environments.push((name, Arc::new(settings.load()?)));
         }
         let mut scenes = Vec::new();
         for (name, scene) in &self.scenes {
@@ -84,7 +85,8 @@ impl Cases {
         self.check_materials()?;
         for (material_name, source) in &self.materials {
             let brdf = load_material(source)?;
-            let mut material = vec![PreparedMaterial { name: material_name.clone(), brdf, threads: None }];
+            let source = source.clone();
+            let mut material = vec![PreparedMaterial { name: material_name.clone(), brdf, source, threads: None }];
             let mut tables = Vec::new();
             for (scene, prepared, display) in &mut scenes {
                 // The scene borrows the material and the environment while they are looked at together.
@@ -144,7 +146,7 @@ pub struct Place<'a> {
     pub prepared: &'a mut Prepared,
     cases: &'a Cases,
     /// The threads made for the material so far.
-    tables: &'a mut Vec<(Estimator, Threads)>,
+    tables: &'a mut Vec<(Estimator, Arc<Threads>)>,
     observer: &'a dyn Observer,
 }
 
@@ -162,6 +164,7 @@ impl Place<'_> {
                 let of = [count.into(), self.cases.seed];
                 let table = load_threads(method, &material.brdf, of, self.cases.cache.as_deref(), self.observer)?;
                 table.map(|(table, ..)| {
+                    let table = Arc::new(table);
                     self.tables.push((estimator, table.clone()));
                     table
                 })

@@ -9,28 +9,45 @@ const GAP_ROWS: usize = 4;
 /// Pixels that were not compared, the gap, and the scale's ticks.
 const LEFT_OUT: [u8; 3] = [72, 78, 84];
 
-/// Width, height and RGBA, 8 bits each, of a heat map: the largest difference among the three channels' display values, in
-/// magma colours from black at 1e-4 and below over violet and orange to pale yellow at 1; the same colour steps for the
-/// same factor. Grey pixels were left out. Below the map is the scale, 1e-4 on the left and 1 on the right, with a tick at each
-/// power of ten.
+/// RGBA, 8 bits each, of a heat map: the largest difference among the three channels' display values, in magma colours from black
+/// at 1e-4 and below over violet and orange to pale yellow at 1; the same colour steps for the same factor. Grey pixels were left out.
 ///
 /// # Panics
 /// If the sizes differ.
-pub fn difference_picture(a: &Comparable, b: &Comparable, mask_background: bool) -> (u32, u32, Vec<u8>) {
+pub fn heat_map(a: &Comparable, b: &Comparable, mask_background: bool) -> Vec<u8> {
     assert_eq!((a.width, a.height), (b.width, b.height), "sizes differ");
-    let colours = nv_flip::magma_lut().to_vec();
-    let colour = |difference: f64| {
-        let place = 1.0 - difference.max(SMALLEST).log10() / SMALLEST.log10();
-        let index = (255.0 * place).round().min(255.0) as usize;
-        [colours[3 * index], colours[3 * index + 1], colours[3 * index + 2]]
-    };
+    let colour = scale();
     // Without alpha in either there is nothing to leave out.
     let compared = compared_pixels(a, b, mask_background).unwrap_or_else(|_| vec![true; a.display.len()]);
     let map = a.display.iter().zip(&b.display).zip(&compared).map(|((a, b), compared)| {
         let largest = (0..3).map(|channel| (a[channel] - b[channel]).abs()).fold(0.0, f32::max);
         if *compared { colour(f64::from(largest)) } else { LEFT_OUT }
     });
+    map.flat_map(opaque).collect()
+}
 
+/// The colour of a difference.
+fn scale() -> impl Fn(f64) -> [u8; 3] {
+    let colours = nv_flip::magma_lut().to_vec();
+    move |difference: f64| {
+        let place = 1.0 - difference.max(SMALLEST).log10() / SMALLEST.log10();
+        let index = (255.0 * place).round().min(255.0) as usize;
+        [colours[3 * index], colours[3 * index + 1], colours[3 * index + 2]]
+    }
+}
+
+fn opaque([r, g, b]: [u8; 3]) -> [u8; 4] {
+    [r, g, b, 255]
+}
+
+/// Width, height and RGBA of the [`heat_map`] with its scale below it: 1e-4 on the left and 1 on the right, with a tick at each power of
+/// ten.
+///
+/// # Panics
+/// If the sizes differ.
+pub fn difference_picture(a: &Comparable, b: &Comparable, mask_background: bool) -> (u32, u32, Vec<u8>) {
+    let mut rgba = heat_map(a, b, mask_background);
+    let colour = scale();
     let width = a.width;
     let decades = -SMALLEST.log10();
     let scale = (0..width).map(|x| {
@@ -43,8 +60,7 @@ pub fn difference_picture(a: &Comparable, b: &Comparable, mask_background: bool)
     });
     let scale: Vec<_> = scale.collect();
     let gap = std::iter::repeat_n(LEFT_OUT, GAP_ROWS * width);
-    let below = gap.chain(scale.iter().copied().cycle().take(SCALE_ROWS * width));
-    let rgba = map.chain(below).flat_map(|[r, g, b]| [r, g, b, 255]).collect();
+    rgba.extend(gap.chain(scale.iter().copied().cycle().take(SCALE_ROWS * width)).flat_map(opaque));
     (width as u32, (a.height + GAP_ROWS + SCALE_ROWS) as u32, rgba)
 }
 

@@ -173,7 +173,7 @@ impl Growing {
             Self::Threads => {}
             Self::Triangles => {
                 for (_, mesh) in &mut place.prepared.meshes {
-                    *mesh = (0..step).fold(mesh.clone(), |mesh, _| mesh.subdivided());
+                    *mesh = (0..step).fold(mesh.clone(), |mesh, _| Arc::new(mesh.subdivided()));
                 }
             }
         }

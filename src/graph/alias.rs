@@ -55,7 +55,7 @@ pub(super) fn alias(
     resources: &mut [PlannedResource],
     memory: &mut dyn FnMut(&ResourceInfo) -> MemoryRequirement,
 ) -> Vec<Block> {
-    let transient = resources.iter().enumerate().filter(|(_, resource)| !resource.imported);
+    let transient = resources.iter().enumerate().filter(|(_, resource)| !resource.imported && !resource.kept);
     let mut largest_first: Vec<_> = transient.map(|(index, resource)| (index, memory(&resource.info))).collect();
     largest_first.sort_by_key(|(_, requirement)| Reverse(requirement.size_bytes));
 

@@ -21,6 +21,7 @@
 //!   before it, those later in the plan ran a frame ago: frames in flight share one set of transient memory, which is
 //!   sound because a barrier also waits for earlier submissions to the same queue. The image's layout is then `UNDEFINED`: the
 //!   contents are gone. Sparing a wait where the order implies it would save nothing: there is one barrier either way.
+//! - *Kept*: the last span of the last frame that used it. What it holds may be still good, or be written anew.
 //!
 //! After the last span of an imported resource stands the access that its owner wants it left for, as one more span. Its
 //! barrier is left out only if the stages are the very same: the owner waits for these later, and for no others.
@@ -28,9 +29,11 @@
 //! What the barriers do not promise: anything between queues, between two plans whose memory overlaps, or to the CPU
 //! beyond making writes available to it (it still has to wait for the frame's fence).
 use super::access::Access;
-use super::declare::{Graph, Kind};
+use super::declare::{Graph, Handle, Kind};
+use super::keep::{Held, Kept};
 use super::plan::PlannedResource;
 use ash::vk::{AccessFlags2, ImageLayout, PipelineStageFlags2};
+use std::collections::HashMap;
 
 /// One dependency, in the terms of `VkMemoryBarrier2` and `VkImageMemoryBarrier2` over a whole resource.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -122,19 +125,24 @@ impl Span {
     }
 }
 
-/// The barriers before each pass of the plan, and those after the last one; each list in the order of the resources.
+/// The barriers before each pass of the plan, and those after the last one; each list in the order of the resources. And what
+/// kept resources hold then.
 pub(super) fn barriers<W>(
     graph: &Graph<W>,
     order: &[usize],
     resources: &[PlannedResource],
-) -> (Vec<Vec<Barrier>>, Vec<Barrier>) {
+    kept: Option<&Kept>,
+    fingerprints: &HashMap<Handle, Option<u64>>,
+) -> ((Vec<Vec<Barrier>>, Vec<Barrier>), Kept) {
     let spans: Vec<Vec<Span>> = resources.iter().map(|resource| spans(graph, order, resource.declared)).collect();
     let mut barriers: Vec<Vec<Barrier>> = vec![Vec::new(); order.len()];
     let mut final_barriers = Vec::new();
+    let mut kept = kept.cloned().unwrap_or_default();
     for (resource, own) in spans.iter().enumerate() {
         let declared = &graph.resources[resources[resource].declared];
         let (mut past, mut takes_over) = match &declared.import {
             Some(import) => (past_of_import(import.before, &declared.kind), Vec::new()),
+            None if resources[resource].kept => (past_of_kept(&resources[resource], &kept), Vec::new()),
             None => past_of_memory(resource, resources, &spans),
         };
         for span in own {
@@ -151,8 +159,36 @@ pub(super) fn barriers<W>(
                 final_barriers.push(barrier(resource, &past, &after, Vec::new()));
             }
         }
+        if resources[resource].kept {
+            kept.hold(&resources[resource], &past, newest(graph, order, resources[resource].declared), fingerprints);
+        }
     }
-    (barriers, final_barriers)
+    ((barriers, final_barriers), kept)
+}
+
+/// The newest version of a resource that the plan makes; none if it only reads.
+fn newest<W>(graph: &Graph<W>, order: &[usize], resource: usize) -> Option<Handle> {
+    let uses = order.iter().flat_map(|&pass| &graph.passes[pass].uses);
+    uses.filter_map(|use_| use_.makes()).filter(|made| made.resource == resource).max()
+}
+
+impl Kept {
+    /// Notes that the plan leaves `resource` as it was used last, with the contents of version `made`, or as they were.
+    fn hold(
+        &mut self,
+        resource: &PlannedResource,
+        last: &Span,
+        made: Option<Handle>,
+        fingerprints: &HashMap<Handle, Option<u64>>,
+    ) {
+        let name = &resource.info.name;
+        let fingerprint = match made {
+            Some(made) => fingerprints.get(&made).copied().flatten(),
+            None => self.0.get(name).and_then(|held| held.fingerprint),
+        };
+        let Span { stages, accesses, layout, .. } = *last;
+        self.0.insert(name.clone(), Held { info: resource.info.clone(), fingerprint, stages, accesses, layout });
+    }
 }
 
 fn spans<W>(graph: &Graph<W>, order: &[usize], resource: usize) -> Vec<Span> {
@@ -173,6 +209,15 @@ fn spans<W>(graph: &Graph<W>, order: &[usize], resource: usize) -> Vec<Span> {
 
 fn past_of_import(before: Option<Access>, kind: &Kind) -> Span {
     before.map_or(UNKNOWN, |access| Span::by_owner(0, access, kind))
+}
+
+/// The last use in an earlier frame of what is still the same object.
+fn past_of_kept(resource: &PlannedResource, kept: &Kept) -> Span {
+    let held = kept.0.get(&resource.info.name).filter(|held| held.info == resource.info);
+    held.map_or(UNKNOWN, |held| {
+        let Held { stages, accesses, layout, .. } = *held;
+        Span { first: 0, stages, accesses, layout, discards: false }
+    })
 }
 
 /// The last spans, as one, of all resources that share bytes with a transient one; and which these are.

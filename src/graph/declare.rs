@@ -1,9 +1,11 @@
 //! Declare: the graph as the passes describe it, resources by version, nothing checked yet.
 use super::access::{Access, Mode};
+use super::plan::ResourceInfo;
 use ash::vk;
+use std::hash::{DefaultHasher, Hash, Hasher};
 
 /// An image of one layer, one mip level and one sample per pixel.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct ImageDesc {
     /// Texel format.
     pub format: vk::Format,
@@ -14,14 +16,14 @@ pub struct ImageDesc {
 }
 
 /// A buffer.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct BufferDesc {
     /// Size in bytes, at least 1.
     pub size_bytes: u64,
 }
 
 /// What a resource is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Kind {
     /// An image.
     Image(ImageDesc),
@@ -93,8 +95,10 @@ pub struct Graph<W> {
 pub(super) struct Resource {
     pub name: String,
     pub kind: Kind,
-    /// `None` for a transient resource.
+    /// `None` for a transient resource, and for one to be kept.
     pub import: Option<Import>,
+    /// Whether it outlives the frame where somebody keeps such resources; otherwise it is transient.
+    pub keep: bool,
 }
 
 /// What the owner of an imported resource says about it.
@@ -107,6 +111,8 @@ pub(super) struct Import {
 pub(super) struct Pass<W> {
     pub name: String,
     pub uses: Vec<Use>,
+    /// Hash of what it depends on besides resources; none if it does not say.
+    pub inputs: Option<u64>,
     pub work: Option<W>,
 }
 
@@ -152,7 +158,15 @@ impl<W> Graph<W> {
         self.resource(name, Kind::Buffer(desc), None).into()
     }
 
-    /// An image that someone else owns and keeps: a swapchain image, a geometry cache kept from the frame before.
+    /// An image that is worth keeping: where frames are compiled one after another with what was kept
+    /// ([`Graph::compile_keeping`]), passes that would make the same contents again do not run. Elsewhere it is transient.
+    pub fn kept_image(&mut self, name: &str, desc: ImageDesc) -> Image {
+        let handle = self.resource(name, Kind::Image(desc), None);
+        self.resources[handle.resource].keep = true;
+        handle.into()
+    }
+
+    /// An image that someone else owns: a swapchain image.
     ///
     /// `before` is the access it was last used with; what was written must already be visible to that access. `None`: its
     /// contents are undefined, and its first use waits for everything earlier on the queue. `after` is the access that it
@@ -180,15 +194,22 @@ impl<W> Graph<W> {
     }
 
     fn resource(&mut self, name: &str, kind: Kind, import: Option<Import>) -> Handle {
-        self.resources.push(Resource { name: name.to_owned(), kind, import });
+        self.resources.push(Resource { name: name.to_owned(), kind, import, keep: false });
         Handle { resource: self.resources.len() - 1, version: 0 }
     }
 
     /// Adds a pass; the builder says what it uses and what it records.
     pub fn pass(&mut self, name: &str) -> PassBuilder<'_, W> {
         let index = self.passes.len();
-        self.passes.push(Pass { name: name.to_owned(), uses: Vec::new(), work: None });
+        self.passes.push(Pass { name: name.to_owned(), uses: Vec::new(), inputs: None, work: None });
         PassBuilder { pass: &mut self.passes[index] }
+    }
+
+    /// What resource number `index` must be to be used as all declared passes use it, whether they run or not.
+    pub(super) fn info(&self, index: usize) -> ResourceInfo {
+        let resource = &self.resources[index];
+        let uses = self.passes.iter().flat_map(|pass| &pass.uses).filter(|use_| use_.handle.resource == index);
+        ResourceInfo::used_as(&resource.name, resource.kind, uses.map(|use_| use_.access))
     }
 
     /// The frame exists for this: the newest version of an imported resource. Passes that no output needs are culled;
@@ -225,6 +246,15 @@ impl<W> PassBuilder<'_, W> {
         let handle = handle.into();
         self.pass.uses.push(Use { handle, access, mode });
         handle.next().into()
+    }
+
+    /// Says what the pass depends on besides the resources that it uses: everything else that, when it changes, changes what
+    /// the pass makes. Where this is not said, nothing that the pass makes is ever still good.
+    pub fn depends_on(&mut self, inputs: &impl Hash) -> &mut Self {
+        let mut hasher = DefaultHasher::new();
+        (self.pass.inputs, inputs).hash(&mut hasher);
+        self.pass.inputs = Some(hasher.finish());
+        self
     }
 
     /// What the pass records when it runs.

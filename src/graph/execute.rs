@@ -1,8 +1,9 @@
 //! Execute: the plan's resources as Vulkan objects, its passes and barriers as commands.
-use super::{Barrier, Graph, Handle, Kind, MemoryRequirement, Plan, PlannedPass, ResourceInfo};
+use super::{Barrier, Graph, Handle, Kept, Kind, MemoryRequirement, Plan, PlannedPass, ResourceInfo};
 use crate::Result;
-use crate::vulkan::{self, Commands, Device, Frames, ImageShape, Memory, PassTime, VulkanError};
+use crate::vulkan::{self, Commands, Device, Frames, ImageShape, Memory, PassTime, Semaphores, VulkanError};
 use ash::vk;
+use std::collections::HashMap;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -10,9 +11,43 @@ use std::time::Instant;
 pub type Work<'a> = Box<dyn Fn(&mut Commands, &Resources<'_>) -> std::result::Result<(), VulkanError> + 'a>;
 
 /// The Vulkan object behind a resource of the plan.
-enum Object {
-    Image(vulkan::Image),
+#[derive(Clone)]
+pub enum Object {
+    /// Behind an image.
+    Image(Arc<vulkan::Image>),
+    /// Behind a buffer.
     Buffer(Arc<vulkan::Buffer>),
+}
+
+/// The objects that outlive frames, and what they hold.
+#[derive(Default)]
+pub struct Store {
+    kept: Kept,
+    objects: HashMap<String, (ResourceInfo, Object)>,
+}
+
+impl Store {
+    /// What the frames so far have left.
+    pub fn kept(&self) -> &Kept {
+        &self.kept
+    }
+
+    /// The object that is kept as `info`, made if there is none.
+    fn object(&mut self, device: &Arc<Device>, info: &ResourceInfo) -> std::result::Result<Object, VulkanError> {
+        if let Some((_, object)) = self.objects.get(&info.name).filter(|(known, _)| known == info) {
+            return Ok(object.clone());
+        }
+        let (object, needs) = make(device, info)?;
+        let requirements = vk::MemoryRequirements {
+            size: needs.size_bytes,
+            alignment: needs.alignment,
+            memory_type_bits: needs.memory_type_bits,
+        };
+        let memory = Memory::new(device, &info.name, requirements, !info.is_image())?;
+        let object = bind(object, &memory, 0)?;
+        self.objects.insert(info.name.clone(), (info.clone(), object.clone()));
+        Ok(object)
+    }
 }
 
 /// The objects behind the handles of a graph.
@@ -26,7 +61,7 @@ impl Resources<'_> {
     /// The image behind `handle`, which a pass that runs has declared.
     pub fn image(&self, handle: super::Image) -> &vulkan::Image {
         match self.object(handle.into()) {
-            Some(Object::Image(image)) => image,
+            Some(Object::Image(image)) => image.as_ref(),
             _ => unreachable!("a pass that runs asks for images that it declared"),
         }
     }
@@ -53,19 +88,37 @@ pub struct Executable<'a> {
 }
 
 impl<'a> Executable<'a> {
-    /// Compiles `graph` and makes its transient resources; `imports` are the objects behind its imported buffers.
+    /// Compiles `graph` and makes its transient resources; `imports` are the objects behind its imported ones.
     ///
     /// # Errors
     /// A wrong graph, no device memory left.
-    pub fn new(
+    pub fn new(device: &Arc<Device>, graph: Graph<Work<'a>>, imports: &[(Handle, Object)]) -> Result<Self> {
+        Self::compile(device, graph, imports, None)
+    }
+
+    /// The same for a frame that is executed once, after those whose results are in `store`.
+    ///
+    /// # Errors
+    /// A wrong graph, no device memory left.
+    pub fn keeping(
         device: &Arc<Device>,
         graph: Graph<Work<'a>>,
-        imports: &[(super::Buffer, Arc<vulkan::Buffer>)],
+        imports: &[(Handle, Object)],
+        store: &mut Store,
+    ) -> Result<Self> {
+        Self::compile(device, graph, imports, Some(store))
+    }
+
+    fn compile(
+        device: &Arc<Device>,
+        graph: Graph<Work<'a>>,
+        imports: &[(Handle, Object)],
+        mut store: Option<&mut Store>,
     ) -> Result<Self> {
         // Vulkan tells what memory an object needs only once the object exists.
-        let mut made = std::collections::HashMap::new();
+        let mut made = HashMap::new();
         let mut failure = None;
-        let plan = graph.compile(&mut |info| match make(device, info) {
+        let mut memory = |info: &ResourceInfo| match make(device, info) {
             Ok((object, requirement)) => {
                 made.insert(info.name.clone(), object);
                 requirement
@@ -74,30 +127,30 @@ impl<'a> Executable<'a> {
                 failure.get_or_insert(error);
                 MemoryRequirement { size_bytes: 1, alignment: 1, memory_type_bits: !0 }
             }
-        })?;
+        };
+        let plan = match &store {
+            Some(store) => graph.compile_keeping(&store.kept, &mut memory)?,
+            None => graph.compile(&mut memory)?,
+        };
         if let Some(error) = failure {
             return Err(error.into());
         }
         let memory = memory_of(device, &plan)?;
         let mut objects = Vec::new();
         for (index, resource) in plan.resources.iter().enumerate() {
-            let object = match (made.remove(&resource.info.name), resource.placement) {
-                (Some(Object::Image(mut image)), Some(at)) => {
-                    image.bind(&memory[at.block], at.offset_bytes)?;
-                    Object::Image(image)
-                }
-                (Some(Object::Buffer(buffer)), Some(at)) => {
-                    let mut buffer = Arc::into_inner(buffer).expect("just made, with no other owner");
-                    buffer.bind(&memory[at.block], at.offset_bytes)?;
-                    Object::Buffer(Arc::new(buffer))
-                }
+            let object = match (made.remove(&resource.info.name), resource.placement, &mut store) {
+                (Some(object), Some(at), _) => bind(object, &memory[at.block], at.offset_bytes)?,
+                (_, _, Some(store)) if resource.kept => store.object(device, &resource.info)?,
                 _ => {
                     let import = imports.iter().find(|(handle, _)| plan.find(*handle) == Some(index));
-                    let (_, buffer) = import.expect("whoever imports a resource brings it");
-                    Object::Buffer(buffer.clone())
+                    let (_, object) = import.expect("whoever imports a resource brings it");
+                    object.clone()
                 }
             };
             objects.push(object);
+        }
+        if let Some(store) = store {
+            store.kept = plan.kept.clone();
         }
         let declared = plan.resources.iter().map(|resource| resource.declared).collect();
         Ok(Self { plan, objects, declared })
@@ -108,7 +161,15 @@ impl<'a> Executable<'a> {
     /// # Errors
     /// Whatever Vulkan refuses.
     pub fn execute(&self, frames: &mut Frames) -> Result<()> {
-        frames.record(|commands| {
+        self.execute_between(frames, Semaphores::default())
+    }
+
+    /// The same between two semaphores.
+    ///
+    /// # Errors
+    /// Whatever Vulkan refuses.
+    pub fn execute_between(&self, frames: &mut Frames, semaphores: Semaphores) -> Result<()> {
+        frames.record_between(semaphores, |commands| {
             for pass in &self.plan.passes {
                 self.record_pass(commands, pass)?;
             }
@@ -128,24 +189,25 @@ impl<'a> Executable<'a> {
             self.execute(frames)?;
             Ok(frames.pass_times()?)
         } else {
-            self.execute_pass_by_pass(frames)
+            self.execute_pass_by_pass(frames, Semaphores::default())
         }
     }
 
-    /// Submits one frame pass by pass, waiting for each, and times them from outside: for devices whose timestamps do
-    /// not tell.
+    /// Submits one frame pass by pass between two semaphores, waiting for each, and times them from outside: for devices whose
+    /// timestamps do not tell.
     ///
     /// # Errors
     /// Whatever Vulkan refuses.
-    fn execute_pass_by_pass(&self, frames: &mut Frames) -> Result<Vec<PassTime>> {
+    pub fn execute_pass_by_pass(&self, frames: &mut Frames, semaphores: Semaphores) -> Result<Vec<PassTime>> {
         let mut times = Vec::new();
         for pass in &self.plan.passes {
             let start = Instant::now();
-            frames.record(|commands| self.record_pass(commands, pass))?;
+            let semaphores = if times.is_empty() { semaphores.first() } else { Semaphores::default() };
+            frames.record_between(semaphores, |commands| self.record_pass(commands, pass))?;
             frames.wait()?;
             times.push(PassTime { name: pass.name.clone(), gpu_ms: start.elapsed().as_secs_f64() * 1e3 });
         }
-        frames.record(|commands| {
+        frames.record_between(semaphores.last(), |commands| {
             self.record_barriers(commands, &self.plan.final_barriers);
             Ok(())
         })?;
@@ -208,19 +270,39 @@ fn memory_barrier(barrier: &Barrier) -> vk::MemoryBarrier2<'static> {
         .dst_access_mask(barrier.dst_access)
 }
 
-/// A transient resource without memory, and what memory it needs.
-fn make(device: &Arc<Device>, info: &ResourceInfo) -> std::result::Result<(Object, MemoryRequirement), VulkanError> {
+/// An object that has no memory yet.
+enum Made {
+    Image(vulkan::Image),
+    Buffer(vulkan::Buffer),
+}
+
+/// Gives `made` its memory.
+fn bind(made: Made, memory: &Arc<Memory>, offset: u64) -> std::result::Result<Object, VulkanError> {
+    Ok(match made {
+        Made::Image(mut image) => {
+            image.bind(memory, offset)?;
+            Object::Image(Arc::new(image))
+        }
+        Made::Buffer(mut buffer) => {
+            buffer.bind(memory, offset)?;
+            Object::Buffer(Arc::new(buffer))
+        }
+    })
+}
+
+/// A resource without memory, and what memory it needs.
+fn make(device: &Arc<Device>, info: &ResourceInfo) -> std::result::Result<(Made, MemoryRequirement), VulkanError> {
     let (object, needs) = match info.kind {
         Kind::Image(desc) => {
             let shape = ImageShape::plane(desc.format, desc.width, desc.height);
             let image = vulkan::Image::unbound(device, &info.name, shape, info.image_usage)?;
             let needs = image.requirements();
-            (Object::Image(image), needs)
+            (Made::Image(image), needs)
         }
         Kind::Buffer(desc) => {
             let buffer = vulkan::Buffer::unbound(device, &info.name, desc.size_bytes, info.buffer_usage)?;
             let needs = buffer.requirements();
-            (Object::Buffer(Arc::new(buffer)), needs)
+            (Made::Buffer(buffer), needs)
         }
     };
     let vk::MemoryRequirements { size: size_bytes, alignment, memory_type_bits } = needs;

@@ -1,8 +1,7 @@
 //! Lifetimes: which resources the plan uses, for what, and from which pass to which.
-use super::access::Access;
-use super::declare::{Graph, Kind};
+use super::declare::Graph;
+use super::keep::Kept;
 use super::plan::{PlannedResource, ResourceInfo};
-use ash::vk;
 
 /// First and last position in the plan, both included.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -21,7 +20,9 @@ impl Lifetime {
 }
 
 /// The resources that some pass of `order` uses, in order of declaration: no other is ever made.
-pub(super) fn lifetimes<W>(graph: &Graph<W>, order: &[usize]) -> Vec<PlannedResource> {
+///
+/// Those to be kept are transient where nothing is `kept`.
+pub(super) fn lifetimes<W>(graph: &Graph<W>, order: &[usize], kept: Option<&Kept>) -> Vec<PlannedResource> {
     let planned = graph.resources.iter().enumerate().filter_map(|(declared, resource)| {
         let uses = order.iter().enumerate().flat_map(|(position, &pass)| {
             let of_resource = graph.passes[pass].uses.iter().filter(|use_| use_.handle.resource == declared);
@@ -30,19 +31,23 @@ pub(super) fn lifetimes<W>(graph: &Graph<W>, order: &[usize]) -> Vec<PlannedReso
         let lifetime = Lifetime { first: uses.clone().next()?.0, last: uses.clone().last()?.0 };
         let import = resource.import.as_ref();
         let by_owner = import.into_iter().flat_map(|import| [import.before, import.after]).flatten();
-        let mut info = ResourceInfo {
-            name: resource.name.clone(),
-            kind: resource.kind,
-            image_usage: vk::ImageUsageFlags::empty(),
-            buffer_usage: vk::BufferUsageFlags::empty(),
-        };
-        for access in uses.map(|(_, access)| access).chain(by_owner).map(Access::info) {
-            match info.kind {
-                Kind::Image(_) => info.image_usage |= access.image_usage.unwrap_or_default(),
-                Kind::Buffer(_) => info.buffer_usage |= access.buffer_usage.unwrap_or_default(),
+        let kept = kept.filter(|_| resource.keep);
+        let info = match kept {
+            // Passes that do not run in this frame will in another.
+            Some(kept) => kept.info(graph, declared),
+            None => {
+                let accesses = uses.map(|(_, access)| access).chain(by_owner);
+                ResourceInfo::used_as(&resource.name, resource.kind, accesses)
             }
-        }
-        Some(PlannedResource { info, imported: import.is_some(), lifetime, placement: None, declared })
+        };
+        Some(PlannedResource {
+            info,
+            imported: import.is_some(),
+            kept: kept.is_some(),
+            lifetime,
+            placement: None,
+            declared,
+        })
     });
     planned.collect()
 }

@@ -3,6 +3,7 @@ use super::access::{Access, Mode};
 use super::alias::{Block, Placement};
 use super::barriers::Barrier;
 use super::declare::{Graph, Handle, Kind, Pass, Use};
+use super::keep::Kept;
 use super::lifetimes::Lifetime;
 use ash::vk;
 use std::collections::HashSet;
@@ -22,6 +23,8 @@ pub struct Plan<W> {
     pub blocks: Vec<Block>,
     /// Names of the passes that do not run, and why.
     pub culled: Vec<(String, String)>,
+    /// What kept resources hold after the frame.
+    pub kept: Kept,
 }
 
 /// A pass that runs.
@@ -64,6 +67,23 @@ pub struct ResourceInfo {
 }
 
 impl ResourceInfo {
+    /// A resource for these accesses.
+    pub(super) fn used_as(name: &str, kind: Kind, accesses: impl Iterator<Item = Access>) -> Self {
+        let mut info = Self {
+            name: name.to_owned(),
+            kind,
+            image_usage: vk::ImageUsageFlags::empty(),
+            buffer_usage: vk::BufferUsageFlags::empty(),
+        };
+        for access in accesses.map(Access::info) {
+            match kind {
+                Kind::Image(_) => info.image_usage |= access.image_usage.unwrap_or_default(),
+                Kind::Buffer(_) => info.buffer_usage |= access.buffer_usage.unwrap_or_default(),
+            }
+        }
+        info
+    }
+
     /// Whether it is an image rather than a buffer.
     pub fn is_image(&self) -> bool {
         matches!(self.kind, Kind::Image(_))
@@ -77,9 +97,11 @@ pub struct PlannedResource {
     pub info: ResourceInfo,
     /// Whether someone else owns it.
     pub imported: bool,
+    /// Whether it outlives the frame.
+    pub kept: bool,
     /// The passes that use it.
     pub lifetime: Lifetime,
-    /// Its memory; `None` for an imported resource.
+    /// Its memory; `None` for an imported or kept resource.
     pub placement: Option<Placement>,
     /// Its index among the declared resources.
     pub(super) declared: usize,
@@ -111,18 +133,20 @@ pub(super) fn plan<W>(
     blocks: Vec<Block>,
     (barriers, final_barriers): (Vec<Vec<Barrier>>, Vec<Barrier>),
     culled: Vec<(String, String)>,
+    kept: Kept,
 ) -> Plan<W> {
     let needed: HashSet<Handle> =
         order.iter().flat_map(|&pass| &graph.passes[pass].uses).filter_map(|use_| use_.needs()).collect();
     let plan_use = |use_: &Use| {
         let resource = resources.iter().position(|resource| resource.declared == use_.handle.resource)?;
-        let kept = use_.makes().is_some_and(|made| resources[resource].imported || needed.contains(&made));
+        let outlives = resources[resource].imported || resources[resource].kept;
+        let kept = use_.makes().is_some_and(|made| outlives || needed.contains(&made));
         Some(PlannedUse { resource, access: use_.access, mode: use_.mode, kept })
     };
     let mut declared: Vec<Option<Pass<W>>> = graph.passes.into_iter().map(Some).collect();
     let passes = order.iter().zip(barriers).filter_map(|(&pass, barriers)| {
-        let Pass { name, uses, work } = declared[pass].take()?;
+        let Pass { name, uses, work, .. } = declared[pass].take()?;
         Some(PlannedPass { name, barriers, uses: uses.iter().filter_map(plan_use).collect(), work: work? })
     });
-    Plan { passes: passes.collect(), final_barriers, resources, blocks, culled }
+    Plan { passes: passes.collect(), final_barriers, resources, blocks, culled, kept }
 }

@@ -67,7 +67,8 @@ impl<W> Plan<W> {
             let PlannedResource { info, lifetime, placement, .. } = resource;
             let alive = |pass: usize| if (lifetime.first..=lifetime.last).contains(&pass) { '#' } else { '.' };
             let chart: String = (0..self.passes.len()).map(alive).collect();
-            let place = placement.map_or(format!("{:>10}", "imported"), |at| {
+            let owned = if resource.kept { "kept" } else { "imported" };
+            let place = placement.map_or(format!("{owned:>10}"), |at| {
                 format!("{:>10}  block {} + {}", bytes(at.size_bytes), at.block, bytes(at.offset_bytes))
             });
             writeln!(f, "     {:width$}  {what:what_width$}  {chart}  {place}", info.name)?;

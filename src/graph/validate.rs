@@ -132,7 +132,7 @@ fn check_outputs<W>(graph: &Graph<W>, writers: &Writers) -> Result<(), GraphErro
             return Err(GraphError::UnknownHandle { user: "output".to_owned() });
         };
         let name = resource.name.clone();
-        if resource.import.is_none() {
+        if resource.import.is_none() && !resource.keep {
             return Err(GraphError::OutputTransient { resource: name });
         }
         if let Some(pass) = writers.get(&output.next()) {

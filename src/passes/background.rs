@@ -1,5 +1,5 @@
 //! Puts the environment behind the surface.
-use super::{CameraRays, FrameGraph, View, tiles_of};
+use super::{CameraRays, FrameGraph, Identity, View, tiles_of};
 use crate::Result;
 use crate::environment::Environment;
 use crate::graph::{Access, Image};
@@ -16,7 +16,7 @@ pub struct Background {
     pipeline: ComputePipeline,
     map: vulkan::Image,
     sampler: Sampler,
-    radiance_scale: f32,
+    identity: Identity,
 }
 
 #[repr(C)]
@@ -33,7 +33,7 @@ impl Background {
     ///
     /// # Errors
     /// No device memory left, or a map wider or higher than the device's images can be.
-    pub fn new(device: &Arc<Device>, cache: &PipelineCache, environment: &Environment, intensity: f64) -> Result<Self> {
+    pub fn new(device: &Arc<Device>, cache: &PipelineCache, environment: &Environment) -> Result<Self> {
         check_map_size(device, environment, "scale it down, or leave the background out with --background none")?;
         // A sun as bright as the largest half float is white on any display, so here, unlike in shading, it is cut off.
         let texel = |rgb: &[f32; 3]| [rgb[0], rgb[1], rgb[2], 1.0].map(|value| f16::from_f32(value.min(65504.0)));
@@ -45,7 +45,7 @@ impl Background {
             pipeline: ComputePipeline::new(device, cache, &compiled::BACKGROUND, &[])?,
             map: vulkan::Image::with_texels(device, "environment map", shape, &[bytes])?,
             sampler: Sampler::new(device, "environment map", SamplerKind::WrappedLinear)?,
-            radiance_scale: intensity as f32,
+            identity: Identity::new(),
         })
     }
 }
@@ -70,16 +70,17 @@ pub fn background<'a>(
 ) -> Image {
     let mut pass = graph.pass("background");
     let radiance = pass.modify(radiance, Access::StorageWriteCompute);
+    let push = Push {
+        camera: view.camera_rays(),
+        size_px: [view.width, view.height],
+        rotation: view.rotation(),
+        radiance_scale: view.intensity as f32,
+    };
+    pass.depends_on(&background.identity).depends_on(&bytemuck::bytes_of(&push));
     pass.record(Box::new(move |commands, resources| {
-        let Background { pipeline, map, sampler, radiance_scale } = background;
+        let Background { pipeline, map, sampler, .. } = background;
         let bindings =
             Bindings::new().image("radiance", resources.image(radiance)).sampled("environment_map", map, sampler);
-        let push = Push {
-            camera: view.camera_rays(),
-            size_px: [view.width, view.height],
-            rotation: view.rotation(),
-            radiance_scale: *radiance_scale,
-        };
         commands.dispatch(pipeline, &bindings, bytemuck::bytes_of(&push), Groups::Direct(tiles_of(view)))
     }));
     radiance

@@ -1,5 +1,5 @@
 //! Sorts pixels into interior, edge and background, and lists those to shade: nothing else is looked at again.
-use super::{FrameGraph, View, clear, tiles_of};
+use super::{FrameGraph, Identity, View, clear, tiles_of};
 use crate::Result;
 use crate::graph::{Access, Buffer, BufferDesc, Image, ImageDesc};
 use crate::vulkan::{Bindings, ComputePipeline, Device, Groups, PipelineCache, compiled};
@@ -49,6 +49,7 @@ impl Counters {
 /// What the pass is made of.
 pub struct Classify {
     pipeline: ComputePipeline,
+    identity: Identity,
 }
 
 #[repr(C)]
@@ -65,7 +66,7 @@ impl Classify {
     /// A driver that cannot compile it.
     pub fn new(device: &Arc<Device>, cache: &PipelineCache, subpixels: u32) -> Result<Self> {
         let pipeline = ComputePipeline::new(device, cache, &compiled::CLASSIFY, &[("SUBPIXELS", subpixels)])?;
-        Ok(Self { pipeline })
+        Ok(Self { pipeline, identity: Identity::new() })
     }
 }
 
@@ -90,13 +91,15 @@ pub fn classify<'a>(graph: &mut FrameGraph<'a>, classify: &'a Classify, geometry
     let tile_count = u64::from(width.div_ceil(TILE_SIDE)) * u64::from(height.div_ceil(TILE_SIDE));
     let tiles = graph.buffer("tile_list", BufferDesc { size_bytes: 2 * 4 * tile_count });
     let pixels = graph.buffer("pixel_list", BufferDesc { size_bytes: 4 * u64::from(TILE_SIDE.pow(2)) * tile_count });
-    let radiance = graph.image("radiance", ImageDesc { format: vk::Format::R32G32B32A32_SFLOAT, width, height });
+    let radiance = graph.kept_image("radiance", ImageDesc { format: vk::Format::R32G32B32A32_SFLOAT, width, height });
     let mut pass = graph.pass("classify");
     pass.read(geometry, Access::SampledCompute);
     let counters = pass.modify(counters, Access::StorageWriteCompute);
     let tiles = pass.write(tiles, Access::StorageWriteCompute);
     let pixels = pass.write(pixels, Access::StorageWriteCompute);
     let radiance = pass.write(radiance, Access::StorageWriteCompute);
+    let push = Push { size_px: [width, height], cos_smooth: SMOOTH_DEG.to_radians().cos() };
+    pass.depends_on(&classify.identity).depends_on(&bytemuck::bytes_of(&push));
     pass.record(Box::new(move |commands, resources| {
         let bindings = Bindings::new()
             .image("geometry", resources.image(geometry))
@@ -104,7 +107,6 @@ pub fn classify<'a>(graph: &mut FrameGraph<'a>, classify: &'a Classify, geometry
             .buffer("tile_list", resources.buffer(tiles))
             .buffer("pixel_list", resources.buffer(pixels))
             .image("radiance", resources.image(radiance));
-        let push = Push { size_px: [width, height], cos_smooth: SMOOTH_DEG.to_radians().cos() };
         let groups = Groups::Direct(tiles_of(view));
         commands.dispatch(&classify.pipeline, &bindings, bytemuck::bytes_of(&push), groups)
     }));

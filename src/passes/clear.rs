@@ -6,6 +6,7 @@ use crate::graph::{Access, Buffer};
 pub fn clear(graph: &mut FrameGraph<'_>, name: &str, buffer: Buffer) -> Buffer {
     let mut pass = graph.pass(name);
     let cleared = pass.write(buffer, Access::TransferWrite);
+    pass.depends_on(&());
     pass.record(Box::new(move |commands, resources| {
         commands.clear_buffer(resources.buffer(cleared));
         Ok(())

@@ -1,5 +1,5 @@
 //! Pass 1 of the paper (section 4.1): normal and material of what is seen, at sub-pixel resolution.
-use super::{FrameGraph, View};
+use super::{FrameGraph, Identity, View};
 use crate::Result;
 use crate::graph::{Access, Image, ImageDesc};
 use crate::scene::Mesh;
@@ -48,7 +48,7 @@ impl DeviceMesh {
 }
 
 /// A mesh in the scene.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Object {
     /// Which mesh.
     pub mesh: usize,
@@ -63,6 +63,7 @@ pub struct GeometryCache {
     pipeline: GraphicsPipeline,
     meshes: Vec<DeviceMesh>,
     objects: Vec<Object>,
+    identity: Identity,
 }
 
 /// `Object` in glsl/geometry_cache.glsl.
@@ -94,7 +95,7 @@ impl GeometryCache {
         };
         let (vertex, fragment) = (&compiled::GEOMETRY_CACHE_VERT, &compiled::GEOMETRY_CACHE_FRAG);
         let pipeline = GraphicsPipeline::new(device, cache, vertex, fragment, &state)?;
-        Ok(Self { pipeline, meshes, objects })
+        Ok(Self { pipeline, meshes, objects, identity: Identity::new() })
     }
 
     /// The push constants of every object that is drawn.
@@ -145,18 +146,23 @@ impl GeometryCache {
 /// Draws every object into the geometry cache.
 pub fn geometry_cache<'a>(graph: &mut FrameGraph<'a>, cache: &'a GeometryCache, view: &'a View) -> Image {
     let [width, height] = view.cache_size();
-    let geometry = graph.image("geometry", ImageDesc { format: GEOMETRY_FORMAT, width, height });
+    let geometry = graph.kept_image("geometry", ImageDesc { format: GEOMETRY_FORMAT, width, height });
     let depth = graph.image("depth", ImageDesc { format: DEPTH_FORMAT, width, height });
     let mut pass = graph.pass("geometry_cache");
     let geometry = pass.write(geometry, Access::ColorAttachment);
     let depth = pass.write(depth, Access::DepthAttachment);
+    let draws = cache.draws(view);
+    pass.depends_on(&cache.identity);
+    for (_, push) in &draws {
+        pass.depends_on(&bytemuck::bytes_of(push));
+    }
     pass.record(Box::new(move |commands, resources| {
         let color = ColorTarget { image: resources.image(geometry), clear: [0; 4] };
         let depth = DepthTarget { image: resources.image(depth), clear: 0.0 };
         commands.render(&color, &depth, |commands| {
-            for (mesh, push) in cache.draws(view) {
+            for (mesh, push) in &draws {
                 let vertices = [&mesh.positions, &mesh.normals];
-                let push = bytemuck::bytes_of(&push);
+                let push = bytemuck::bytes_of(push);
                 commands.draw(&cache.pipeline, push, &vertices, &mesh.indices, mesh.index_count)?;
             }
             Ok(())

@@ -24,7 +24,34 @@ pub struct DeviceLight {
     sources: Option<Buffer>,
     map: Option<vulkan::Image>,
     aliases: Option<Buffer>,
-    intensity: f32,
+    /// For kernels: what is there besides the pyramid, whose finest level is this one.
+    extras: Extras,
+    finest_level: f32,
+}
+
+/// What kernels may look up besides the pyramid.
+#[derive(Clone, Copy, Default)]
+struct Extras {
+    /// The environment as it is, for those sharper than the pyramid.
+    map: bool,
+    /// The sources, for lobes in which they are mirrored.
+    sources: bool,
+}
+
+impl Extras {
+    /// What those of `materials` do, in a pyramid of this finest level.
+    fn of(environment: &Environment, materials: &[PreparedMaterial], finest_level: f32) -> Self {
+        let sources = &environment.small_sources().list;
+        let mirrors = |material: &PreparedMaterial| {
+            let lobe_width = half_vector_width(&material.brdf) as f32;
+            sources.iter().any(|source| clearance(0.0, source.width_rad() as f32, lobe_width) < CLEAR[1])
+        };
+        let is_sharp = |material: &PreparedMaterial| match material.threads.as_deref() {
+            Some(Threads::Fitted(table)) => table.sharpest_level() < finest_level,
+            _ => false,
+        };
+        Self { map: materials.iter().any(is_sharp), sources: materials.iter().any(mirrors) }
+    }
 }
 
 /// A pyramid on the device.
@@ -47,11 +74,10 @@ impl DeviceLight {
         cache_folder: Option<&Path>,
         method: Method,
         environment: &Environment,
-        intensity: f64,
         materials: &[PreparedMaterial],
     ) -> Result<Self> {
         let shader = method.shader()?;
-        let mut light = Self { intensity: intensity as f32, ..Self::default() };
+        let mut light = Self::default();
         if shader.declares("irradiance_map")? {
             light.add_blurred(device, cache, cache_folder, environment, materials)?;
             return Ok(light);
@@ -83,32 +109,31 @@ impl DeviceLight {
         materials: &[PreparedMaterial],
     ) -> Result<()> {
         let blurred = |part| blurred(device, cache, cache_folder, part);
-        let (rest, sources) = (environment.rest(), &environment.small_sources().list);
-        let by_kernels = |material: &PreparedMaterial| {
-            let lobe_width = half_vector_width(&material.brdf) as f32;
-            sources.iter().any(|source| clearance(0.0, source.width_rad() as f32, lobe_width) < CLEAR[1])
-        };
-        let sources_alone = environment.sources_alone().filter(|_| materials.iter().any(by_kernels));
+        let rest = blurred(environment.rest())?;
+        self.finest_level = (rest.finest_width_rad() / FINEST_WIDTH_RAD).log2() as f32;
+        self.extras = Extras::of(environment, materials, self.finest_level);
+        let pyramid = &rest.levels;
         let nothing = Pyramid { face_size: 1, levels: vec![vec![[0.0; 3]; 6]] };
+        let sources_alone = environment.sources_alone().filter(|_| self.extras.sources);
         let source_pyramid = sources_alone.map(blurred).transpose()?.map_or(&nothing, |pyramid| &pyramid.levels);
-        let finest_level = (blurred(rest)?.finest_width_rad() / FINEST_WIDTH_RAD).log2() as f32;
-        let pyramid = &blurred(rest)?.levels;
         // One scale for all that is added up.
         let scale = pyramid.radiance_scale().max(source_pyramid.radiance_scale());
-        let sharpest = materials.iter().map(|material| match &material.threads {
-            Some(Threads::Fitted(table)) => table.sharpest_level(),
-            _ => f32::INFINITY,
-        });
-        let map = match sharpest.fold(f32::INFINITY, f32::min) < finest_level {
+        let map = match self.extras.map {
             true => LightMap::with_sources_marked(environment),
             false => LightMap { width: 1, height: 1, texels: vec![[0.0; 4]] },
         };
         self.map = Some(upload_map(device, environment, &map, scale)?);
         self.pyramid = Some(DevicePyramid::new(device, "environment pyramid", pyramid, scale)?);
         self.source_pyramid = Some(DevicePyramid::new(device, "source pyramid", source_pyramid, scale)?);
-        self.irradiance = Some(DevicePyramid::new(device, "irradiance map", rest.irradiance(), scale)?);
-        self.sources = Some(source_buffer(device, sources, scale)?);
+        self.irradiance = Some(DevicePyramid::new(device, "irradiance map", environment.rest().irradiance(), scale)?);
+        self.sources = Some(source_buffer(device, &environment.small_sources().list, scale)?);
         Ok(())
+    }
+
+    /// Whether it has all that fitted threads of `materials` look up of `environment`, which it was made for.
+    pub fn serves(&self, environment: &Environment, materials: &[PreparedMaterial]) -> bool {
+        let needed = Extras::of(environment, materials, self.finest_level);
+        (self.extras.map || !needed.map) && (self.extras.sources || !needed.sources)
     }
 
     /// Adds all of it to `bindings`.
@@ -141,7 +166,7 @@ impl DeviceLight {
 
     /// Radiance of a texel of value 1.
     pub(super) fn radiance_scale(&self) -> f32 {
-        self.intensity * self.pyramid.as_ref().map_or(1.0, |pyramid| pyramid.scale)
+        self.pyramid.as_ref().map_or(1.0, |pyramid| pyramid.scale)
     }
 }
 
@@ -152,7 +177,7 @@ fn blurred<'e>(
     cache_folder: Option<&Path>,
     part: &'e Environment,
 ) -> Result<&'e VmfPyramid> {
-    part.vmf_filtered(cache_folder, |source| vmf_pyramid(device, cache, source))
+    part.vmf_filtered(cache_folder, &(), |source| vmf_pyramid(device, cache, source, &()))
 }
 
 /// Uploads `map`, of `environment`: its radiance over `scale`.

@@ -7,10 +7,15 @@ mod bare_lookups;
 mod classify;
 mod clear;
 mod geometry_cache;
+mod identity;
 mod light;
+#[cfg(feature = "viewer")]
+mod present;
 mod readback;
 mod shade;
 mod tone_map;
+#[cfg(feature = "viewer")]
+mod ui;
 mod view;
 mod vmf_pyramid;
 
@@ -19,12 +24,17 @@ pub use bare_lookups::{BareLookups, bare_lookups};
 pub use classify::{Classify, Counters, SMOOTH_DEG, Tiles, classify};
 pub use clear::clear;
 pub use geometry_cache::{DeviceMesh, GeometryCache, Object, geometry_cache};
+pub use identity::Identity;
 pub use light::DeviceLight;
+#[cfg(feature = "viewer")]
+pub use present::{Area, present};
 pub use readback::{Readbacks, texels};
 pub use shade::{DeviceMaterials, Sampling, Shade, Shaded, shade};
 pub use tone_map::{ToneMap, tone_map};
+#[cfg(feature = "viewer")]
+pub use ui::ui;
 pub use view::{CameraRays, View};
-pub use vmf_pyramid::vmf_pyramid;
+pub use vmf_pyramid::{filter_environment, vmf_pyramid};
 
 use crate::graph::{Graph, Work};
 

@@ -1,5 +1,5 @@
 //! Pass 2 of the paper (section 4.2): the radiance of every listed pixel, by its partition of the sample threads.
-use super::{CameraRays, Counters, DeviceLight, FrameGraph, Tiles, View, clear};
+use super::{CameraRays, Counters, DeviceLight, FrameGraph, Identity, Tiles, View, clear};
 use crate::brdf::{Brdf, half_vector_width};
 use crate::graph::{self, Access, BufferDesc, Image};
 use crate::method::Method;
@@ -189,12 +189,16 @@ pub struct Sampling {
 }
 
 /// What the pass is made of.
+#[derive(Clone)]
 pub struct Shade {
-    pipeline: ComputePipeline,
-    materials: DeviceMaterials,
-    light: DeviceLight,
+    pipeline: Arc<ComputePipeline>,
+    /// What objects are made of.
+    pub materials: Arc<DeviceMaterials>,
+    /// What lights them.
+    pub light: Arc<DeviceLight>,
     /// How many threads or samples, and which random numbers.
     pub sampling: Sampling,
+    identity: Identity,
 }
 
 #[repr(C)]
@@ -221,12 +225,12 @@ impl Shade {
         method: Method,
         sampling: Sampling,
         subpixels: u32,
-        materials: DeviceMaterials,
-        light: DeviceLight,
+        materials: Arc<DeviceMaterials>,
+        light: Arc<DeviceLight>,
     ) -> Result<Self> {
         let constants = [("SUBPIXELS", subpixels), ("MODELS_USED", materials.models_used)];
-        let pipeline = ComputePipeline::new(device, cache, method.shader()?, &constants)?;
-        Ok(Self { pipeline, materials, light, sampling })
+        let pipeline = Arc::new(ComputePipeline::new(device, cache, method.shader()?, &constants)?);
+        Ok(Self { pipeline, materials, light, sampling, identity: Identity::new() })
     }
 }
 
@@ -258,8 +262,19 @@ pub fn shade<'a>(
     pass.read(pixels, Access::StorageReadCompute);
     let radiance = pass.modify(radiance, Access::StorageWriteCompute);
     let lookups = pass.modify(lookups, Access::StorageWriteCompute);
+    let Shade { pipeline, materials, light, sampling, identity } = shade;
+    let push = Push {
+        camera: view.camera_rays(),
+        size_px: [view.width, view.height],
+        kind: 0,
+        face_size: light.face_size(),
+        rotation: view.rotation(),
+        radiance_scale: view.intensity as f32 * light.radiance_scale(),
+        sample_count: sampling.count,
+        seed: [sampling.seed as u32, (sampling.seed >> 32) as u32],
+    };
+    pass.depends_on(identity).depends_on(&bytemuck::bytes_of(&push));
     pass.record(Box::new(move |commands, resources| {
-        let Shade { pipeline, materials, light, sampling } = shade;
         let counters = resources.buffer(counters);
         let mut bindings = Bindings::new()
             .image("geometry", resources.image(geometry))
@@ -278,16 +293,7 @@ pub fn shade<'a>(
             }
         }
         for kind in [0, 1] {
-            let push = Push {
-                camera: view.camera_rays(),
-                size_px: [view.width, view.height],
-                kind,
-                face_size: light.face_size(),
-                rotation: view.rotation(),
-                radiance_scale: light.radiance_scale(),
-                sample_count: sampling.count,
-                seed: [sampling.seed as u32, (sampling.seed >> 32) as u32],
-            };
+            let push = Push { kind, ..push };
             let groups = Groups::Indirect(counters, Counters::arguments_of(kind));
             commands.dispatch(pipeline, &bindings, bytemuck::bytes_of(&push), groups)?;
         }

@@ -1,5 +1,5 @@
 //! Linear radiance to 8-bit display values: exposure, clamp, gamma.
-use super::{FrameGraph, View, tiles_of};
+use super::{FrameGraph, Identity, View, tiles_of};
 use crate::Result;
 use crate::graph::{Access, Image, ImageDesc};
 use crate::vulkan::{Bindings, ComputePipeline, Device, Groups, PipelineCache, compiled};
@@ -10,6 +10,7 @@ use std::sync::Arc;
 /// What the pass is made of.
 pub struct ToneMap {
     pipeline: ComputePipeline,
+    identity: Identity,
 }
 
 #[repr(C)]
@@ -26,21 +27,23 @@ impl ToneMap {
     /// # Errors
     /// A driver that cannot compile it.
     pub fn new(device: &Arc<Device>, cache: &PipelineCache) -> Result<Self> {
-        Ok(Self { pipeline: ComputePipeline::new(device, cache, &compiled::TONE_MAP, &[])? })
+        let pipeline = ComputePipeline::new(device, cache, &compiled::TONE_MAP, &[])?;
+        Ok(Self { pipeline, identity: Identity::new() })
     }
 }
 
 /// Makes the picture to look at out of `radiance`: RGBA, 8 bits each.
 pub fn tone_map<'a>(graph: &mut FrameGraph<'a>, tone_map: &'a ToneMap, radiance: Image, view: &'a View) -> Image {
     let (width, height) = (view.width, view.height);
-    let display = graph.image("display", ImageDesc { format: vk::Format::R8G8B8A8_UNORM, width, height });
+    let display = graph.kept_image("display", ImageDesc { format: vk::Format::R8G8B8A8_UNORM, width, height });
     let mut pass = graph.pass("tone_map");
     pass.read(radiance, Access::StorageReadCompute);
     let display = pass.write(display, Access::StorageWriteCompute);
+    let push = Push { size_px: [width, height], exposure: view.exposure, inverse_gamma: 1.0 / view.gamma };
+    pass.depends_on(&tone_map.identity).depends_on(&bytemuck::bytes_of(&push));
     pass.record(Box::new(move |commands, resources| {
         let bindings =
             Bindings::new().image("radiance", resources.image(radiance)).image("display", resources.image(display));
-        let push = Push { size_px: [width, height], exposure: view.exposure, inverse_gamma: 1.0 / view.gamma };
         commands.dispatch(&tone_map.pipeline, &bindings, bytemuck::bytes_of(&push), Groups::Direct(tiles_of(view)))
     }));
     display

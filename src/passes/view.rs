@@ -48,6 +48,8 @@ pub struct View {
     pub subpixels: u32,
     /// The environment is turned by this angle about +Y, counter-clockwise seen from above.
     pub rotation_deg: f64,
+    /// Factor on the environment's radiance.
+    pub intensity: f64,
     /// Factor on radiance before display.
     pub exposure: f32,
     /// Display values are radiance to the power of 1/gamma.

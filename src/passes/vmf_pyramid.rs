@@ -1,12 +1,24 @@
-//! Blurs an environment by the kernels that fitted threads look up, once at load: a graph of its own, a pass a level.
+//! Blurs an environment by the kernels that fitted threads look up, once at load.
+//!
+//! In many short submissions, since a device without a second queue (such as a processor) draws no frame until a submission has ended,
+//! and so that it can be cancelled.
 use super::{FrameGraph, Readbacks, texels};
-use crate::Result;
-use crate::environment::{Kernel, Pyramid, Step, VmfPyramid};
-use crate::graph::{Access, BufferDesc, Executable};
-use crate::vulkan::{Bindings, Buffer, ComputePipeline, Device, Frames, Groups, PipelineCache, compiled};
+use crate::environment::{Environment, Kernel, Pyramid, Step, VmfPyramid};
+use crate::graph::{Access, BufferDesc, Executable, Object};
+use crate::method::Method;
+use crate::threads::Observer;
+use crate::vulkan::{Bindings, Buffer, BufferUse, ComputePipeline, Device, Frames, Groups, PipelineCache, compiled};
+use crate::{Error, Result};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
+use std::cell::Cell;
+use std::path::Path;
 use std::sync::Arc;
+
+/// Texels along the edges of a workgroup.
+const GROUP: usize = 8;
+/// Maps with smaller faces are made at once; in larger ones a submission is a row of workgroups of one face.
+const SMALLEST_DIVIDED: usize = 64;
 
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
@@ -15,58 +27,140 @@ struct Push {
     size: u32,
     from_kernel: u32,
     kernel: u32,
+    first_row: u32,
+    first_face: u32,
 }
 
-/// The pyramid of vMF kernels of the environment whose box-filtered one is `source`, made on `device`.
+/// Makes what `method` needs of `environment` before it is uploaded: long work, so that nothing long is left for the upload. `observer`
+/// hears of submissions.
 ///
 /// # Errors
-/// Whatever Vulkan refuses.
-pub fn vmf_pyramid(device: &Arc<Device>, cache: &PipelineCache, source: &Pyramid) -> Result<VmfPyramid> {
+/// Whatever Vulkan refuses; a method that does not run on the GPU; cancelled.
+pub fn filter_environment(
+    device: &Arc<Device>,
+    cache: &PipelineCache,
+    cache_folder: Option<&Path>,
+    method: Method,
+    environment: &Environment,
+    observer: &dyn Observer,
+) -> Result<()> {
+    let shader = method.shader()?;
+    if shader.declares("irradiance_map")? {
+        for part in std::iter::once(environment.rest()).chain(environment.sources_alone()) {
+            part.vmf_filtered(cache_folder, observer, |source| vmf_pyramid(device, cache, source, observer))?;
+        }
+        environment.rest().watched_irradiance(observer)?;
+    } else if shader.declares("environment_pyramid")? {
+        environment.watched_box_filtered(observer)?;
+    }
+    Ok(())
+}
+
+/// The pyramid of vMF kernels of the environment whose box-filtered one is `source`, made on `device`. `observer` hears of submissions.
+///
+/// # Errors
+/// Whatever Vulkan refuses; cancelled.
+pub fn vmf_pyramid(
+    device: &Arc<Device>,
+    cache: &PipelineCache,
+    source: &Pyramid,
+    observer: &dyn Observer,
+) -> Result<VmfPyramid> {
     let pipeline = ComputePipeline::new(device, cache, &compiled::VMF_PYRAMID, &[])?;
     let finest_texels = bytemuck::cast_slice(&source.levels[0]);
-    let finest = Arc::new(Buffer::with_contents(device, "box", vk::BufferUsageFlags::STORAGE_BUFFER, finest_texels)?);
-    let mut graph = FrameGraph::new();
-    let size_bytes = finest_texels.len() as u64;
-    let finest_handle = graph.import_buffer("box", BufferDesc { size_bytes }, Some(Access::StorageReadCompute), None);
+    let storage = vk::BufferUsageFlags::STORAGE_BUFFER;
+    let finest = Arc::new(Buffer::with_contents(device, "box", storage, finest_texels)?);
     let steps = VmfPyramid::steps(source.face_size);
-    let mut maps = Vec::new();
-    for (index, step) in steps.iter().enumerate() {
-        let from = step.from.map_or(finest_handle, |from| maps[from]);
-        let size_bytes = size_bytes_of(step);
-        let level = graph.buffer(&format!("map_{index}"), BufferDesc { size_bytes });
-        let mut pass = graph.pass(&format!("blur_{index}"));
-        pass.read(from, Access::StorageReadCompute);
-        let level = pass.write(level, Access::StorageWriteCompute);
-        let (pipeline, step) = (&pipeline, *step);
-        pass.record(Box::new(move |commands, resources| {
-            let bindings =
-                Bindings::new().buffer("Source", resources.buffer(from)).buffer("Destination", resources.buffer(level));
-            let Step { from_kernel, from_size, size, kernel, .. } = step;
-            let push = Push {
-                from_size: from_size as u32,
-                size: size as u32,
-                from_kernel: from_kernel as u32,
-                kernel: kernel as u32,
-            };
-            let groups = size.div_ceil(8) as u32;
-            commands.dispatch(pipeline, &bindings, bytemuck::bytes_of(&push), Groups::Direct([groups, groups, 6]))
-        }));
-        maps.push(level);
+    let total = steps.iter().map(|step| parts(step.size).count()).sum();
+    let (mut done, mut maps, mut levels) = (0, Vec::new(), Vec::new());
+    for step in &steps {
+        let usage = storage | vk::BufferUsageFlags::TRANSFER_SRC;
+        let map = Arc::new(Buffer::new(device, "vmf_map", size_bytes_of(step), usage, BufferUse::Device)?);
+        let from = step.from.map_or(&finest, |from| &maps[from]);
+        blur(device, &pipeline, step, from, &map, &mut || {
+            done += 1;
+            observer.progress(done, total);
+            if observer.cancelled() { Err(Error::Cancelled) } else { Ok(()) }
+        })?;
+        // The others have served.
+        if step.kernel == Kernel::Vmf {
+            levels.push(read_back(device, &map)?);
+        }
+        maps.push(map);
     }
-    // The others have served.
-    let levels = steps.iter().zip(maps).enumerate().filter(|(_, (step, _))| step.kernel == Kernel::Vmf);
+    Ok(VmfPyramid { levels: Pyramid { face_size: source.face_size, levels } })
+}
+
+/// First row and first face of each part of a map with faces of `size`.
+fn parts(size: usize) -> impl Iterator<Item = [u32; 2]> {
+    let (rows, faces) = if size < SMALLEST_DIVIDED { (1, 1) } else { (size.div_ceil(GROUP), 6) };
+    (0..faces).flat_map(move |face| (0..rows).map(move |row| [(row * GROUP) as u32, face]))
+}
+
+/// Makes the map of `step` part by part; `go_on` is asked before each of them.
+fn blur(
+    device: &Arc<Device>,
+    pipeline: &ComputePipeline,
+    step: &Step,
+    from: &Arc<Buffer>,
+    map: &Arc<Buffer>,
+    go_on: &mut dyn FnMut() -> Result<()>,
+) -> Result<()> {
+    let part = Cell::new([0; 2]);
+    let Step { from_kernel, from_size, size, kernel, .. } = *step;
+    let mut graph = FrameGraph::new();
+    let mut import = |name: &str, buffer: &Arc<Buffer>| {
+        let desc = BufferDesc { size_bytes: buffer.size_bytes };
+        graph.import_buffer(name, desc, Some(Access::StorageWriteCompute), None)
+    };
+    let (source, target) = (import("source", from), import("vmf_map", map));
+    let imports = [(source.into(), Object::Buffer(from.clone())), (target.into(), Object::Buffer(map.clone()))];
+    let mut pass = graph.pass("blur");
+    pass.read(source, Access::StorageReadCompute);
+    let target = pass.modify(target, Access::StorageWriteCompute);
+    let part_now = &part;
+    pass.record(Box::new(move |commands, resources| {
+        let bindings =
+            Bindings::new().buffer("Source", resources.buffer(source)).buffer("Destination", resources.buffer(target));
+        let [first_row, first_face] = part_now.get();
+        let push = Push {
+            from_size: from_size as u32,
+            size: size as u32,
+            from_kernel: from_kernel as u32,
+            kernel: kernel as u32,
+            first_row,
+            first_face,
+        };
+        let across = size.div_ceil(GROUP) as u32;
+        let groups = if size < SMALLEST_DIVIDED { [across, across, 6] } else { [across, 1, 1] };
+        commands.dispatch(pipeline, &bindings, bytemuck::bytes_of(&push), Groups::Direct(groups))
+    }));
+    graph.output(target);
+    let executable = Executable::new(device, graph, &imports)?;
+    let mut frames = Frames::new(device, "vmf_pyramid", 1)?;
+    for place in parts(size) {
+        go_on()?;
+        part.set(place);
+        executable.execute(&mut frames)?;
+        frames.wait()?;
+    }
+    Ok(())
+}
+
+/// The texels of `map`.
+fn read_back(device: &Arc<Device>, map: &Arc<Buffer>) -> Result<Vec<[f32; 3]>> {
+    let mut graph = FrameGraph::new();
+    let desc = BufferDesc { size_bytes: map.size_bytes };
+    let handle = graph.import_buffer("vmf_map", desc, Some(Access::StorageWriteCompute), None);
     let mut readbacks = Readbacks::new(device, graph);
-    readbacks.imports.push((finest_handle, finest));
-    let targets =
-        levels.map(|(index, (step, map))| readbacks.buffer(&format!("read_map_{index}"), map, size_bytes_of(step)));
-    let targets = targets.collect::<Result<Vec<_>>>()?;
+    readbacks.imports.push((handle.into(), Object::Buffer(map.clone())));
+    let target = readbacks.buffer("read_map", handle, map.size_bytes)?;
     let Readbacks { graph, imports, .. } = readbacks;
     let executable = Executable::new(device, graph, &imports)?;
     let mut frames = Frames::new(device, "vmf_pyramid", 1)?;
     executable.execute(&mut frames)?;
     frames.wait()?;
-    let levels = targets.iter().map(|target| texels(Some(target))).collect();
-    Ok(VmfPyramid { levels: Pyramid { face_size: source.face_size, levels } })
+    Ok(texels(Some(&target)))
 }
 
 /// Size of the map that a step makes.

@@ -62,15 +62,13 @@ impl Camera {
     /// The view that frames a sphere: the unit sphere at the origin is seen from (1.5, 1, 3.5) at 36 degrees, others from
     /// the same side and as large. In an image taller than wide (`aspect` = width / height below 1) the camera steps back.
     pub fn framing(centre: DVec3, radius: f64, aspect: f64) -> Self {
-        // To three digits: a tessellated unit sphere, whose vertices lie 5e-5 outside, is framed as what it stands for.
-        let magnitude = 10f64.powi(2 - radius.log10().floor() as i32);
-        let radius = if radius > 0.0 { (radius * magnitude).round() / magnitude } else { 1.0 };
-        // The sine of the angle between the axis and the nearest edge of the image: the silhouette stays as far inside it.
-        let half_height = (0.5 * DEFAULT_FOV_Y_DEG).to_radians();
-        let half_width = (half_height.tan() * aspect).atan();
-        let step_back = (half_height.sin() / half_width.sin()).max(1.0);
-        let eye = centre + DEFAULT_EYE * (radius * step_back);
+        let eye = centre + DEFAULT_EYE * framing_scale(radius, DEFAULT_FOV_Y_DEG, aspect);
         Self { eye, target: centre, up: DVec3::Y, fov_y_deg: DEFAULT_FOV_Y_DEG }
+    }
+
+    /// The distance from the centre of a sphere at which it is framed as [`Self::framing`] does, with another field of view.
+    pub fn framing_distance(radius: f64, fov_y_deg: f64, aspect: f64) -> f64 {
+        DEFAULT_EYE.length() * framing_scale(radius, fov_y_deg, aspect)
     }
 
     /// Whether the camera can see: an error in words names the key at fault.
@@ -133,6 +131,17 @@ impl Camera {
         let near = 1e-3 * self.eye.distance(self.target);
         dcamera::rh::proj::vulkan::perspective_infinite_reverse(self.fov_y_deg.to_radians(), aspect, near)
     }
+}
+
+/// How many times farther than the default view of the unit sphere the eye has to be.
+fn framing_scale(radius: f64, fov_y_deg: f64, aspect: f64) -> f64 {
+    // To three digits: a tessellated unit sphere, whose vertices lie 5e-5 outside, is framed as what it stands for.
+    let magnitude = 10f64.powi(2 - radius.log10().floor() as i32);
+    let radius = if radius > 0.0 { (radius * magnitude).round() / magnitude } else { 1.0 };
+    // The sine of the angle between the axis and the nearest edge of the image: the silhouette stays as far inside it.
+    let [default_half_height, half_height] = [DEFAULT_FOV_Y_DEG, fov_y_deg].map(|fov| (0.5 * fov).to_radians());
+    let half_width = (half_height.tan() * aspect).atan();
+    radius * (default_half_height.sin() / half_height.sin().min(half_width.sin()))
 }
 
 #[cfg(test)]

@@ -7,10 +7,11 @@ use serde::{Deserialize, Serialize};
 use toml::Spanned;
 
 use super::{
-    Camera, DEFAULT_MATERIAL, EXPOSURE, EnvironmentSettings, GAMMA, ImageSettings, MAX_SAMPLES, MAX_SIZE_PX,
+    Camera, DEFAULT_MATERIAL, EXPOSURE, EnvironmentSettings, GAMMA, INTENSITY, ImageSettings, MAX_SAMPLES, MAX_SIZE_PX,
     MAX_SUBPIXELS, MaterialSettings, MaterialSource, ObjectSettings, Scene, ShadingSettings, Source,
 };
 use crate::error::{Error, Result};
+use crate::output::write_whole;
 
 /// A whole scene file.
 #[derive(Deserialize)]
@@ -88,10 +89,25 @@ impl Scene {
         parse(text, base_dir).map_err(|problem| Error::input("scene", problem, "see the scene file in the README"))
     }
 
-    /// The scene as the text of a file, with absolute paths, so that it can be saved anywhere.
-    pub fn to_toml(&self) -> Result<String> {
-        toml::to_string_pretty(&SceneText::from(self)).map_err(|cause| {
-            Error::input("scene", format!("cannot be written as TOML ({cause})"), "use paths in UTF-8")
+    /// Writes a scene file that [`Self::load`] reads as this scene: `render` makes the same picture of it, to the bit. Paths of files in
+    /// the folder of `path` and below are relative to it, so that the folder can be moved; others are absolute.
+    ///
+    /// # Errors
+    /// `path` cannot be written; what [`Self::to_toml`] says.
+    pub fn save(&self, path: &Path) -> Result<()> {
+        let folder = std::path::absolute(path).ok().and_then(|path| path.parent().map(Path::to_owned));
+        let text = self.to_toml(folder.as_deref())?;
+        write_whole(path, text.as_bytes())
+    }
+
+    /// The scene as the text of a file: paths in `folder` and below are relative to it, others are absolute.
+    ///
+    /// # Errors
+    /// A path that is not UTF-8.
+    pub fn to_toml(&self, folder: Option<&Path>) -> Result<String> {
+        let text = SceneText::new(self, folder)?;
+        toml::to_string_pretty(&text).map_err(|cause| {
+            Error::input("scene", format!("cannot be written as TOML ({cause})"), "use numbers that are finite")
         })
     }
 }
@@ -254,9 +270,9 @@ pub(super) fn gamma<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D
     checked(deserializer, GAMMA, "finite and above 0")
 }
 
-/// Factor of the environment's radiance: shaders have it in single precision.
+/// Factor of the environment's radiance.
 fn intensity<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
-    checked(deserializer, 0.0..=f64::from(f32::MAX), "finite and not negative")
+    checked(deserializer, INTENSITY, "finite and not negative")
 }
 
 fn finite<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
@@ -289,62 +305,66 @@ struct SceneText<'a> {
     object: Vec<toml::Table>,
 }
 
-impl<'a> From<&'a Scene> for SceneText<'a> {
-    fn from(scene: &'a Scene) -> Self {
+impl<'a> SceneText<'a> {
+    fn new(scene: &'a Scene, folder: Option<&Path>) -> Result<Self> {
         let environment = &scene.environment;
-        let (key, value) = source_entry(&environment.source, "file");
-        Self {
+        Ok(Self {
             image: &scene.image,
             camera: scene.camera,
             environment: toml::Table::from_iter([
-                (key, value),
+                source_entry(&environment.source, "file", folder)?,
                 ("rotation_deg".into(), environment.rotation_deg.into()),
                 ("intensity".into(), environment.intensity.into()),
             ]),
             shading: &scene.shading,
-            material: scene.materials.iter().map(material_table).collect(),
-            object: scene.objects.iter().map(object_table).collect(),
-        }
+            material: scene.materials.iter().map(|material| material_table(material, folder)).collect::<Result<_>>()?,
+            object: scene.objects.iter().map(|object| object_table(object, folder)).collect::<Result<_>>()?,
+        })
     }
 }
 
-fn material_table(material: &MaterialSettings) -> toml::Table {
+fn material_table(material: &MaterialSettings, folder: Option<&Path>) -> Result<toml::Table> {
     let mut table = toml::Table::from_iter([("name".into(), material.name.clone().into())]);
     match &material.source {
-        MaterialSource::File(path) => table.extend([("file".into(), absolute(path))]),
+        MaterialSource::File(path) => table.extend([("file".into(), path_value(path, folder)?)]),
         MaterialSource::Builtin(name) => table.extend([("builtin".into(), name.clone().into())]),
         MaterialSource::Model { model, parameters } => {
             table.extend([("model".into(), model.clone().into())]);
             table.extend(parameters.clone());
         }
     }
-    table
+    Ok(table)
 }
 
-fn object_table(object: &ObjectSettings) -> toml::Table {
+fn object_table(object: &ObjectSettings, folder: Option<&Path>) -> Result<toml::Table> {
     // Through the shortest decimal, so that 0.1 does not become 0.10000000149011612.
     let number = |value: f32| toml::Value::Float(value.to_string().parse().unwrap_or(f64::from(value)));
     let vector = |values: [f32; 3]| toml::Value::Array(values.map(number).to_vec());
-    toml::Table::from_iter([
-        source_entry(&object.mesh, "mesh"),
+    Ok(toml::Table::from_iter([
+        source_entry(&object.mesh, "mesh", folder)?,
         ("material".into(), object.material.clone().into()),
         ("translate".into(), vector(object.translate.to_array())),
         ("rotate_deg".into(), vector(object.rotate_deg.to_array())),
         ("scale".into(), number(object.scale)),
-    ])
+    ]))
 }
 
 /// The key and value of a source; `file_key` is the key of files.
-fn source_entry(source: &Source, file_key: &str) -> (String, toml::Value) {
-    match source {
-        Source::File(path) => (file_key.into(), absolute(path)),
+fn source_entry(source: &Source, file_key: &str, folder: Option<&Path>) -> Result<(String, toml::Value)> {
+    Ok(match source {
+        Source::File(path) => (file_key.into(), path_value(path, folder)?),
         Source::Builtin(name) => ("builtin".into(), name.clone().into()),
-    }
+    })
 }
 
-/// The absolute path: the file may be saved in another folder than the one that relative paths start at.
-fn absolute(path: &Path) -> toml::Value {
-    std::path::absolute(path).unwrap_or(path.into()).to_string_lossy().into_owned().into()
+/// The path as it is seen from `folder` if it lies there, else the absolute one.
+fn path_value(path: &Path, folder: Option<&Path>) -> Result<toml::Value> {
+    let absolute = std::path::absolute(path).unwrap_or(path.into());
+    let relative = folder.and_then(|folder| absolute.strip_prefix(folder).ok()).unwrap_or(&absolute);
+    match relative.to_str() {
+        Some(text) => Ok(text.into()),
+        None => Err(Error::in_file(path, "has a name that no scene file can hold", "rename it to UTF-8")),
+    }
 }
 
 #[cfg(test)]
@@ -447,10 +467,59 @@ mod tests {
 
     #[test]
     fn what_is_saved_reads_back_the_same() {
-        for scene in [Scene::default(), Scene::parse(FULL, Path::new("/base")).unwrap()] {
-            let text = scene.to_toml().unwrap();
-            assert_eq!(Scene::parse(&text, Path::new("/elsewhere")).unwrap(), scene, "{text}");
+        let mut odd = Scene::default();
+        odd.image = ImageSettings { exposure: 0.1 + 0.2, gamma: f64::from(f32::MIN_POSITIVE), ..odd.image };
+        odd.environment.rotation_deg = -1e-300;
+        odd.environment.intensity = f64::from(f32::MAX);
+        odd.shading = ShadingSettings { seed: u64::MAX, ..odd.shading };
+        odd.camera = Some(Camera::framing(DVec3::new(1.0 / 3.0, 1e9, -1e-9), 0.7, 1.1));
+        odd.objects[0].translate = Vec3::new(f32::MAX, f32::MIN_POSITIVE, 1.0 / 3.0);
+        odd.objects[0].rotate_deg = Vec3::new(0.1, -0.2, 1e-30);
+        odd.materials[0].name = "\"quoted\"\n[image]\twith = '\u{e9}'".into();
+        odd.objects[0].material.clone_from(&odd.materials[0].name);
+        odd.materials[0].source = MaterialSource::Model {
+            model: "lambert".into(),
+            parameters: "reflectance = [0.1, 1, 0.30000000000000004]".parse().unwrap(),
+        };
+        for scene in [Scene::default(), odd, Scene::parse(FULL, Path::new("/base")).unwrap()] {
+            for (folder, base) in
+                [(None, "/elsewhere"), (Some("/base"), "/base"), (Some("/"), "/"), (Some("/other"), "/there")]
+            {
+                let text = scene.to_toml(folder.map(Path::new)).unwrap();
+                assert_eq!(Scene::parse(&text, Path::new(base)).unwrap(), scene, "{text}");
+            }
         }
+    }
+
+    #[test]
+    fn files_beside_a_saved_scene_are_named_relative_to_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("saved.toml");
+        let mut scene = Scene::default();
+        scene.environment.source = Source::File(folder.path().join("maps/x.hdr"));
+        scene.objects[0].mesh = Source::File("/elsewhere/y.obj".into());
+        scene.save(&path).unwrap();
+        let text = std::fs::read_to_string(&path).unwrap();
+        assert!(text.contains("\"maps/x.hdr\"") && text.contains("\"/elsewhere/y.obj\""), "{text}");
+        assert_eq!(Scene::load(&path).unwrap(), scene);
+    }
+
+    #[test]
+    fn what_toml_cannot_say_is_an_error_and_leaves_the_old_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("saved.toml");
+        std::fs::write(&path, "old").unwrap();
+        #[cfg(unix)]
+        {
+            use std::os::unix::ffi::OsStrExt;
+            let name = std::ffi::OsStr::from_bytes(b"/maps/\xff.hdr");
+            let mut scene = Scene::default();
+            scene.environment.source = Source::File(name.into());
+            assert!(scene.save(&path).unwrap_err().to_string().contains("UTF-8"));
+        }
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), "old");
+        let nowhere = folder.path().join("absent/saved.toml");
+        assert!(Scene::default().save(&nowhere).unwrap_err().to_string().contains("absent"));
     }
 
     #[test]

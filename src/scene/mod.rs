@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use glam::{DMat3, DQuat, EulerRot, Mat4, Quat, Vec3};
 use serde::{Deserialize, Serialize};
 
+use crate::brdf::Brdf;
 use crate::environment::Environment;
 use crate::error::Result;
 
@@ -30,6 +31,8 @@ pub const MAX_SUBPIXELS: u32 = 4;
 pub const MAX_SAMPLES: u32 = 10_000;
 /// What the exposure may be: shaders have it in single precision.
 pub const EXPOSURE: RangeInclusive<f64> = 0.0..=f32::MAX as f64;
+/// What the factor of the environment's radiance may be: shaders have it in single precision.
+pub const INTENSITY: RangeInclusive<f64> = 0.0..=f32::MAX as f64;
 /// What the gamma may be: shaders have it in single precision.
 pub const GAMMA: RangeInclusive<f64> = f32::MIN_POSITIVE as f64..=f32::MAX as f64;
 
@@ -85,7 +88,8 @@ pub enum Background {
 }
 
 /// A file, or something of that name made by the program.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Source {
     /// Read from the disk.
     File(PathBuf),
@@ -143,7 +147,8 @@ pub struct MaterialSettings {
 }
 
 /// Where a BRDF comes from.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum MaterialSource {
     /// A measured one on the disk.
     File(PathBuf),
@@ -156,6 +161,20 @@ pub enum MaterialSource {
         /// The keys beside it.
         parameters: toml::Table,
     },
+}
+
+impl MaterialSource {
+    /// What a flag names: built in, or a file (`./name` for one that is called like a built-in). A name that is neither, and looks like no
+    /// file, is an unknown built-in rather than a missing file.
+    pub fn named(text: &str) -> Self {
+        let path = PathBuf::from(text);
+        let is_builtin = Brdf::builtin_names().any(|name| name == text);
+        if !is_builtin && (path.extension().is_some() || path.exists()) {
+            Self::File(path)
+        } else {
+            Self::Builtin(text.to_owned())
+        }
+    }
 }
 
 /// `[[object]]`: a mesh at its place, of one material.
@@ -188,6 +207,20 @@ impl Default for Scene {
             objects: vec![ObjectSettings::new(Source::Builtin("sphere".into()), &material.name)],
             materials: vec![material],
         }
+    }
+}
+
+impl Scene {
+    /// Makes `source`, called `name`, the material of every object, and the only one.
+    pub fn use_material(&mut self, name: &str, source: MaterialSource) {
+        self.materials = vec![MaterialSettings { name: name.into(), source }];
+        self.objects.iter_mut().for_each(|object| name.clone_into(&mut object.material));
+    }
+
+    /// Puts `mesh`, of the first object's material, in the place of all objects.
+    pub fn use_mesh(&mut self, mesh: Source) {
+        let material = self.objects.first().map(|object| object.material.clone()).unwrap_or_default();
+        self.objects = vec![ObjectSettings::new(mesh, &material)];
     }
 }
 

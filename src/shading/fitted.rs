@@ -122,7 +122,9 @@ fn at_sources(point: &Point, sources: &[Source], w_o: Vec3, mirror: Vec3) -> (Ve
 /// # Panics
 /// A scene prepared for another method has other threads.
 pub(super) fn estimate(point: &Point) -> Vec3 {
-    let Some(Threads::Fitted(threads)) = &point.material().threads else { panic!("fitted threads are there") };
+    let Some(Threads::Fitted(threads)) = point.material().threads.as_deref() else {
+        panic!("fitted threads are there")
+    };
     let surface = &point.surface;
     let light = point.twin.blurred.as_ref().expect("the method declares the pyramid");
     let row = (surface.theta_o * (threads.rows as f32 / FRAC_PI_2)).min((threads.rows - 1) as f32);

@@ -119,7 +119,7 @@ struct BlurredLight<'a> {
 
 impl<'a> BlurredLight<'a> {
     fn new(environment: &'a Environment) -> Result<Self> {
-        let blurred = |part: &'a Environment| part.vmf_filtered(None, |source| Ok(VmfPyramid::new(source)));
+        let blurred = |part: &'a Environment| part.vmf_filtered(None, &(), |source| Ok(VmfPyramid::new(source)));
         Ok(Self {
             rest: blurred(environment.rest())?,
             sources: environment.sources_alone().map(blurred).transpose()?,
@@ -182,7 +182,7 @@ impl<'a> Twin<'a> {
             Point { twin: self, surface, axis, material, subpixel: pixel * view.subpixels, first: 0, stride: 1 }
         });
         if let Some(middle) = middle.filter(|middle| !fitted::needs_subpixels(middle)) {
-            return (middle.estimate() * self.prepared.intensity as f32).extend(1.0);
+            return (middle.estimate() * self.prepared.view.intensity as f32).extend(1.0);
         }
         let partitioned = interior && !may_share;
         let normal_variance = if partitioned { normal_variance } else { 0.0 };
@@ -199,7 +199,7 @@ impl<'a> Twin<'a> {
         if !partitioned {
             sum /= texels.len() as f32;
         }
-        (sum * self.prepared.intensity as f32).extend(covered as f32 / texels.len() as f32)
+        (sum * self.prepared.view.intensity as f32).extend(covered as f32 / texels.len() as f32)
     }
 }
 

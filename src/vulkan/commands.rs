@@ -72,8 +72,8 @@ pub struct DepthTarget<'a> {
 
 /// A command buffer being recorded.
 pub struct Commands {
-    device: Arc<Device>,
-    raw: vk::CommandBuffer,
+    pub(super) device: Arc<Device>,
+    pub(super) raw: vk::CommandBuffer,
     descriptor_pool: vk::DescriptorPool,
     queries: Option<vk::QueryPool>,
     timed: Vec<String>,
@@ -239,6 +239,44 @@ impl Commands {
         let region = [vk::BufferCopy::default().size(source.size_bytes.min(target.size_bytes))];
         // SAFETY: both are alive and large enough.
         unsafe { self.device.raw.cmd_copy_buffer(self.raw, source.raw, target.raw, &region) };
+    }
+
+    /// Scales level 0 of `source` to `area` (left, top, width, height) of `target`, bilinearly where their sizes differ; formats
+    /// are converted. Of what lies outside of the target nothing is drawn.
+    pub fn blit(&mut self, source: &Image, target: &Image, [left, top, width, height]: [u32; 4]) {
+        let [target_width, target_height, _] = target.shape.extent;
+        let [source_width, source_height, _] = source.shape.extent;
+        let (shown_width, shown_height) =
+            (width.min(target_width.saturating_sub(left)), height.min(target_height.saturating_sub(top)));
+        if shown_width == 0 || shown_height == 0 {
+            return;
+        }
+        let part = |side: u32, shown: u32, of: u32| (u64::from(side) * u64::from(shown) / u64::from(of)).max(1) as i32;
+        let corner = |x: u32, y: u32| vk::Offset3D { x: x as i32, y: y as i32, z: 0 };
+        let source_end = vk::Offset3D {
+            x: part(source_width, shown_width, width),
+            y: part(source_height, shown_height, height),
+            z: 1,
+        };
+        let region = [vk::ImageBlit::default()
+            .src_subresource(source.shape.level(0))
+            .src_offsets([corner(0, 0), source_end])
+            .dst_subresource(target.shape.level(0))
+            .dst_offsets([corner(left, top), vk::Offset3D { z: 1, ..corner(left + shown_width, top + shown_height) }])];
+        let filter =
+            if [source_width, source_height] == [width, height] { vk::Filter::NEAREST } else { vk::Filter::LINEAR };
+        let layouts = [vk::ImageLayout::TRANSFER_SRC_OPTIMAL, vk::ImageLayout::TRANSFER_DST_OPTIMAL];
+        // SAFETY: both are alive, the caller's barriers set the layouts, the regions are within the images.
+        unsafe {
+            self.device.raw.cmd_blit_image(self.raw, source.raw, layouts[0], target.raw, layouts[1], &region, filter);
+        }
+    }
+
+    /// Fills level 0 of `image`, in transfer-destination layout, with a colour.
+    pub fn clear_image(&mut self, image: &Image, color: [f32; 4]) {
+        let (color, layout) = (vk::ClearColorValue { float32: color }, vk::ImageLayout::TRANSFER_DST_OPTIMAL);
+        // SAFETY: the image is alive, the caller's barriers set the layout.
+        unsafe { self.device.raw.cmd_clear_color_image(self.raw, image.raw, layout, &color, &[image.shape.whole()]) };
     }
 
     /// Copies level 0 of `source`, in transfer-source layout, into `target`, tightly packed.

@@ -1,7 +1,10 @@
 //! The device: which one, its queue, its submissions, and the queue of objects waiting to be destroyed.
 use super::commands::Commands;
 use super::error::{During, VulkanError};
+use super::frames::Semaphores;
 use super::instance::Instance;
+#[cfg(feature = "viewer")]
+use super::surface::Surface;
 use super::{Frames, Result};
 use ash::{ext, khr, vk};
 use gpu_allocator::vulkan::{Allocation, Allocator, AllocatorCreateDesc};
@@ -120,6 +123,10 @@ fn candidate(instance: &Instance, index: usize, physical: vk::PhysicalDevice) ->
     let has_dynamic_rendering = has(khr::dynamic_rendering::NAME);
     // A portability driver insists on this one being enabled.
     has(khr::portability_subset::NAME);
+    #[cfg(feature = "viewer")]
+    if instance.presents {
+        has(khr::swapchain::NAME);
+    }
     if !has_synchronization2 {
         lacks.push("VK_KHR_synchronization2");
     }
@@ -188,6 +195,8 @@ pub struct Device {
     pub(super) timestamp_valid_bits: u32,
     is_lavapipe: bool,
     description: DeviceDescription,
+    #[cfg(feature = "viewer")]
+    pub(super) swapchain: Option<khr::swapchain::Device>,
     queue: Mutex<vk::Queue>,
     // Counts submissions: the n-th signals the value n when it has finished.
     timeline: vk::Semaphore,
@@ -205,7 +214,27 @@ impl Device {
     /// # Errors
     /// No driver, no device of that name, or one that lacks what the renderer needs.
     pub fn new(instance: &Arc<Instance>, asked: Option<&str>) -> Result<Arc<Self>> {
+        Self::choose(instance, candidates(instance)?, asked)
+    }
+
+    /// The same among those that can present to `surface`.
+    ///
+    /// # Errors
+    /// No driver, no device of that name, or one that lacks what the renderer needs or cannot present to that window.
+    #[cfg(feature = "viewer")]
+    pub fn for_surface(instance: &Arc<Instance>, asked: Option<&str>, surface: &Surface) -> Result<Arc<Self>> {
         let mut candidates = candidates(instance)?;
+        for candidate in &mut candidates {
+            if !candidate.extensions.contains(&khr::swapchain::NAME) {
+                candidate.description.lacks.push("VK_KHR_swapchain");
+            } else if !surface.is_supported(candidate.physical, candidate.queue_family) {
+                candidate.description.lacks.push("a queue that presents to this window");
+            }
+        }
+        Self::choose(instance, candidates, asked)
+    }
+
+    fn choose(instance: &Arc<Instance>, mut candidates: Vec<Candidate>, asked: Option<&str>) -> Result<Arc<Self>> {
         if let Some(asked) = asked {
             let list = candidates.iter().map(|c| format!("{} \"{}\"", c.description.index, c.description.name));
             let available = list.collect::<Vec<_>>().join(", ");
@@ -269,6 +298,11 @@ impl Device {
             timestamp_valid_bits: chosen.timestamp_valid_bits,
             is_lavapipe: chosen.is_lavapipe,
             description: chosen.description,
+            #[cfg(feature = "viewer")]
+            swapchain: chosen
+                .extensions
+                .contains(&khr::swapchain::NAME)
+                .then(|| khr::swapchain::Device::new(&instance.raw, &raw)),
             queue: Mutex::new(queue),
             timeline,
             submitted: AtomicU64::new(0),
@@ -325,15 +359,23 @@ impl Device {
     }
 
     /// Hands `commands` to the queue; the returned value is reached when they have finished.
-    pub(super) fn submit(&self, commands: vk::CommandBuffer, name: &str) -> Result<u64> {
+    pub(super) fn submit(&self, commands: vk::CommandBuffer, name: &str, semaphores: Semaphores) -> Result<u64> {
         let queue = lock(&self.queue);
         let value = self.submitted.load(Ordering::Acquire) + 1;
         let buffers = [vk::CommandBufferSubmitInfo::default().command_buffer(commands)];
-        let signals = [vk::SemaphoreSubmitInfo::default()
-            .semaphore(self.timeline)
-            .value(value)
-            .stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)];
-        let info = vk::SubmitInfo2::default().command_buffer_infos(&buffers).signal_semaphore_infos(&signals);
+        let at_all_commands = |semaphore| {
+            let info = vk::SemaphoreSubmitInfo::default().semaphore(semaphore);
+            info.stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)
+        };
+        let waits: Vec<_> = semaphores.wait.map(at_all_commands).into_iter().collect();
+        let signals: Vec<_> = [at_all_commands(self.timeline).value(value)]
+            .into_iter()
+            .chain(semaphores.signal.map(at_all_commands))
+            .collect();
+        let info = vk::SubmitInfo2::default()
+            .wait_semaphore_infos(&waits)
+            .command_buffer_infos(&buffers)
+            .signal_semaphore_infos(&signals);
         // SAFETY: the queue is held exclusively; the command buffer is complete and kept until `value` is reached.
         unsafe { self.synchronization2.queue_submit2(*queue, &[info], vk::Fence::null()) }
             .during("vkQueueSubmit2", name)?;
@@ -348,6 +390,24 @@ impl Device {
         // SAFETY: the timeline lives as long as the device; `value` has been submitted or is 0.
         unsafe { self.raw.wait_semaphores(&info, u64::MAX) }.during("vkWaitSemaphores", "timeline")?;
         self.collect_garbage(value);
+        Ok(())
+    }
+
+    /// Lets `act` use the queue, alone.
+    #[cfg(feature = "viewer")]
+    pub(super) fn with_queue<T>(&self, act: impl FnOnce(vk::Queue) -> T) -> T {
+        act(*lock(&self.queue))
+    }
+
+    /// Blocks until the queue has nothing left to do, also for presentation, then destroys what was waiting for it.
+    #[cfg(feature = "viewer")]
+    pub(super) fn wait_idle(&self) -> Result<()> {
+        let finished = self.with_queue(|queue| {
+            // SAFETY: the queue is held exclusively.
+            unsafe { self.raw.queue_wait_idle(queue) }.during("vkQueueWaitIdle", &self.description.name)?;
+            Ok(self.submitted.load(Ordering::Acquire))
+        })?;
+        self.collect_garbage(finished);
         Ok(())
     }
 

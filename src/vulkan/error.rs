@@ -20,6 +20,14 @@ pub enum VulkanError {
         "validation: the layer VK_LAYER_KHRONOS_validation is not installed; install it (Debian, Ubuntu: apt-get install vulkan-validationlayers) or leave out --validate"
     )]
     NoValidationLayer,
+    /// The driver cannot show anything in windows.
+    #[error(
+        "no Vulkan driver presents to this window system ({extension} is missing); install one that does, or use `threadlight render`"
+    )]
+    NoPresentation {
+        /// What it would take.
+        extension: String,
+    },
     /// `--device` names none of the devices.
     #[error("--device {asked}: no such Vulkan device; name one of: {available}")]
     NoSuchDevice {

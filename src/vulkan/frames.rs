@@ -15,6 +15,25 @@ pub struct PassTime {
     pub gpu_ms: f64,
 }
 
+/// What a submission waits for before it starts, and signals when it has finished, besides the device's timeline.
+#[derive(Clone, Copy, Default)]
+pub struct Semaphores {
+    pub(super) wait: Option<vk::Semaphore>,
+    pub(super) signal: Option<vk::Semaphore>,
+}
+
+impl Semaphores {
+    /// The same for the first of several submissions that were to be one.
+    pub fn first(self) -> Self {
+        Self { signal: None, ..self }
+    }
+
+    /// The same for the last of several submissions that were to be one.
+    pub fn last(self) -> Self {
+        Self { wait: None, ..self }
+    }
+}
+
 /// Passes that a frame can time; more are recorded, but not timed.
 const MAX_TIMED_PASSES: u32 = 64;
 
@@ -53,6 +72,18 @@ impl Frames {
     /// # Errors
     /// What `record` returns, or a failing submission.
     pub fn record<T>(&mut self, record: impl FnOnce(&mut Commands) -> Result<T>) -> Result<T> {
+        self.record_between(Semaphores::default(), record)
+    }
+
+    /// The same between two semaphores.
+    ///
+    /// # Errors
+    /// What `record` returns, or a failing submission.
+    pub fn record_between<T>(
+        &mut self,
+        semaphores: Semaphores,
+        record: impl FnOnce(&mut Commands) -> Result<T>,
+    ) -> Result<T> {
         let slot = &mut self.slots[self.next];
         self.device.wait_for(slot.finished_at)?;
         slot.begin(&self.device, &self.name)?;
@@ -61,9 +92,17 @@ impl Frames {
         slot.timed = commands.into_timed_passes();
         // SAFETY: the command buffer is in the recording state.
         unsafe { self.device.raw.end_command_buffer(slot.commands) }.during("vkEndCommandBuffer", &self.name)?;
-        slot.finished_at = self.device.submit(slot.commands, &self.name)?;
+        slot.finished_at = self.device.submit(slot.commands, &self.name, semaphores)?;
         self.next = (self.next + 1) % self.slots.len();
         Ok(result)
+    }
+
+    /// Blocks until the oldest frame has left the GPU, so that [`Frames::record`] will not wait.
+    ///
+    /// # Errors
+    /// A lost device.
+    pub fn wait_for_place(&self) -> Result<()> {
+        self.device.wait_for(self.slots[self.next].finished_at)
     }
 
     /// Blocks until every frame has left the GPU.
@@ -75,6 +114,14 @@ impl Frames {
         self.device.wait_for(last)
     }
 
+    /// GPU time of each pass of the oldest frame, which must have left the GPU ([`Frames::wait_for_place`]); empty where there is none.
+    ///
+    /// # Errors
+    /// A lost device.
+    pub fn oldest_pass_times(&self) -> Result<Vec<PassTime>> {
+        self.times_of(&self.slots[self.next])
+    }
+
     /// GPU time of each pass of the frame recorded last, which is waited for. Empty where the device has no timestamps.
     ///
     /// # Errors
@@ -82,6 +129,11 @@ impl Frames {
     pub fn pass_times(&self) -> Result<Vec<PassTime>> {
         let slot = &self.slots[(self.next + self.slots.len() - 1) % self.slots.len()];
         self.device.wait_for(slot.finished_at)?;
+        self.times_of(slot)
+    }
+
+    /// Times of a frame that has left the GPU.
+    fn times_of(&self, slot: &Slot) -> Result<Vec<PassTime>> {
         let Some(queries) = slot.queries.filter(|_| !slot.timed.is_empty()) else { return Ok(Vec::new()) };
         let mut ticks = vec![0_u64; 2 * slot.timed.len()];
         let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;

@@ -30,8 +30,12 @@ pub struct Instance {
     messages: Messages,
     // The callback's user data: at one address for as long as the messenger lives.
     _user_data: Box<Messages>,
-    // Unloads the loader when dropped: last.
-    _entry: ash::Entry,
+    /// Whether it was made for a window system.
+    #[cfg(feature = "viewer")]
+    pub(super) presents: bool,
+    // Unloads the loader when dropped: last. Without windows it is only kept alive.
+    #[cfg_attr(not(feature = "viewer"), expect(dead_code))]
+    pub(super) entry: ash::Entry,
 }
 
 impl Instance {
@@ -40,6 +44,23 @@ impl Instance {
     /// # Errors
     /// No loader, no driver, or no validation layer where one was asked for; each says what to install.
     pub fn new(validate: bool) -> Result<Arc<Self>> {
+        Self::with_extensions(validate, &[])
+    }
+
+    /// The same for one that can present to windows of `display`.
+    ///
+    /// # Errors
+    /// Those of [`Instance::new`], and a window system that the driver does not present to.
+    #[cfg(feature = "viewer")]
+    pub fn for_display(validate: bool, display: raw_window_handle::RawDisplayHandle) -> Result<Arc<Self>> {
+        let extensions =
+            ash_window::enumerate_required_extensions(display).during("vkCreateInstance", "window system")?;
+        // SAFETY: they are names in static memory.
+        let extensions: Vec<_> = extensions.iter().map(|name| unsafe { CStr::from_ptr(*name) }).collect();
+        Self::with_extensions(validate, &extensions)
+    }
+
+    fn with_extensions(validate: bool, wanted: &[&CStr]) -> Result<Arc<Self>> {
         // SAFETY: loads the system's Vulkan loader; it is unloaded after every object made through it (field order).
         let entry =
             unsafe { ash::Entry::load() }.map_err(|cause| VulkanError::NoLoader { cause: cause.to_string() })?;
@@ -61,7 +82,10 @@ impl Instance {
         let available = unsafe { entry.enumerate_instance_extension_properties(None) }
             .during("vkEnumerateInstanceExtensionProperties", name)?;
         let has = |wanted: &CStr| available.iter().any(|extension| extension.extension_name_as_c_str() == Ok(wanted));
-        let mut extensions = Vec::new();
+        if let Some(missing) = wanted.iter().find(|wanted| !has(wanted)) {
+            return Err(VulkanError::NoPresentation { extension: missing.to_string_lossy().into_owned() });
+        }
+        let mut extensions: Vec<_> = wanted.iter().map(|extension| extension.as_ptr()).collect();
         let mut flags = vk::InstanceCreateFlags::empty();
         // Names and labels cost nothing without a tool that listens, and are what a frame debugger shows.
         let debug_names = validate || has(ext::debug_utils::NAME);
@@ -106,7 +130,16 @@ impl Instance {
         } else {
             None
         };
-        Ok(Arc::new(Self { raw, debug_names, messenger, messages, _user_data: user_data, _entry: entry }))
+        Ok(Arc::new(Self {
+            raw,
+            debug_names,
+            messenger,
+            messages,
+            _user_data: user_data,
+            #[cfg(feature = "viewer")]
+            presents: !wanted.is_empty(),
+            entry,
+        }))
     }
 
     /// What the validation layer has said so far; stays readable after the instance is gone.

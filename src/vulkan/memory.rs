@@ -267,6 +267,8 @@ pub struct Image {
     pub shape: ImageShape,
     name: String,
     memory: Option<Arc<Memory>>,
+    /// Whether it is destroyed with the swapchain that it is of, not by itself.
+    of_swapchain: bool,
     device: Arc<Device>,
 }
 
@@ -313,7 +315,17 @@ impl Image {
         let raw = unsafe { device.raw.create_image(&info, None) }.during("vkCreateImage", name)?;
         device.set_name(raw, name);
         let view = vk::ImageView::null();
-        Ok(Self { raw, view, shape, name: name.to_owned(), memory: None, device: device.clone() })
+        let (name, device) = (name.to_owned(), device.clone());
+        Ok(Self { raw, view, shape, name, memory: None, of_swapchain: false, device })
+    }
+
+    /// An image that a swapchain owns, which has to outlive it.
+    #[cfg(feature = "viewer")]
+    pub(super) fn of_swapchain(device: &Arc<Device>, name: &str, shape: ImageShape, raw: vk::Image) -> Result<Self> {
+        let (view, memory, name, device) = (vk::ImageView::null(), None, name.to_owned(), device.clone());
+        let mut image = Self { raw, view, shape, name, memory, of_swapchain: true, device };
+        image.make_view()?;
+        Ok(image)
     }
 
     /// What memory it needs.
@@ -332,12 +344,16 @@ impl Image {
         unsafe { self.device.raw.bind_image_memory(self.raw, raw_memory, offset) }
             .during("vkBindImageMemory", &self.name)?;
         self.memory = Some(memory.clone());
+        self.make_view()
+    }
+
+    fn make_view(&mut self) -> Result<()> {
         let info = vk::ImageViewCreateInfo::default()
             .image(self.raw)
             .view_type(self.shape.view_type())
             .format(self.shape.format)
             .subresource_range(self.shape.whole());
-        // SAFETY: the image is alive and bound; the view is destroyed with it.
+        // SAFETY: the image is alive and has memory; the view is destroyed with it.
         self.view =
             unsafe { self.device.raw.create_image_view(&info, None) }.during("vkCreateImageView", &self.name)?;
         self.device.set_name(self.view, &self.name);
@@ -348,7 +364,9 @@ impl Image {
 impl Drop for Image {
     fn drop(&mut self) {
         self.device.delete_later(Garbage::ImageView(self.view));
-        self.device.delete_later(Garbage::Image(self.raw));
+        if !self.of_swapchain {
+            self.device.delete_later(Garbage::Image(self.raw));
+        }
     }
 }
 

@@ -56,6 +56,10 @@ pub(super) struct Interface {
 
 impl Shader {
     pub(super) fn words(&self) -> Vec<u32> {
+        #[cfg(feature = "hot-reload")]
+        if let Some(words) = super::hot_reload::words_of(self.name) {
+            return words;
+        }
         self.spirv.chunks_exact(4).map(|word| u32::from_le_bytes([word[0], word[1], word[2], word[3]])).collect()
     }
 
@@ -148,7 +152,7 @@ mod tests {
             }
         }
         let spirv = words.iter().flat_map(|word| word.to_le_bytes()).collect::<Vec<_>>().leak();
-        let problem = Shader { spirv, ..compiled::TONE_MAP }.reflect().unwrap_err().to_string();
+        let problem = Shader { spirv, name: "moved", ..compiled::TONE_MAP }.reflect().unwrap_err().to_string();
         assert!(problem.contains("have the same binding, 0"), "{problem}");
     }
 }

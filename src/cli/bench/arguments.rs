@@ -1,6 +1,7 @@
 //! What the measurements have in common on the command line: what to measure, on which device, and where to write it.
-use crate::cli::render::{parse_size, processor};
-use crate::cli::{cache_folder, material_of, number, stem};
+use crate::cli::render::processor;
+use crate::cli::scene_flags::parse_size;
+use crate::cli::{cache_folder, number, stem};
 use anyhow::Context;
 use clap::value_parser;
 use std::path::{Path, PathBuf};
@@ -10,7 +11,7 @@ use threadlight::evaluate::sweep::Measured;
 use threadlight::evaluate::{Cases, Sweep, cases::OnlyCancels, reference_picture, sweep};
 use threadlight::method::Method;
 use threadlight::output;
-use threadlight::scene::{MAX_SUBPIXELS, ObjectSettings, Scene, Source, mesh};
+use threadlight::scene::{MAX_SUBPIXELS, MaterialSource, ObjectSettings, Scene, Source, mesh};
 use threadlight::threads::{MAX_COUNT, Observer};
 use threadlight::vulkan::{Device, Instance};
 use threadlight::{Error, Result, environment};
@@ -79,7 +80,7 @@ impl CasesArguments {
             counts: once("--counts", counts)?,
             materials: named("--materials", materials)?
                 .into_iter()
-                .map(|(name, text)| (name, material_of(text)))
+                .map(|(name, text)| (name, MaterialSource::named(text)))
                 .collect(),
             environments: named("--environments", &self.environments)?
                 .into_iter()

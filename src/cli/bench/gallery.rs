@@ -1,6 +1,5 @@
 //! `threadlight bench gallery`: pictures beside each other, of materials and of methods.
 use super::arguments::{CasesArguments, Defaults, OutputArguments, QUICK_TOLERANCE, TruthArguments, named};
-use crate::cli::material_of;
 use crate::cli::progress::Progress;
 use clap::value_parser;
 use std::io::Write;
@@ -11,6 +10,7 @@ use threadlight::evaluate::sweep::Measured;
 use threadlight::evaluate::{Cases, Estimator, Sweep, tables};
 use threadlight::method::Method;
 use threadlight::output;
+use threadlight::scene::MaterialSource;
 use threadlight::threads::MAX_COUNT;
 use threadlight::{Error, Result};
 
@@ -65,7 +65,7 @@ impl BenchGallery {
         })?;
         let estimator = Estimator { method: materials.methods[0], count: self.threads };
         let compared = named("--compare", &self.compare)?;
-        let compared = compared.into_iter().map(|(name, text)| (name, material_of(text))).collect();
+        let compared = compared.into_iter().map(|(name, text)| (name, MaterialSource::named(text))).collect();
         let sweep = Sweep {
             cases: Cases { materials: compared, ..materials.clone() },
             repeat: 3,

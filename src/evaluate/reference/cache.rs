@@ -15,7 +15,7 @@ pub fn key(prepared: &Prepared, geometry: &[[u32; 2]], tolerance: f64) -> String
     let Prepared { view, environment, .. } = prepared;
     let mut hasher = blake3::Hasher::new();
     let camera = &view.camera;
-    let numbers = [tolerance, prepared.intensity, view.rotation_deg, view.exposure.into(), view.gamma.into()];
+    let numbers = [tolerance, prepared.view.intensity, view.rotation_deg, view.exposure.into(), view.gamma.into()];
     let vectors = [camera.eye, camera.target, camera.up].map(|vector| vector.to_array());
     for number in numbers.iter().chain(vectors.as_flattened()).chain([&camera.fov_y_deg]) {
         hasher.update(&number.to_le_bytes());

@@ -28,11 +28,13 @@ mod cache;
 mod cubature;
 mod gpu;
 mod light;
+mod progressive;
 #[cfg(test)]
 mod tests;
 
 use cubature::Cubature;
 use light::{CellPlace, Light};
+pub use progressive::{Estimate, STAGES, Stage, progressive};
 
 /// Tolerance where none is given: a twentieth of a step of an 8-bit display value.
 pub const TOLERANCE: f64 = 2e-4;
@@ -40,6 +42,8 @@ pub const TOLERANCE: f64 = 2e-4;
 pub const GPU_TOLERANCE: f64 = 1e-3;
 /// A pixel gives up at so many cells.
 const MOST_CELLS: usize = 1 << 18;
+/// After so many splits of a pixel's cells, well under a millisecond, the observer is asked: a pixel may take seconds.
+const SPLITS_A_LOOK: usize = 64;
 /// What the view angle is held below: at 90 degrees f is 0 and no slice is left. A renderer only meets it where an
 /// interpolated normal turns from the eye.
 pub const MAX_THETA_O_DEG: f64 = 89.99;
@@ -90,7 +94,7 @@ impl Default for ReferenceSettings {
 }
 
 /// The reference picture.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct ReferenceImage {
     /// Linear radiance times coverage, and coverage, row by row from the top left: means over sub-pixels.
     pub radiance: Vec<[f32; 4]>,
@@ -122,7 +126,7 @@ impl ReferenceImage {
             }
             let (x, y) = (pixel as u32 % width, pixel as u32 / width);
             let ray = camera.ray(f64::from(x), f64::from(y), width, height);
-            let behind = prepared.environment.radiance(to_environment * ray) * prepared.intensity;
+            let behind = prepared.environment.radiance(to_environment * ray) * prepared.view.intensity;
             let sum = dvec3(r.into(), g.into(), b.into()) + (1.0 - f64::from(coverage)) * behind;
             sum.min(DVec3::splat(f32::MAX.into())).as_vec3().extend(1.0).to_array()
         });
@@ -170,7 +174,7 @@ pub fn reference(
         return Ok(ReferenceImage { seconds: start.elapsed().as_secs_f64(), cached: true, ..image });
     }
     let brdfs = prepared.materials.iter().map(|material| &material.brdf);
-    let integrator = Integrator::new(&prepared.environment, prepared.intensity, brdfs, prepared.view.subpixels);
+    let integrator = Integrator::new(&prepared.environment, prepared.view.intensity, brdfs, prepared.view.subpixels);
     let image = integrator.image(&prepared.view, &geometry, settings.tolerance, observer)?;
     let image = ReferenceImage { seconds: start.elapsed().as_secs_f64(), ..image };
     if let Some(folder) = &settings.cache {
@@ -234,6 +238,15 @@ pub struct PixelEstimate {
     pub evaluations: u64,
 }
 
+/// A pixel that sees a surface.
+struct Texel {
+    /// Linear radiance times coverage, and coverage.
+    rgba: [f32; 4],
+    /// Sub-pixels that see a surface.
+    points: usize,
+    estimate: PixelEstimate,
+}
+
 /// How a radiance is shown, for errors to be measured in what is seen.
 #[derive(Clone, Copy, Debug)]
 pub struct Display {
@@ -293,26 +306,19 @@ impl<'a> Integrator<'a> {
     ) -> Result<ReferenceImage> {
         let start = Instant::now();
         let (width, height) = (view.width as usize, view.height as usize);
-        let display = Display::of(view);
         let (evaluations, covered, rows_done) = (AtomicU64::new(0), AtomicU64::new(0), AtomicUsize::new(0));
         let row = |y: usize| -> Result<(Vec<[f32; 4]>, Vec<DVec3>)> {
             let (mut texels, mut errors) = (Vec::with_capacity(width), Vec::new());
             for x in 0..width {
-                if observer.cancelled() {
-                    return Err(Error::Cancelled);
-                }
-                let points = self.points(view, geometry, x, y);
-                if points.is_empty() {
+                let Some(Texel { rgba, points, estimate }) = self.texel(view, geometry, [x, y], tolerance, observer)?
+                else {
                     texels.push([0.0; 4]);
                     continue;
-                }
-                let estimate = self.pixel(&points, tolerance, display);
+                };
                 evaluations.fetch_add(estimate.evaluations, Ordering::Relaxed);
-                covered.fetch_add(points.len() as u64, Ordering::Relaxed);
+                covered.fetch_add(points as u64, Ordering::Relaxed);
                 errors.push(estimate.display_error);
-                // Beyond single precision there is no picture: the brightest number stands for it.
-                let [r, g, b] = estimate.radiance.to_array().map(|value| value.min(f64::from(f32::MAX)) as f32);
-                texels.push([r, g, b, points.len() as f32 / self.subpixels as f32]);
+                texels.push(rgba);
             }
             observer.progress(rows_done.fetch_add(1, Ordering::Relaxed) + 1, height);
             Ok((texels, errors))
@@ -329,6 +335,29 @@ impl<'a> Integrator<'a> {
             seconds: start.elapsed().as_secs_f64(),
             cached: false,
         })
+    }
+
+    /// The pixel in column `x` and row `y` of the picture of `geometry`; none where no surface is seen.
+    fn texel(
+        &self,
+        view: &View,
+        geometry: &[[u32; 2]],
+        [x, y]: [usize; 2],
+        tolerance: f64,
+        observer: &dyn Observer,
+    ) -> Result<Option<Texel>> {
+        if observer.cancelled() {
+            return Err(Error::Cancelled);
+        }
+        let points = self.points(view, geometry, x, y);
+        if points.is_empty() {
+            return Ok(None);
+        }
+        let estimate = self.observed_pixel(&points, tolerance, Display::of(view), observer)?;
+        // Beyond single precision there is no picture: the brightest number stands for it.
+        let [r, g, b] = estimate.radiance.to_array().map(|value| value.min(f64::from(f32::MAX)) as f32);
+        let rgba = [r, g, b, points.len() as f32 / self.subpixels as f32];
+        Ok(Some(Texel { rgba, points: points.len(), estimate }))
     }
 
     /// What the covered sub-pixels of the pixel in column `x` and row `y` see, row by row.
@@ -352,13 +381,24 @@ impl<'a> Integrator<'a> {
     /// # Panics
     /// With more points than sub-pixels, or of materials that are not there.
     pub fn pixel(&self, points: &[Point], tolerance: f64, display: Display) -> PixelEstimate {
+        self.observed_pixel(points, tolerance, display, &()).expect("nobody cancels")
+    }
+
+    /// The same; the only error is that `observer` cancels it.
+    fn observed_pixel(
+        &self,
+        points: &[Point],
+        tolerance: f64,
+        display: Display,
+        observer: &dyn Observer,
+    ) -> Result<PixelEstimate> {
         assert!(points.len() <= self.subpixels, "at most one point a sub-pixel");
         let f_cos =
             |direction: DVec3| points.iter().map(|point| point.f_cos(self.brdfs[point.material].0, direction)).sum();
         let must_split = |place| points.iter().any(|point| point.may_hide_lobe(self.brdfs[point.material].1, place));
         let mut cubature = Cubature::new(&self.light, f_cos, must_split);
         let scale = self.intensity / self.subpixels as f64;
-        loop {
+        for split in 1.. {
             let radiance = scale * cubature.integral;
             let radiance_error = scale * ERROR_LEFT * cubature.squares.powf(0.5);
             let channel = |i: usize| display.error(radiance[i], radiance_error[i]);
@@ -368,9 +408,13 @@ impl<'a> Integrator<'a> {
             let done = rms(display_error) <= tolerance || cubature.len() >= MOST_CELLS;
             if done || !cubature.refine(seen * seen) {
                 let evaluations = cubature.evaluations * points.len() as u64;
-                return PixelEstimate { radiance, radiance_error, display_error, evaluations };
+                return Ok(PixelEstimate { radiance, radiance_error, display_error, evaluations });
+            }
+            if split % SPLITS_A_LOOK == 0 && observer.cancelled() {
+                return Err(Error::Cancelled);
             }
         }
+        unreachable!("there is no end to splits")
     }
 }
 

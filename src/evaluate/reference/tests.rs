@@ -196,6 +196,7 @@ fn the_picture_is_the_same_on_any_number_of_threads_and_can_be_cancelled() {
         height: 5,
         subpixels: 2,
         rotation_deg: 30.0,
+        intensity: 1.0,
         exposure: 1.0,
         gamma: 2.2,
     };

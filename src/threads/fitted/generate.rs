@@ -37,7 +37,7 @@ type Row = (Vec<Kernel>, DVec3, f64);
 /// Fits `settings.count` threads to `brdf`, the same to the last bit on any number of cores.
 ///
 /// # Errors
-/// No or too many threads, no rows, or cancelled by `observer` (noticed within a row).
+/// No or too many threads, no rows, or cancelled by `observer` (noticed within a step of a row).
 pub fn generate(brdf: &Brdf, settings: &Settings, observer: &dyn Observer) -> Result<FittedTable> {
     settings.check()?;
     let rows = settings.rows;
@@ -48,6 +48,9 @@ pub fn generate(brdf: &Brdf, settings: &Settings, observer: &dyn Observer) -> Re
         }
         let slice = Slice::new(brdf, theta_o(row, rows));
         let lights = TestLights::new(&slice, (LIGHTS_A_THREAD * settings.count).max(FEWEST_LIGHTS), LIGHTS_SEED);
+        if observer.cancelled() {
+            return Err(Error::Cancelled);
+        }
         let (mut kernels, effort) = match from {
             Some((before, kernels)) => (carried(kernels, theta_o(before, rows), theta_o(row, rows)), NEXT),
             None => (cells(&slice, settings.count), FIRST),
@@ -55,7 +58,7 @@ pub fn generate(brdf: &Brdf, settings: &Settings, observer: &dyn Observer) -> Re
         let start = kernels.clone();
         let fit = Fit::new(&lights, slice.albedo());
         let fit = if from.is_some() { fit.tied(&start, TIED) } else { fit };
-        fit.solve(&mut kernels, effort);
+        fit.solve(&mut kernels, effort, observer)?;
         let error = fit.relative_error(&kernels);
         observer.progress(done.fetch_add(1, Ordering::Relaxed) + 1, rows);
         Ok((kernels, slice.albedo(), error))

@@ -4,6 +4,8 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::kernel::{Pair, SHARPEST_LEVEL, WIDEST_LEVEL, kappa_of_level, overlap, scale_rad};
 use super::lights::{SCALES, TestLights, light_kappa};
+use crate::error::{Error, Result};
+use crate::threads::Observer;
 
 /// A thread in one row: a kernel of the environment's pyramid, and the radiance it gives under light of radiance 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -126,7 +128,10 @@ impl<'a> Fit<'a> {
     }
 
     /// Improves `kernels`.
-    pub fn solve(&self, kernels: &mut Vec<Kernel>, effort: Effort) {
+    ///
+    /// # Errors
+    /// Cancelled by `observer` (noticed within a step: a tenth of a second for the most threads that there can be).
+    pub fn solve(&self, kernels: &mut Vec<Kernel>, effort: Effort, observer: &dyn Observer) -> Result<()> {
         let mut damping = 1e-3;
         let mut tried = 0;
         let squares = |r: &[DVec3]| r.iter().map(|r| r.length_squared()).sum::<f64>();
@@ -134,6 +139,9 @@ impl<'a> Fit<'a> {
         let mut cost = squares(&residuals) + self.prior_cost(kernels);
         while tried < effort.steps {
             let design = self.design(kernels);
+            if observer.cancelled() {
+                return Err(Error::Cancelled);
+            }
             let gram = design.transpose() * &design;
             let right: [DVector<f64>; 3] = std::array::from_fn(|c| {
                 let r = DVector::from_iterator(residuals.len(), residuals.iter().map(|r| r[c]));
@@ -142,6 +150,9 @@ impl<'a> Fit<'a> {
             let (hessian, gradient) = self.normal_equations(kernels, &gram, &right);
             let before = cost;
             loop {
+                if observer.cancelled() {
+                    return Err(Error::Cancelled);
+                }
                 tried += 1;
                 let next = step(kernels, &hessian, &gradient, damping);
                 let next_residuals = self.residuals(&next);
@@ -153,13 +164,14 @@ impl<'a> Fit<'a> {
                 }
                 damping *= 5.0;
                 if tried >= effort.steps || damping > 1e6 {
-                    return;
+                    return Ok(());
                 }
             }
             if cost > before * (1.0 - effort.least_gain) || cost == 0.0 {
                 break;
             }
         }
+        Ok(())
     }
 
     /// Gauss and Newton's matrix and the gradient. Unknowns: red, green and blue weights of all kernels, then two tangents and the

@@ -1,0 +1,129 @@
+//! The flags that say what is rendered, and on what: `render` and `view` have them in common.
+use super::{cache_folder, number};
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::value_parser;
+use std::path::PathBuf;
+use threadlight::environment;
+use threadlight::method::Method;
+use threadlight::scene::{
+    Background, EXPOSURE, GAMMA, MAX_SAMPLES, MAX_SIZE_PX, MAX_SUBPIXELS, MaterialSource, Scene, Source, mesh,
+};
+
+/// What is rendered.
+#[derive(clap::Args)]
+pub struct SceneFlags {
+    /// Scene file (TOML); without one, the built-in scene: a gold sphere in a studio.
+    pub scene: Option<PathBuf>,
+    /// Mesh in place of the scene's objects: a built-in name or an OBJ file.
+    #[arg(long, value_name = "NAME|FILE")]
+    pub mesh: Option<String>,
+    /// Material of every object: a built-in name, a MERL .binary, or a .toml with a model and its parameters.
+    #[arg(long, value_name = "NAME|FILE")]
+    pub material: Option<String>,
+    /// Light from all directions: a built-in name, a Radiance .hdr or an .exr, latitude-longitude.
+    #[arg(long, value_name = "NAME|FILE")]
+    pub environment: Option<String>,
+    /// Shading method.
+    #[arg(long, value_name = "NAME", value_parser = methods())]
+    pub method: Option<String>,
+    /// Sample threads per pixel: fitted 1 to 128 (default 16), paper 1 to 1024 (default 100); or samples per pixel of methods that
+    /// have none, 1 to 10000 (default 100).
+    #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=i64::from(MAX_SAMPLES)))]
+    pub threads: Option<u32>,
+    /// Sub-pixels per axis, 1 to 4.
+    #[arg(long, value_name = "S", value_parser = value_parser!(u32).range(1..=i64::from(MAX_SUBPIXELS)))]
+    pub subpixels: Option<u32>,
+    /// Size of the picture in pixels, each side 1 to 16384.
+    #[arg(long, value_name = "WxH", value_parser = parse_size)]
+    pub size: Option<(u32, u32)>,
+    /// Factor on radiance before display.
+    #[arg(long, value_name = "X", value_parser = number(EXPOSURE, "a finite number that is not negative"))]
+    pub exposure: Option<f64>,
+    /// Display values are radiance to the power of 1/X.
+    #[arg(long, value_name = "X", value_parser = number(GAMMA, "a finite number above 0"))]
+    pub gamma: Option<f64>,
+    /// What is seen behind the objects.
+    #[arg(long, value_name = "environment|none", value_parser = background(), hide_possible_values = true)]
+    pub background: Option<Background>,
+    /// Turns the environment about the vertical axis, counter-clockwise seen from above, in degrees.
+    #[arg(long, value_name = "DEG", value_parser = number(f64::MIN..=f64::MAX, "a finite number"))]
+    pub rotation: Option<f64>,
+    /// Seed of everything random; the same seed gives the same bytes.
+    #[arg(long, value_name = "N")]
+    pub seed: Option<u64>,
+}
+
+/// On what it is rendered.
+#[derive(clap::Args)]
+pub struct MachineFlags {
+    /// Vulkan device: its index or part of its name, as `threadlight devices` lists them.
+    #[arg(long, value_name = "NAME|INDEX")]
+    pub device: Option<String>,
+    /// Turn on Vulkan's validation layer, with synchronisation validation; any message is a failure.
+    #[arg(long)]
+    pub validate: bool,
+    /// Neither read nor write cached threads, blurred environments and pipelines.
+    #[arg(long)]
+    pub no_cache: bool,
+}
+
+impl MachineFlags {
+    /// The folder for what takes long to make, if there is to be one.
+    pub fn cache(&self) -> Option<PathBuf> {
+        cache_folder(self.no_cache)
+    }
+}
+
+impl SceneFlags {
+    /// The scene file, or the built-in scene, with the flags laid over it.
+    pub fn scene(&self) -> threadlight::Result<Scene> {
+        let mut scene = match &self.scene {
+            Some(path) => Scene::load(path)?,
+            None => Scene::default(),
+        };
+        if let Some(material) = &self.material {
+            scene.use_material(material, MaterialSource::named(material));
+        }
+        if let Some(mesh) = &self.mesh {
+            scene.use_mesh(Source::named(mesh, mesh::builtin_names()));
+        }
+        if let Some(name) = &self.environment {
+            scene.environment.source = Source::named(name, environment::builtin_names());
+        }
+        if let Some((width, height)) = self.size {
+            (scene.image.width, scene.image.height) = (width, height);
+        }
+        fn lay<T: Clone>(flag: &Option<T>, setting: &mut T) {
+            if let Some(value) = flag {
+                *setting = value.clone();
+            }
+        }
+        lay(&self.method, &mut scene.shading.method);
+        scene.shading.threads = self.threads.or(scene.shading.threads);
+        lay(&self.seed, &mut scene.shading.seed);
+        lay(&self.subpixels, &mut scene.image.subpixels);
+        lay(&self.exposure, &mut scene.image.exposure);
+        lay(&self.gamma, &mut scene.image.gamma);
+        lay(&self.background, &mut scene.image.background);
+        lay(&self.rotation, &mut scene.environment.rotation_deg);
+        Ok(scene)
+    }
+}
+
+/// `640x480`.
+pub fn parse_size(text: &str) -> Result<(u32, u32), String> {
+    let side = |text: &str| text.parse().ok().filter(|side| (1..=MAX_SIZE_PX).contains(side));
+    let sides = text.split_once(['x', 'X']).and_then(|(width, height)| Some((side(width)?, side(height)?)));
+    sides.ok_or_else(|| format!("use width x height in pixels, each 1 to {MAX_SIZE_PX}, such as 640x480"))
+}
+
+/// The name of a method.
+fn methods() -> PossibleValuesParser {
+    PossibleValuesParser::new(Method::ALL.iter().map(|method| method.name()))
+}
+
+/// `environment` or `none`.
+fn background() -> impl TypedValueParser<Value = Background> {
+    PossibleValuesParser::new(["environment", "none"])
+        .map(|name| if name == "none" { Background::None } else { Background::Environment })
+}

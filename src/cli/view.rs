@@ -1,0 +1,87 @@
+//! `threadlight view`: a window to look at a scene and change it.
+use super::scene_flags::{MachineFlags, SceneFlags};
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::value_parser;
+use std::path::PathBuf;
+use threadlight::output::{self, Format};
+use threadlight::view::{self, Settings, input};
+use threadlight::vulkan::PresentMode;
+use threadlight::{Error, Result};
+
+const EXAMPLES: &str = "\
+Examples:
+  threadlight view                                      the built-in scene
+  threadlight view --mesh dragon.obj --material alumina-oxide.binary --environment lebombo.hdr
+  threadlight view scene.toml --present-mode mailbox
+  threadlight view --frames 1 --screenshot window.png   for scripts: draw the scene, take a picture of the window, end
+
+In the window:
+  drag                 turn the camera              F, Home   frame the objects, reset the view
+  right drag, Shift    move it                      T         turntable
+  wheel, pinch         zoom                         + - 0     exposure
+  Ctrl + drag          turn the environment         [ ]       half, twice the threads
+  drop a file          material, environment,       B         background
+                       mesh or scene                Escape    close the message";
+
+/// Opens a window to look at a scene, change it, and save picture and scene. Flags override the scene file.
+#[derive(clap::Args)]
+#[command(after_help = EXAMPLES, allow_negative_numbers = true)]
+pub struct View {
+    #[command(flatten)]
+    scene: SceneFlags,
+    #[command(flatten)]
+    machine: MachineFlags,
+    /// When finished frames reach the screen: fifo and fifo-relaxed wait for the display, mailbox and immediate do not.
+    #[arg(long, value_name = "MODE", default_value = "fifo", value_parser = present_modes())]
+    present_mode: PresentMode,
+    /// End after this many frames of the loaded scene (and after the replay).
+    #[arg(long, value_name = "N", value_parser = value_parser!(u64).range(1..))]
+    frames: Option<u64>,
+    /// Write what the window shows in the last of these frames, as .png.
+    #[arg(long, value_name = "FILE")]
+    screenshot: Option<PathBuf>,
+    /// Do what this file says as if the user did it: one event a line, in JSON.
+    #[arg(long, value_name = "FILE")]
+    replay: Option<PathBuf>,
+}
+
+/// Size of the picture where neither scene nor flag names one: with the panel, 1280 x 720.
+const SIZE: (u32, u32) = (980, 720);
+
+impl View {
+    pub fn run(self) -> anyhow::Result<()> {
+        if let Some(path) = &self.screenshot {
+            if Format::of(path)? != Format::Png {
+                return Err(Error::in_file(path, "is no PNG", "end the name of --screenshot in .png").into());
+            }
+            output::check_writable(path)?;
+        }
+        let mut scene = self.scene.scene()?;
+        if self.scene.scene.is_none() && self.scene.size.is_none() {
+            (scene.image.width, scene.image.height) = SIZE;
+        }
+        let replay = self.replay.as_deref().map(input::read_replay).transpose()?.unwrap_or_default();
+        let messages = view::run(Settings {
+            scene,
+            cache: self.machine.cache(),
+            device: self.machine.device,
+            validate: self.machine.validate,
+            present_mode: self.present_mode,
+            frames: self.frames,
+            screenshot: self.screenshot,
+            replay: replay.into_iter().map(|(_, input)| input).collect(),
+        })?;
+        if let Some(first) = messages.first() {
+            anyhow::bail!("validation: {} messages, the first: {}", messages.len(), first.replace('\n', " "));
+        }
+        Ok(())
+    }
+}
+
+/// The name of a present mode.
+fn present_modes() -> impl TypedValueParser<Value = PresentMode> {
+    let names = PossibleValuesParser::new(PresentMode::ALL.iter().map(|mode| mode.name()));
+    names.try_map(|name| -> Result<PresentMode> {
+        Ok(PresentMode::ALL.into_iter().find(|mode| mode.name() == name).unwrap_or_default())
+    })
+}

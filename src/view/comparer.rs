@@ -1,0 +1,109 @@
+//! When the other picture of a comparison is made: begins anew when the view changes, waits while it moves.
+use std::path::Path;
+use std::sync::Arc;
+
+use super::comparison::{Compared, Other, Wipe, compare_with};
+use super::jobs::{Newest, Progress};
+use crate::prepare::{Prepared, view_of};
+use crate::scene::Scene;
+use crate::vulkan::Device;
+use crate::{Error, Result};
+
+/// What is compared, and what has come of it so far.
+pub struct Comparer {
+    /// With what the picture is compared; none for nothing.
+    pub other: Option<Other>,
+    /// Where the line is.
+    pub wipe: Wipe,
+    /// Whether the heat map is right of it, in the place of the other picture.
+    pub shows_heat_map: bool,
+    jobs: Newest<Compared>,
+    /// What was compared last, or is.
+    begun: Option<(Scene, Other)>,
+    compared: Option<Arc<Compared>>,
+}
+
+impl Comparer {
+    /// Nothing is compared yet. `wake` is called when there is something new to be drawn.
+    pub fn new(wake: impl Fn() + Send + Sync + 'static) -> Self {
+        Self {
+            other: None,
+            wipe: Wipe::default(),
+            shows_heat_map: false,
+            jobs: Newest::new("comparison", wake),
+            begun: None,
+            compared: None,
+        }
+    }
+
+    /// The latest result for what is shown.
+    pub fn compared(&self) -> Option<&Arc<Compared>> {
+        self.compared.as_ref()
+    }
+
+    /// Whether more is to come.
+    pub fn is_busy(&self) -> bool {
+        self.jobs.is_busy()
+    }
+
+    /// How far the stage that is made is.
+    pub fn progress(&self) -> Option<Progress> {
+        self.jobs.progress()
+    }
+
+    /// Takes what has been made meanwhile; gives whether there is anything new.
+    ///
+    /// # Errors
+    /// It could not be made; nothing is compared then.
+    pub fn take(&mut self) -> Result<bool> {
+        let mut is_new = false;
+        while let Some(result) = self.jobs.take() {
+            is_new = true;
+            match result {
+                Ok(compared) => self.compared = Some(Arc::new(compared)),
+                Err(Error::Cancelled) => {}
+                Err(error) => {
+                    self.other = None;
+                    return Err(error);
+                }
+            }
+        }
+        Ok(is_new)
+    }
+
+    /// Begins anew if what is `shown` (all of which `prepared` has loaded) is not what was compared; not while it `is_moving`.
+    ///
+    /// # Errors
+    /// Objects that no camera can frame.
+    pub fn update(
+        &mut self,
+        shown: &Scene,
+        prepared: &Prepared,
+        device: &Arc<Device>,
+        cache: Option<&Path>,
+        is_moving: bool,
+    ) -> Result<()> {
+        let wanted = self.other.clone().map(|other| (shown.clone(), other));
+        if self.begun.is_some() && (self.begun != wanted || is_moving) {
+            self.jobs.cancel();
+            (self.begun, self.compared) = (None, None);
+        }
+        let Some((scene, other)) = wanted.clone().filter(|_| self.begun.is_none() && !is_moving) else { return Ok(()) };
+        let view = view_of(&scene, prepared.bounding_sphere())?;
+        let prepared = Prepared { scene, view, ..prepared.clone() };
+        let (device, cache) = (device.clone(), cache.map(Path::to_owned));
+        self.begun = wanted;
+        self.jobs.request(move |task| {
+            task.begin("comparison");
+            let mut last = None;
+            compare_with(&prepared, &other, &device, cache.as_deref(), task, &mut |compared| {
+                // The last one is what the work returns.
+                if let Some(before) = last.replace(compared) {
+                    task.publish(before);
+                }
+            })?;
+            last.ok_or(Error::Cancelled)
+        });
+        Ok(())
+    }
+}

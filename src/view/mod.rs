@@ -1,0 +1,77 @@
+//! The interactive viewer (feature `viewer`).
+//!
+//! | what | module | |
+//! |---|---|---|
+//! | what the user does, as data | [`input`] | pure |
+//! | the camera's orbit | [`orbit`] | pure |
+//! | the scene being edited, and what a change asks for | [`session`] | pure |
+//! | how coarse a moving picture is | [`pace`] | pure |
+//! | loading and making in the background | [`jobs`] | threads |
+//! | another picture of the same view, and the difference | [`comparison`] | |
+//! | when that is made anew | [`comparer`] | |
+//! | the threads of what is under the cursor | [`threads_seen`] | egui |
+//! | what inputs do, and the frames that follow | [`viewer`] | |
+//! | what is shown and set beside the picture | `panel` | egui |
+//! | frames into the window | [`stage`] | Vulkan, by the frame graph |
+//! | the window | `window` | winit |
+
+pub mod comparer;
+pub mod comparison;
+pub mod input;
+pub mod jobs;
+pub mod orbit;
+pub mod pace;
+mod panel;
+pub mod session;
+#[cfg(feature = "hot-reload")]
+mod shader_watch;
+pub mod stage;
+pub mod threads_seen;
+pub mod viewer;
+mod window;
+
+use crate::scene::Scene;
+use crate::vulkan::PresentMode;
+use crate::{Error, Result};
+use input::Input;
+use std::path::PathBuf;
+use winit::event_loop::EventLoop;
+
+/// What the viewer is started with.
+#[derive(Clone, Debug, Default)]
+pub struct Settings {
+    /// What is looked at first; its image is as large as the picture in the window.
+    pub scene: Scene,
+    /// Vulkan device: index or part of its name.
+    pub device: Option<String>,
+    /// Whether the validation layer is on; any message is an error at the end.
+    pub validate: bool,
+    /// Folder for what takes long to make.
+    pub cache: Option<PathBuf>,
+    /// How frames reach the screen.
+    pub present_mode: PresentMode,
+    /// Ends after so many frames of the loaded scene, and of the end of the replay.
+    pub frames: Option<u64>,
+    /// Writes what the window shows in the last of these (or the first, if none are asked for).
+    pub screenshot: Option<PathBuf>,
+    /// What is done as if the user did it.
+    pub replay: Vec<Input>,
+}
+
+/// Opens a window and runs until it is closed. Gives the validation layer's messages.
+///
+/// # Errors
+/// No window system, no device that presents to it, a scene that cannot be loaded.
+pub fn run(settings: Settings) -> Result<Vec<String>> {
+    let event_loop = EventLoop::<window::Wake>::with_user_event().build()?;
+    let mut app = window::App::new(settings, event_loop.create_proxy());
+    event_loop.run_app(&mut app)?;
+    let window::App { result, messages, .. } = app;
+    result?;
+    Ok(messages.map(|messages| messages.all()).unwrap_or_default())
+}
+
+/// What the window system refuses.
+fn failed(cause: impl std::fmt::Display) -> Error {
+    Error::Window { cause: cause.to_string() }
+}

@@ -1,0 +1,36 @@
+//! Which environment, its turn and its intensity.
+use super::{group, on_change, source};
+use crate::environment;
+use crate::scene::Source;
+use crate::view::input::Input;
+use crate::view::session::Change;
+use crate::view::viewer::Viewer;
+use egui::Ui;
+
+#[derive(Default)]
+pub struct State {
+    path: String,
+}
+
+impl State {
+    pub fn show(&mut self, ui: &mut Ui, viewer: &Viewer, inputs: &mut Vec<Input>) {
+        let settings = &viewer.session.wanted().environment;
+        group(ui, "Light", |ui| {
+            let (current, names) = (settings.source.to_string(), environment::builtin_names());
+            let tooltip = "Distant light from all directions: a built-in environment, or a latitude-longitude picture (.hdr, .exr).";
+            let chosen = source(ui, "environment", &current, names, &mut self.path, tooltip, "file: .hdr or .exr");
+            if let Some(name) = chosen {
+                inputs.push(Input::Set(Change::Environment(Source::named(&name, names))));
+            }
+            let mut turn = settings.rotation_deg;
+            let slider = egui::Slider::new(&mut turn, 0.0..=360.0).suffix("°").max_decimals(1).text("turn");
+            let tooltip =
+                "Turn of the environment about the vertical axis, counter-clockwise seen from above. Ctrl and drag.";
+            on_change(&ui.add(slider).on_hover_text(tooltip), inputs, || Change::Rotation(turn));
+            let mut intensity = settings.intensity;
+            let slider = egui::Slider::new(&mut intensity, 0.01..=100.0).logarithmic(true).text("intensity");
+            let tooltip = "Factor on the environment's radiance.";
+            on_change(&ui.add(slider).on_hover_text(tooltip), inputs, || Change::Intensity(intensity));
+        });
+    }
+}

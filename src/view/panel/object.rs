@@ -1,0 +1,45 @@
+//! Which mesh.
+use super::{group, source};
+use crate::scene::{Source, mesh};
+use crate::view::input::Input;
+use crate::view::session::Change;
+use crate::view::viewer::Viewer;
+use egui::Ui;
+
+#[derive(Default)]
+pub struct State {
+    path: String,
+}
+
+impl State {
+    pub fn show(&mut self, ui: &mut Ui, viewer: &Viewer, inputs: &mut Vec<Input>) {
+        let objects = &viewer.session.wanted().objects;
+        group(ui, "Object", |ui| {
+            let current = match objects.as_slice() {
+                [object] => object.mesh.to_string(),
+                objects => format!("{} objects", objects.len()),
+            };
+            let names = mesh::builtin_names();
+            let tooltip = "The mesh in place of all objects: built in, or a Wavefront .obj, with or without normals.";
+            let chosen = source(ui, "mesh", &current, names, &mut self.path, tooltip, "file: .obj");
+            if let Some(name) = chosen {
+                inputs.push(Input::Set(Change::Mesh(Source::named(&name, names))));
+            }
+            ui.horizontal(|ui| {
+                let frame =
+                    ui.button("frame").on_hover_text("Moves the camera back until all objects are in the picture: F");
+                if frame.clicked() {
+                    inputs.push(Input::Key("f".to_owned()));
+                }
+                let reset = ui.button("reset").on_hover_text("The default view, which frames the objects: Home");
+                if reset.clicked() {
+                    inputs.push(Input::Key("home".to_owned()));
+                }
+                let turn = ui.selectable_label(viewer.turntable, "turntable");
+                if turn.on_hover_text("Turns the camera around the objects, once in 20 s: T").clicked() {
+                    inputs.push(Input::Key("t".to_owned()));
+                }
+            });
+        });
+    }
+}

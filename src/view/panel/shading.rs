@@ -1,0 +1,62 @@
+//! Which method, how many threads, how many sub-pixels.
+use super::{group, on_change};
+use crate::method::Method;
+use crate::scene::{MAX_SAMPLES, MAX_SUBPIXELS};
+use crate::view::input::Input;
+use crate::view::session::Change;
+use crate::view::viewer::Viewer;
+use egui::Ui;
+
+pub fn show(ui: &mut Ui, viewer: &Viewer, inputs: &mut Vec<Input>) {
+    let scene = viewer.session.wanted();
+    let Ok(method) = Method::from_name(&scene.shading.method) else { return };
+    group(ui, "Shading", |ui| {
+        egui::ComboBox::from_id_salt("method")
+            .selected_text(method.name())
+            .width(160.0)
+            .show_ui(ui, |ui| {
+                for other in Method::ALL.iter().filter(|method| method.runs_on_gpu()) {
+                    let label = ui.selectable_label(*other == method, other.name()).on_hover_text(described(*other));
+                    if label.clicked() && *other != method {
+                        inputs.push(Input::Set(Change::Method(other.name().to_owned())));
+                    }
+                }
+            })
+            .response
+            .on_hover_text(described(method));
+        let (what, most, tooltip) = match method.threads() {
+            Some(kind) => (
+                "threads",
+                kind.max_count() as u32,
+                "Sample threads: lookups in the filtered environment for each pixel. Other numbers are made in the background.",
+            ),
+            None => ("samples", MAX_SAMPLES, "Samples of the Monte Carlo estimate for each pixel."),
+        };
+        let mut count = scene.shading.threads.unwrap_or(method.default_count());
+        let slider = egui::Slider::new(&mut count, 1..=most).logarithmic(true).text(what);
+        let tooltip = format!("{tooltip} [ and ] halve and double.");
+        on_change(&ui.add(slider).on_hover_text(tooltip), inputs, || Change::Threads(Some(count)));
+        let mut subpixels = scene.image.subpixels;
+        let slider = egui::Slider::new(&mut subpixels, 1..=MAX_SUBPIXELS).text("sub-pixels");
+        let tooltip =
+            "Sub-pixels along each axis of a pixel: resolution of the geometry cache, and how smooth edges are.";
+        on_change(&ui.add(slider).on_hover_text(tooltip), inputs, || Change::Subpixels(subpixels));
+    });
+}
+
+fn described(method: Method) -> &'static str {
+    match method {
+        Method::Fitted => {
+            "Threads fitted to the BRDF: directions, kernel widths and colours whose sum answers any light as the BRDF does."
+        }
+        Method::Paper => "Sample threads as published by Kim, Kyung and Lee (2010).",
+        Method::Uniform => "Monte Carlo, uniform over the hemisphere.",
+        Method::Cosine => "Monte Carlo, by the cosine to the normal.",
+        Method::Importance => "Monte Carlo by a 2D CDF of the BRDF (Matusik et al. 2003).",
+        Method::Filtered => "The same with filtered lookups (Colbert and Krivanek 2007); biased.",
+        Method::Environment => "Monte Carlo by the light (Agarwal et al. 2003).",
+        Method::Resampled => "Resampled importance sampling of the product (Talbot et al. 2005).",
+        Method::Combined => "Multiple importance sampling of lobe and light (Veach and Guibas 1995).",
+        Method::Reference => "The integral itself, by quadrature on the CPU.",
+    }
+}

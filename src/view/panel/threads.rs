@@ -1,0 +1,55 @@
+//! The threads of the material under the cursor, and where in the environment they look.
+use super::comparison::on_screen;
+use super::group;
+use crate::environment::Environment;
+use crate::evaluate::Display;
+use crate::view::threads_seen::{self, Surface, in_picture};
+use crate::view::viewer::Viewer;
+use egui::{TextureHandle, TextureOptions, Ui};
+use std::sync::Arc;
+
+/// The environment's thumbnail as it was last uploaded, with its environment, intensity and display.
+#[derive(Default)]
+pub struct State {
+    thumbnail: Option<(Arc<Environment>, f64, Display, TextureHandle)>,
+}
+
+impl State {
+    pub fn show(&mut self, ui: &mut Ui, viewer: &Viewer) {
+        let Some(loaded) = viewer.loaded() else { return };
+        group(ui, "Threads", |ui| {
+            let prepared = &loaded.prepared;
+            let surface = viewer.shown_view().and_then(|view| {
+                let scale = ui.ctx().pixels_per_point();
+                let [x, y] = viewer.cursor?.map(|pixels| pixels as f32 / scale);
+                let place = in_picture(egui::pos2(x, y), on_screen(ui.ctx(), viewer.area), [view.width, view.height])?;
+                Surface::under(prepared, &view, place.x, place.y)
+            });
+            let material = &prepared.materials[surface.map_or(0, |surface| surface.material)];
+            match surface {
+                Some(surface) => {
+                    ui.label(format!("{}, theta_o = {:.1}°", material.name, surface.theta_o_rad.to_degrees()))
+                }
+                None => ui.weak("move the cursor over an object"),
+            };
+            match material.threads.as_deref() {
+                Some(threads) => threads_seen::draw_hemisphere(ui, threads, surface.as_ref()),
+                None => drop(ui.weak("this method has no threads")),
+            }
+            let image = &viewer.session.shown().image;
+            let intensity = viewer.session.shown().environment.intensity;
+            let display = Display { exposure: image.exposure, gamma: image.gamma };
+            let is_good = |(environment, of, shown, _): &(Arc<Environment>, f64, Display, TextureHandle)| {
+                Arc::ptr_eq(environment, &prepared.environment) && (*of, *shown) == (intensity, display)
+            };
+            if !self.thumbnail.as_ref().is_some_and(is_good) {
+                let picture = threads_seen::thumbnail(&prepared.environment, intensity, display);
+                let texture = ui.ctx().load_texture("environment", picture, TextureOptions::LINEAR);
+                self.thumbnail = Some((prepared.environment.clone(), intensity, display, texture));
+            }
+            if let Some((.., texture)) = &self.thumbnail {
+                threads_seen::draw_environment(ui, texture.id(), material.threads.as_deref(), surface.as_ref());
+            }
+        });
+    }
+}

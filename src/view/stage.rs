@@ -1,0 +1,164 @@
+//! The stage: draws frames into the window.
+use crate::Result;
+use crate::graph::{Access, Executable, ImageDesc, Object, Store};
+use crate::passes::{Area, Counters, FrameGraph, Readbacks, View, present, texels, ui};
+use crate::pipeline::{Renderer, declare};
+use crate::vulkan::{Device, Frames, PassTime, PresentMode, Presented, Surface, Swapchain, UiFrame, UiPainter};
+use egui::TexturesDelta;
+use std::sync::Arc;
+use std::time::Duration;
+
+/// Frames in flight.
+const FRAMES: usize = 2;
+
+/// What a frame shows.
+pub struct Picture<'a> {
+    /// Of what.
+    pub renderer: &'a Renderer,
+    /// From where, and in which resolution: scaled to `area` where that is not its size.
+    pub view: &'a View,
+    /// Where it is in the window.
+    pub area: Area,
+}
+
+/// What became of a frame.
+pub struct Drawn {
+    /// Time of each pass: of an earlier frame, where frames are in flight. Empty where the device cannot tell.
+    pub passes: Vec<PassTime>,
+    /// Names of the passes that ran, in their order.
+    pub ran: Vec<String>,
+    /// What was counted, if it was shaded and that was asked for: pixels, and lookups in the environment.
+    pub counted: Option<(Counters, u64)>,
+    /// What the window shows, if that was asked for: RGBA, 8 bits each, and its size.
+    pub screenshot: Option<(Vec<u8>, [u32; 2])>,
+}
+
+impl Drawn {
+    /// What the picture took, without what a window of that size always takes; none if it is not known of this frame.
+    pub fn picture_time(&self) -> Option<Duration> {
+        let is_of_window = |pass: &&PassTime| ["clear_window", "present", "ui"].contains(&pass.name.as_str());
+        let ms: f64 =
+            self.passes.iter().filter(|pass| !is_of_window(pass) && !pass.is_readback()).map(|pass| pass.gpu_ms).sum();
+        self.passes.iter().any(|pass| pass.name == "shade").then(|| Duration::from_secs_f64(ms * 1e-3))
+    }
+}
+
+/// What a frame is to leave besides the picture in the window. Both wait for the GPU.
+#[derive(Clone, Copy, Default)]
+pub struct Extras {
+    /// What was counted.
+    pub counts: bool,
+    /// What the window shows.
+    pub screenshot: bool,
+}
+
+/// The window, as frames see it.
+pub struct Stage {
+    // In the order in which they are dropped: whoever uses a thing goes before it.
+    store: Store,
+    painter: UiPainter,
+    frames: Frames,
+    swapchain: Swapchain,
+    device: Arc<Device>,
+}
+
+impl Stage {
+    /// The stage of the window of `surface`.
+    ///
+    /// # Errors
+    /// No memory left, or a window that cannot be presented to.
+    pub fn new(device: &Arc<Device>, surface: Surface, mode: PresentMode) -> Result<Self> {
+        Ok(Self {
+            store: Store::default(),
+            painter: UiPainter::new(device, Swapchain::FORMAT, FRAMES)?,
+            frames: Frames::new(device, "window", FRAMES)?,
+            swapchain: Swapchain::new(device, surface, mode, FRAMES)?,
+            device: device.clone(),
+        })
+    }
+
+    /// How frames reach the screen.
+    pub fn mode(&self) -> PresentMode {
+        self.swapchain.mode()
+    }
+
+    /// Says that the window has another size.
+    pub fn window_changed(&mut self) {
+        self.swapchain.window_changed();
+    }
+
+    /// Draws one frame into a window of `size` pixels: what of `picture` is not still good, and `panel` over it. None if there is
+    /// nothing to draw on now, or the window changed meanwhile; then it is to be drawn again later.
+    ///
+    /// # Errors
+    /// Whatever Vulkan refuses.
+    pub fn draw(
+        &mut self,
+        size: [u32; 2],
+        picture: Option<Picture>,
+        panel: &UiFrame,
+        textures: &TexturesDelta,
+        extras: Extras,
+    ) -> Result<Option<Drawn>> {
+        // Also where nothing is drawn: egui tells of each change once.
+        self.painter.update(textures)?;
+        let Some(turn) = self.swapchain.turn(&self.frames, size)? else { return Ok(None) };
+        let [width, height, _] = turn.image.shape.extent;
+
+        let mut graph = FrameGraph::new();
+        let desc = ImageDesc { format: Swapchain::FORMAT, width, height };
+        let window = graph.import_image("window", desc, None, Some(Access::Present));
+        let nowhere = Area { left: 0, top: 0, width, height };
+        let frame = picture.as_ref().map(|Picture { renderer, view, .. }| declare(&mut graph, renderer, view));
+        let area = picture.as_ref().map_or(nowhere, |picture| picture.area);
+        let shown = present(&mut graph, frame.as_ref().map(|frame| frame.display), window, area);
+        let shown = ui(&mut graph, &self.painter, panel, shown);
+        graph.output(shown);
+
+        let mut readbacks = Readbacks::new(&self.device, graph);
+        // Only frames that shade count: reading what was counted must not be what makes them do so.
+        let counting =
+            frame.filter(|frame| extras.counts && !readbacks.graph.is_still_good(frame.radiance, self.store.kept()));
+        let counts = match &counting {
+            Some(frame) => Some((
+                readbacks.buffer("read_counters", frame.counters, size_of::<Counters>() as u64)?,
+                readbacks.buffer("read_lookups", frame.lookups, size_of::<u64>() as u64)?,
+            )),
+            None => None,
+        };
+        let screenshot = readbacks.image("read_window", shown, [width, height], 4, extras.screenshot)?;
+        let Readbacks { graph, mut imports, .. } = readbacks;
+        imports.push((window.into(), Object::Image(turn.image.clone())));
+        let executable = Executable::keeping(&self.device, graph, &imports, &mut self.store)?;
+        let passes = match self.device.times_passes() {
+            true => {
+                let passes = self.frames.oldest_pass_times()?;
+                executable.execute_between(&mut self.frames, turn.semaphores)?;
+                passes
+            }
+            false => executable.execute_pass_by_pass(&mut self.frames, turn.semaphores)?,
+        };
+        if counts.is_some() || screenshot.is_some() {
+            self.frames.wait()?;
+        }
+        let ran = executable.plan.passes.iter().map(|pass| pass.name.clone()).collect();
+        tracing::debug!(
+            "frame: {}",
+            executable.plan.passes.iter().map(|pass| pass.name.as_str()).collect::<Vec<_>>().join(" ")
+        );
+        drop((executable, imports));
+        if self.swapchain.present(turn)? == Presented::Again && screenshot.is_none() {
+            return Ok(None);
+        }
+        let counted = counts.map(|(counters, lookups)| {
+            let counters: Vec<Counters> = texels(Some(&counters));
+            let lookups: Vec<u64> = texels(Some(&lookups));
+            (counters.first().copied().unwrap_or_default(), lookups.first().copied().unwrap_or_default())
+        });
+        let screenshot = screenshot.map(|bgra| {
+            let rgba = texels::<[u8; 4]>(Some(&bgra)).into_iter().flat_map(|[b, g, r, _]| [r, g, b, 255]);
+            (rgba.collect(), [width, height])
+        });
+        Ok(Some(Drawn { passes, ran, counted, screenshot }))
+    }
+}

@@ -1,0 +1,518 @@
+//! The viewer: what inputs do to the session, and the frames that follow from it. Knows nothing of the window system.
+use super::comparer::Comparer;
+use super::comparison::Wipe;
+use super::input::{DragAction, Dropped, Input, change_of_dropped};
+use super::jobs::{Newest, Progress};
+use super::orbit::{Bounds, Orbit, environment_turn_deg};
+use super::pace::Pace;
+use super::session::{Change, Session};
+use super::stage::{Drawn, Extras, Picture, Stage};
+use crate::output::{self, ExrHeader, Format};
+use crate::passes::{Area, Counters, View, filter_environment};
+use crate::pipeline::{Renderer, Wanted};
+use crate::prepare::{Prepared, prepare_again, view_of};
+use crate::scene::{Background, Scene};
+use crate::vulkan::{Device, PassTime, PipelineCache, UiFrame};
+use crate::{Error, Result};
+use egui::TexturesDelta;
+use glam::DVec2;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// A picture is still moving for so long after the last motion: a scroll wheel has no release.
+const SETTLING: Duration = Duration::from_millis(150);
+
+/// All that a scene needs, on the device.
+#[derive(Clone)]
+pub struct Loaded {
+    /// In memory.
+    pub prepared: Arc<Prepared>,
+    /// On the device.
+    pub renderer: Arc<Renderer>,
+}
+
+/// Something to tell the user.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Notice {
+    /// In one sentence.
+    pub text: String,
+    /// Whether it is that something could not be done.
+    pub is_error: bool,
+}
+
+/// What the last frames have shown of themselves.
+#[derive(Clone, Debug, Default)]
+pub struct Measured {
+    /// Time of each pass of the frame when it last ran.
+    pub passes: Vec<PassTime>,
+    /// Names of the passes that ran in the last frame.
+    pub ran: Vec<String>,
+    /// Pixels and lookups of the last frame that counted them.
+    pub counted: Option<(Counters, u64)>,
+    /// From the start of the last frame until it was handed to the window.
+    pub frame: Duration,
+    /// Frames so far.
+    pub frames: u64,
+    /// Columns and rows that the last frame shaded.
+    pub size: [u32; 2],
+}
+
+impl Measured {
+    /// Takes the times of the passes that ran; those of the others stay.
+    fn time(&mut self, passes: &[PassTime]) {
+        for (index, pass) in passes.iter().enumerate() {
+            match self.passes.iter_mut().find(|known| known.name == pass.name) {
+                Some(known) => known.gpu_ms = pass.gpu_ms,
+                // Where it belongs: after the one that it ran after.
+                None => {
+                    let before = index.checked_sub(1).map(|before| &passes[before].name);
+                    let place = self.passes.iter().position(|known| Some(&known.name) == before);
+                    self.passes.insert(place.map_or(0, |place| place + 1), pass.clone());
+                }
+            }
+        }
+    }
+}
+
+/// The viewer.
+pub struct Viewer {
+    /// The scene that is asked for, and the one that is seen.
+    pub session: Session,
+    /// Where the picture is in the window.
+    pub area: Area,
+    /// What was last told.
+    pub notice: Option<Notice>,
+    /// What frames have shown of themselves.
+    pub measured: Measured,
+    /// Whether the camera turns by itself.
+    pub turntable: bool,
+    /// What the picture is compared with.
+    pub comparer: Comparer,
+    /// Where the cursor is in the window, in pixels; none while it is elsewhere.
+    pub cursor: Option<[f64; 2]>,
+    loaded: Option<Loaded>,
+    loading: Newest<Loaded>,
+    /// The scene whose preparation was asked for last, as [`Self::needs`] has it.
+    requested: Option<Scene>,
+    pace: Pace,
+    last_motion: Option<Instant>,
+    last_turn: Option<Instant>,
+    #[cfg(feature = "hot-reload")]
+    shaders: super::shader_watch::ShaderWatch,
+    device: Arc<Device>,
+    cache: Option<PathBuf>,
+}
+
+impl Viewer {
+    /// A viewer of `scene`, which begins to load. `wake` is called when there is something new to be drawn.
+    pub fn new(
+        scene: Scene,
+        device: &Arc<Device>,
+        cache: Option<PathBuf>,
+        wake: impl Fn() + Send + Sync + 'static,
+    ) -> Self {
+        let wake = Arc::new(wake);
+        let wake_too = wake.clone();
+        #[cfg(feature = "hot-reload")]
+        let wake_for_shaders = wake.clone();
+        let area = Area { left: 0, top: 0, width: scene.image.width, height: scene.image.height };
+        let mut viewer = Self {
+            session: Session::new(scene),
+            area,
+            notice: None,
+            measured: Measured::default(),
+            turntable: false,
+            loaded: None,
+            comparer: Comparer::new(move || wake_too()),
+            cursor: None,
+            loading: Newest::new("loading", move || wake()),
+            requested: None,
+            pace: Pace::default(),
+            last_motion: None,
+            last_turn: None,
+            #[cfg(feature = "hot-reload")]
+            shaders: super::shader_watch::ShaderWatch::new(move || wake_for_shaders()),
+            device: device.clone(),
+            cache,
+        };
+        viewer.request();
+        viewer
+    }
+
+    /// What is shown, if it has been loaded.
+    pub fn loaded(&self) -> Option<&Loaded> {
+        self.loaded.as_ref()
+    }
+
+    /// The device that draws.
+    pub fn device(&self) -> &Device {
+        &self.device
+    }
+
+    /// How far the loading of what is wanted is.
+    pub fn progress(&self) -> Option<Progress> {
+        self.loading.progress()
+    }
+
+    /// Whether something is being loaded or made that frames wait for.
+    pub fn is_loading(&self) -> bool {
+        self.loading.is_busy()
+    }
+
+    /// Whether anything is made in the background.
+    pub fn is_busy(&self) -> bool {
+        self.is_loading() || self.comparer.is_busy()
+    }
+
+    /// From where and how what is shown is looked at, at full resolution; none while nothing is.
+    pub fn shown_view(&self) -> Option<View> {
+        let loaded = self.loaded.as_ref()?;
+        view_of(self.session.shown(), loaded.prepared.bounding_sphere()).ok()
+    }
+
+    /// Does what the user asks for. Whatever goes wrong is told by a notice, and changes nothing.
+    pub fn handle(&mut self, input: &Input) {
+        if let Err(error) = self.try_handle(input) {
+            self.tell_error(&error);
+        }
+    }
+
+    fn try_handle(&mut self, input: &Input) -> Result<()> {
+        match input {
+            Input::Drag(drag) => {
+                let by = DVec2::from(drag.by);
+                let rows = f64::from(self.area.height);
+                match drag.action() {
+                    DragAction::Orbit => self.move_camera(|orbit| orbit.turn(by, rows)),
+                    DragAction::Pan => self.move_camera(|orbit| orbit.pan(by, rows)),
+                    DragAction::TurnEnvironment => {
+                        self.last_motion = Some(Instant::now());
+                        let turned = self.session.wanted().environment.rotation_deg + environment_turn_deg(by.x, rows);
+                        self.change(&Change::Rotation(turned.rem_euclid(360.0)))
+                    }
+                }
+            }
+            Input::Scroll(scroll) => self.move_camera(|orbit| orbit.zoom((*scroll).into())),
+            Input::Key(key) => self.press(key),
+            Input::Drop(path) => match change_of_dropped(path)? {
+                Dropped::Change(change) => self.change(&change),
+                Dropped::Scene(path) => {
+                    let mut scene = Scene::load(&path)?;
+                    // The window stays as large as it is.
+                    (scene.image.width, scene.image.height) = (self.area.width, self.area.height);
+                    self.session.replace(scene);
+                    self.request();
+                    Ok(())
+                }
+            },
+            Input::Set(change) => self.change(change),
+            Input::SavePicture(path) => self.save_picture(path),
+            Input::SaveScene(path) => {
+                self.session.wanted().save(path)?;
+                self.tell(format!("saved {}", path.display()));
+                Ok(())
+            }
+            Input::Move(at) => {
+                self.cursor = Some(*at);
+                Ok(())
+            }
+            Input::Compare(other) => {
+                self.comparer.other.clone_from(other);
+                Ok(())
+            }
+            Input::Wipe(part) => {
+                self.comparer.wipe = Wipe::at(*part);
+                Ok(())
+            }
+            Input::HeatMap(shows) => {
+                self.comparer.shows_heat_map = *shows;
+                Ok(())
+            }
+            // What the window itself does.
+            Input::Resize(..) | Input::Minimise(_) | Input::Wait | Input::Quit => Ok(()),
+        }
+    }
+
+    fn press(&mut self, key: &str) -> Result<()> {
+        let (image, shading) = (&self.session.wanted().image, &self.session.wanted().shading);
+        match key {
+            "f" => {
+                let aspect = image.aspect();
+                self.move_camera(|orbit| orbit.frame(aspect))
+            }
+            "home" => self.change(&Change::Camera(None)),
+            "t" => {
+                self.turntable = !self.turntable;
+                self.last_turn = None;
+                Ok(())
+            }
+            "b" => {
+                let none = image.background == Background::Environment;
+                self.change(&Change::Background(if none { Background::None } else { Background::Environment }))
+            }
+            // Thirds of a stop.
+            "+" | "=" => self.change(&Change::Exposure(image.exposure * 2f64.powf(1.0 / 3.0))),
+            "-" => self.change(&Change::Exposure(image.exposure * 0.5f64.powf(1.0 / 3.0))),
+            "0" => self.change(&Change::Exposure(1.0)),
+            "[" | "]" => {
+                let method = crate::method::Method::from_name(&shading.method)?;
+                let count = shading.threads.unwrap_or(method.default_count());
+                let count = if key == "[" { (count / 2).max(1) } else { count.saturating_mul(2) };
+                self.change(&Change::Threads(Some(count)))
+            }
+            "escape" => {
+                self.notice = None;
+                Ok(())
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Makes a change; what it needs is loaded in the background.
+    fn change(&mut self, change: &Change) -> Result<()> {
+        self.session.change(change)?;
+        self.request();
+        Ok(())
+    }
+
+    fn move_camera(&mut self, act: impl FnOnce(&mut Orbit)) -> Result<()> {
+        let Some(loaded) = &self.loaded else { return Ok(()) };
+        let (centre, radius) = loaded.prepared.bounding_sphere();
+        let view = view_of(self.session.shown(), (centre, radius))?;
+        let mut orbit = Orbit::new(&view.camera, Bounds { centre, radius });
+        act(&mut orbit);
+        self.last_motion = Some(Instant::now());
+        self.change(&Change::Camera(Some(orbit.camera())))
+    }
+
+    /// What of a scene has to be loaded, made or compiled: all but what a frame is given anew each time.
+    fn needs(scene: &Scene) -> Scene {
+        let default = Scene::default();
+        let mut needs = scene.clone();
+        needs.camera = None;
+        let image = needs.image.clone();
+        needs.image =
+            crate::scene::ImageSettings { subpixels: image.subpixels, background: image.background, ..default.image };
+        (needs.environment.rotation_deg, needs.environment.intensity) = (0.0, 1.0);
+        needs
+    }
+
+    /// Asks for what is wanted, if that is another than what was asked for last.
+    fn request(&mut self) {
+        let scene = self.session.wanted().clone();
+        let needs = Self::needs(&scene);
+        if self.requested.as_ref() == Some(&needs) {
+            return;
+        }
+        self.requested = Some(needs);
+        let (before, device, cache) = (self.loaded.clone(), self.device.clone(), self.cache.clone());
+        self.loading.request(move |task| {
+            task.begin("threads");
+            let known = before.as_ref().map(|before| &*before.prepared);
+            let prepared = prepare_again(&scene, known, cache.as_deref(), task)?;
+            task.begin("environment");
+            let pipelines = PipelineCache::new(&device, cache.as_deref())?;
+            let Prepared { method, environment, .. } = &prepared;
+            filter_environment(&device, &pipelines, cache.as_deref(), *method, environment, task)?;
+            task.begin("upload");
+            let renderer = match &before {
+                Some(Loaded { prepared: known, renderer }) => renderer.again(cache.as_deref(), known, &prepared)?,
+                None => Renderer::new(&device, cache.as_deref(), &prepared)?,
+            };
+            Ok(Loaded { prepared: Arc::new(prepared), renderer: Arc::new(renderer) })
+        });
+    }
+
+    /// Compiles the shaders anew, and everything that is made of them; if that fails, what is shown stays.
+    #[cfg(feature = "hot-reload")]
+    fn reload_shaders(&mut self) {
+        let scene = self.session.wanted().clone();
+        self.requested = Some(Self::needs(&scene));
+        let (before, device, cache) = (self.loaded.clone(), self.device.clone(), self.cache.clone());
+        self.loading.request(move |task| {
+            task.begin("shaders");
+            let known = before.as_ref().map(|before| &*before.prepared);
+            let prepared = prepare_again(&scene, known, cache.as_deref(), task)?;
+            let build = || Renderer::new(&device, cache.as_deref(), &prepared);
+            let renderer = Arc::new(crate::vulkan::hot_reload::reload(build)?);
+            Ok(Loaded { prepared: Arc::new(prepared), renderer })
+        });
+    }
+
+    /// Shows what has been loaded meanwhile; gives whether there is anything new.
+    ///
+    /// # Errors
+    /// The scene that the viewer was started with cannot be loaded.
+    pub fn take_loaded(&mut self) -> Result<bool> {
+        #[cfg(feature = "hot-reload")]
+        if self.shaders.take() {
+            self.reload_shaders();
+        }
+        let mut is_new = self.comparer.take().unwrap_or_else(|error| {
+            self.tell_error(&error);
+            true
+        });
+        while let Some(result) = self.loading.take() {
+            is_new = true;
+            match result {
+                Ok(loaded) => {
+                    self.session.prepared(&loaded.prepared.scene);
+                    self.loaded = Some(loaded);
+                }
+                Err(Error::Cancelled) => {}
+                Err(error) if self.loaded.is_none() => return Err(error),
+                Err(error) => {
+                    self.session.failed();
+                    self.requested = self.loaded.as_ref().map(|loaded| Self::needs(&loaded.prepared.scene));
+                    self.tell_error(&error);
+                }
+            }
+        }
+        Ok(is_new)
+    }
+
+    fn tell(&mut self, text: String) {
+        tracing::info!("{text}");
+        self.notice = Some(Notice { text, is_error: false });
+    }
+
+    fn tell_error(&mut self, error: &Error) {
+        tracing::warn!("{error}");
+        self.notice = Some(Notice { text: error.to_string(), is_error: true });
+    }
+
+    /// Gives the picture this size, in pixels.
+    pub fn resize(&mut self, area: Area) {
+        if self.area == area {
+            return;
+        }
+        self.area = area;
+        self.handle(&Input::Set(Change::Size(area.width.max(1), area.height.max(1))));
+    }
+
+    /// When a frame is due though nothing happens: none if nothing is.
+    pub fn next_frame(&self) -> Option<Instant> {
+        if self.turntable {
+            return Some(Instant::now());
+        }
+        self.last_motion.map(|last| last + SETTLING)
+    }
+
+    /// Whether the picture moves, and may be coarse. What `is_held` is being dragged.
+    fn is_moving(&mut self, is_held: bool) -> bool {
+        let settled = self.last_motion.is_none_or(|last| last.elapsed() >= SETTLING) && !is_held;
+        if settled {
+            self.last_motion = None;
+        }
+        !settled || self.turntable
+    }
+
+    /// Turns the turntable to where it is now.
+    fn turn(&mut self) {
+        if !self.turntable {
+            return;
+        }
+        let now = Instant::now();
+        let seconds = self.last_turn.replace(now).map_or(0.0, |last| (now - last).as_secs_f64());
+        if let Err(error) = self.move_camera(|orbit| orbit.turntable(seconds)) {
+            self.tell_error(&error);
+        }
+    }
+
+    /// Draws a frame. `is_held`: the user holds something that moves the picture.
+    ///
+    /// # Errors
+    /// Whatever Vulkan refuses.
+    pub fn draw(
+        &mut self,
+        stage: &mut Stage,
+        size: [u32; 2],
+        panel: &UiFrame,
+        textures: &TexturesDelta,
+        is_held: bool,
+        screenshot: bool,
+    ) -> Result<Option<Drawn>> {
+        let start = Instant::now();
+        self.turn();
+        let is_moving = self.is_moving(is_held) && !screenshot;
+        let loaded = self.loaded.clone();
+        let view = match &loaded {
+            Some(loaded) => {
+                let mut view = self.view(loaded)?;
+                if is_moving {
+                    [view.width, view.height] = self.pace.moving([view.width, view.height]);
+                }
+                Some(view)
+            }
+            None => None,
+        };
+        if let Some(Loaded { prepared, .. }) = &loaded {
+            self.comparer.update(self.session.shown(), prepared, &self.device, self.cache.as_deref(), is_moving)?;
+        }
+        let picture = loaded.as_ref().zip(view.as_ref()).map(|(loaded, view)| Picture {
+            renderer: &loaded.renderer,
+            view,
+            area: self.area,
+        });
+        let extras = Extras { counts: !is_moving, screenshot };
+        let drawn = stage.draw(size, picture, panel, textures, extras)?;
+        if let (Some(drawn), Some(view)) = (&drawn, &view) {
+            let frame = start.elapsed();
+            let size = [view.width, view.height];
+            if drawn.ran.iter().any(|pass| pass == "shade") {
+                let full = &self.session.shown().image;
+                self.pace.drawn(size, [full.width, full.height], drawn.picture_time().unwrap_or(frame));
+            }
+            tracing::debug!("{} x {} in {:.1} ms", size[0], size[1], frame.as_secs_f64() * 1e3);
+            self.measured.frames += 1;
+            (self.measured.frame, self.measured.size) = (frame, size);
+            self.measured.ran.clone_from(&drawn.ran);
+            self.measured.time(&drawn.passes);
+            self.measured.counted = drawn.counted.or(self.measured.counted);
+        }
+        Ok(drawn)
+    }
+
+    /// How the scene that is shown is looked at.
+    fn view(&self, loaded: &Loaded) -> Result<View> {
+        let mut view = view_of(self.session.shown(), loaded.prepared.bounding_sphere())?;
+        // Others have yet to be compiled.
+        view.subpixels = loaded.renderer.view.subpixels;
+        Ok(view)
+    }
+
+    /// Saves what is shown, as `threadlight render` would make it.
+    fn save_picture(&mut self, path: &Path) -> Result<()> {
+        let format = Format::of(path)?;
+        output::check_writable(path)?;
+        let Some(loaded) = self.loaded.clone() else {
+            return Err(Error::input("the picture", "has not been loaded yet", "wait until it is shown"));
+        };
+        let mut renderer = (*loaded.renderer).clone();
+        renderer.view = self.view(&loaded)?;
+        let wanted = Wanted { radiance: format == Format::Exr, display: format == Format::Png, geometry: false };
+        let rendering = renderer.render(wanted, 1)?;
+        let Prepared { method, sampling, environment, materials, .. } = &*loaded.prepared;
+        let (width, height) = (renderer.view.width, renderer.view.height);
+        let alpha = self.session.shown().image.background == Background::None;
+        match format {
+            Format::Png => output::write_png(path, width, height, &rendering.display, alpha)?,
+            Format::Exr => {
+                let names: Vec<_> = materials.iter().map(|material| material.name.as_str()).collect();
+                let header = ExrHeader {
+                    method: method.name().to_owned(),
+                    threads: sampling.count,
+                    material: names.join(", "),
+                    environment: environment.name.clone(),
+                    device: self.device.description().name.clone(),
+                    seconds: rendering.frame_ms * 1e-3,
+                    ..ExrHeader::default()
+                };
+                output::write_exr(path, width, height, &rendering.radiance, alpha, &header)?;
+            }
+        }
+        self.tell(format!("saved {}", path.display()));
+        Ok(())
+    }
+}

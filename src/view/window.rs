@@ -1,0 +1,420 @@
+//! The window: what winit tells becomes inputs, and frames are drawn when there is something new.
+use super::input::{Button, Drag, Input, Scroll};
+use super::panel::{self, Panel};
+use super::stage::Stage;
+use super::viewer::Viewer;
+use super::{Settings, failed};
+use crate::output;
+use crate::passes::Area;
+use crate::vulkan::{Device, Instance, Messages, Surface, UiFrame};
+use crate::{Error, Result};
+use egui::{TexturesDelta, ViewportId};
+use std::collections::VecDeque;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+use winit::application::ApplicationHandler;
+use winit::dpi::{LogicalSize, PhysicalSize};
+use winit::event::{ElementState, MouseButton, MouseScrollDelta, WindowEvent};
+use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoopProxy};
+use winit::keyboard::{Key, ModifiersState, NamedKey};
+use winit::window::{Window, WindowId};
+
+/// Something is new: a result of background work, or progress.
+#[derive(Debug)]
+pub struct Wake;
+
+/// A window that cannot be drawn on is tried again after this time.
+const RETRY: Duration = Duration::from_millis(100);
+/// How often the progress of background work is drawn.
+const PROGRESS_INTERVAL: Duration = Duration::from_millis(100);
+/// A window system has this long to give the window the size that a replay asks for.
+const RESIZE_PATIENCE: Duration = Duration::from_secs(2);
+
+/// The program as winit sees it.
+pub struct App {
+    settings: Settings,
+    proxy: EventLoopProxy<Wake>,
+    open: Option<Open>,
+    /// What ended it.
+    pub result: Result<()>,
+    /// What the validation layer said, once there is an instance.
+    pub messages: Option<Messages>,
+}
+
+/// An open window.
+struct Open {
+    // In the order in which they are dropped: the window goes last.
+    viewer: Viewer,
+    stage: Stage,
+    panel: Panel,
+    egui: egui_winit::State,
+    context: egui::Context,
+    window: Arc<Window>,
+    /// Changes of egui's textures that have not been drawn yet.
+    textures: TexturesDelta,
+    /// When a frame is due; none while nothing changes.
+    due: Option<Instant>,
+    last_drawn: Instant,
+    is_minimised: bool,
+    cursor: [f64; 2],
+    modifiers: ModifiersState,
+    /// What is held down, and from where.
+    held: Option<(Button, [f64; 2])>,
+    script: Script,
+}
+
+/// What a script asks for: inputs to play, frames to count, a picture to take.
+struct Script {
+    replay: VecDeque<Input>,
+    frames_left: Option<u64>,
+    /// Until when the window may take to get this size.
+    resizing: Option<([u32; 2], Instant)>,
+}
+
+impl App {
+    /// An app that will open its window when winit says so.
+    pub fn new(settings: Settings, proxy: EventLoopProxy<Wake>) -> Self {
+        Self { settings, proxy, open: None, result: Ok(()), messages: None }
+    }
+
+    fn open(&mut self, event_loop: &ActiveEventLoop) -> Result<Open> {
+        let Settings { scene, device, validate, cache, present_mode, frames, screenshot, replay } = &self.settings;
+        let image = &scene.image;
+        let attributes = Window::default_attributes()
+            .with_title("Threadlight")
+            .with_min_inner_size(LogicalSize::new(panel::WIDTH + 160.0, 240.0))
+            .with_inner_size(PhysicalSize::new(image.width + panel::WIDTH.ceil() as u32, image.height));
+        let window = Arc::new(event_loop.create_window(attributes).map_err(failed)?);
+        // The panel is as wide as the display's scale makes it, the picture as large as asked for.
+        let scale = window.scale_factor();
+        if scale != 1.0 {
+            let _ = window.request_inner_size(window_size([image.width, image.height], scale));
+        }
+        let display = event_loop.owned_display_handle();
+        let raw = winit::raw_window_handle::HasDisplayHandle::display_handle(&display).map_err(failed)?.as_raw();
+        let instance = Instance::for_display(*validate, raw)?;
+        self.messages = Some(instance.messages());
+        let surface = Surface::new(&instance, window.clone())?;
+        let device = Device::for_surface(&instance, device.as_deref(), &surface)?;
+        let stage = Stage::new(&device, surface, *present_mode)?;
+        let context = egui::Context::default();
+        let egui = egui_winit::State::new(
+            context.clone(),
+            ViewportId::ROOT,
+            &*window,
+            Some(scale as f32),
+            None,
+            Some(device.limits().max_image_dimension2_d as usize),
+        );
+        let proxy = self.proxy.clone();
+        let viewer = Viewer::new(scene.clone(), &device, cache.clone(), move || {
+            // A loop that has ended needs no waking.
+            let _ = proxy.send_event(Wake);
+        });
+        let frames_left = frames.or(screenshot.is_some().then_some(1));
+        let script = Script { replay: replay.clone().into(), frames_left, resizing: None };
+        let mut open = Open {
+            viewer,
+            stage,
+            panel: Panel::default(),
+            egui,
+            context,
+            window,
+            textures: TexturesDelta::default(),
+            due: Some(Instant::now()),
+            last_drawn: Instant::now(),
+            is_minimised: false,
+            cursor: [0.0; 2],
+            modifiers: ModifiersState::empty(),
+            held: None,
+            script,
+        };
+        open.fit_picture();
+        Ok(open)
+    }
+
+    /// Ends the program, with `result` if it is the first.
+    fn end(&mut self, event_loop: &ActiveEventLoop, result: Result<()>) {
+        tracing::debug!("closing");
+        if self.result.is_ok() {
+            self.result = result;
+        }
+        event_loop.exit();
+    }
+}
+
+/// Size of a window whose picture has this size.
+fn window_size([width, height]: [u32; 2], scale: f64) -> PhysicalSize<u32> {
+    PhysicalSize::new(width + (f64::from(panel::WIDTH) * scale).ceil() as u32, height)
+}
+
+impl Open {
+    /// The picture takes what the panel leaves of the window.
+    fn fit_picture(&mut self) {
+        let PhysicalSize { width, height } = self.window.inner_size();
+        let panel = (f64::from(panel::WIDTH) * self.window.scale_factor()).ceil() as u32;
+        // A minimised window has no area; the picture keeps its.
+        if width > panel && height > 0 {
+            self.viewer.resize(Area { left: 0, top: 0, width: width - panel, height });
+        }
+    }
+
+    fn redraw(&mut self) {
+        self.due = Some(Instant::now());
+    }
+
+    /// Draws a frame; gives whether the program is to end.
+    fn draw(&mut self, settings: &Settings) -> Result<bool> {
+        self.due = None;
+        self.last_drawn = Instant::now();
+        let raw = self.egui.take_egui_input(&self.window);
+        let mut inputs = Vec::new();
+        let (panel, viewer) = (&mut self.panel, &mut self.viewer);
+        let output = self.context.run(raw, |context| inputs.extend(panel.show(context, viewer)));
+        self.egui.handle_platform_output(&self.window, output.platform_output);
+        self.textures.append(output.textures_delta);
+        inputs.iter().for_each(|input| self.viewer.handle(input));
+        let frame = UiFrame {
+            primitives: self.context.tessellate(output.shapes, output.pixels_per_point),
+            pixels_per_point: output.pixels_per_point,
+        };
+        let PhysicalSize { width, height } = self.window.inner_size();
+        let size = if self.is_minimised { [0, 0] } else { [width, height] };
+        let is_held = self.held.is_some() || (self.context.is_using_pointer() && !inputs.is_empty());
+        let counts = self.viewer.loaded().is_some() && !self.viewer.is_busy() && self.script.replay.is_empty();
+        let last = counts && self.script.frames_left.is_some_and(|left| left <= 1);
+        let screenshot = last && settings.screenshot.is_some();
+        let drawn = self.viewer.draw(&mut self.stage, size, &frame, &self.textures, is_held, screenshot)?;
+        self.textures.clear();
+        // What changed in the panel shows in the next frame.
+        if !inputs.is_empty() {
+            self.redraw();
+        }
+        if let Some(output) = output.viewport_output.get(&ViewportId::ROOT)
+            && output.repaint_delay < Duration::from_secs(3600)
+        {
+            self.due_at(Instant::now() + output.repaint_delay);
+        }
+        if let Some(next) = self.viewer.next_frame() {
+            self.due_at(next);
+        }
+        let Some(drawn) = drawn else {
+            if !self.is_minimised && !size.contains(&0) {
+                self.due_at(Instant::now() + RETRY);
+            }
+            return Ok(false);
+        };
+        if let (Some((rgba, [width, height])), Some(path)) = (drawn.screenshot, &settings.screenshot) {
+            output::write_png(path, width, height, &rgba, false)?;
+        }
+        if let Some(left) = self.script.frames_left.as_mut().filter(|_| counts) {
+            *left = left.saturating_sub(1);
+            self.redraw();
+        }
+        Ok(last)
+    }
+
+    fn due_at(&mut self, time: Instant) {
+        self.due = Some(self.due.map_or(time, |due| due.min(time)));
+    }
+
+    /// Plays inputs of the script, up to one that has to be drawn or waited for. Gives whether the program is to end.
+    fn play(&mut self) -> bool {
+        if let Some((size, until)) = self.script.resizing {
+            let area = self.viewer.area;
+            if [area.width, area.height] != size && Instant::now() < until {
+                self.due_at(Instant::now() + Duration::from_millis(20));
+                return false;
+            }
+            self.script.resizing = None;
+        }
+        // Each is drawn before the next.
+        if self.due.is_some_and(|due| due <= Instant::now()) {
+            return false;
+        }
+        let Some(input) = self.script.replay.front().cloned() else { return false };
+        match &input {
+            Input::Wait if self.viewer.is_busy() || self.due.is_some() => return false,
+            Input::Quit => return true,
+            Input::Resize(width, height) => {
+                let size = window_size([*width, *height], self.window.scale_factor());
+                if let Some(size) = self.window.request_inner_size(size) {
+                    tracing::debug!("the window is {} x {} at once", size.width, size.height);
+                    self.stage.window_changed();
+                    self.fit_picture();
+                }
+                self.script.resizing = Some(([*width, *height], Instant::now() + RESIZE_PATIENCE));
+            }
+            Input::Minimise(minimise) => {
+                self.window.set_minimized(*minimise);
+                // Window systems need not do so, or tell; either way nothing is drawn meanwhile.
+                self.is_minimised = *minimise;
+            }
+            Input::Move(at) => {
+                self.cursor = *at;
+                self.viewer.handle(&input);
+            }
+            input => self.viewer.handle(input),
+        }
+        self.script.replay.pop_front();
+        self.redraw();
+        false
+    }
+
+    fn drag(&mut self, to: [f64; 2]) {
+        let from = std::mem::replace(&mut self.cursor, to);
+        self.viewer.cursor = Some(to);
+        if let Some((button, start)) = self.held {
+            let by = [to[0] - from[0], to[1] - from[1]];
+            let (shift, control) =
+                (self.modifiers.shift_key(), self.modifiers.control_key() || self.modifiers.super_key());
+            self.viewer.handle(&Input::Drag(Drag { button, from: start, by, shift, control }));
+            self.redraw();
+        }
+    }
+
+    /// Whether the cursor is over the picture.
+    fn over_picture(&self) -> bool {
+        let Area { left, top, width, height } = self.viewer.area;
+        let within = |at: f64, low: u32, size: u32| at >= f64::from(low) && at < f64::from(low + size);
+        within(self.cursor[0], left, width) && within(self.cursor[1], top, height)
+    }
+
+    /// Takes an event of the window. Gives whether the program is to end.
+    fn on_event(&mut self, event: &WindowEvent) -> bool {
+        let response = self.egui.on_window_event(&self.window, event);
+        if response.repaint {
+            self.redraw();
+        }
+        match event {
+            WindowEvent::CloseRequested => return true,
+            WindowEvent::Resized(_) | WindowEvent::ScaleFactorChanged { .. } => {
+                self.stage.window_changed();
+                self.fit_picture();
+                self.redraw();
+            }
+            WindowEvent::Occluded(hidden) => {
+                self.is_minimised = *hidden;
+                self.redraw();
+            }
+            WindowEvent::ModifiersChanged(modifiers) => self.modifiers = modifiers.state(),
+            WindowEvent::CursorLeft { .. } => self.viewer.cursor = None,
+            WindowEvent::CursorMoved { position, .. } => self.drag([position.x, position.y]),
+            WindowEvent::MouseInput { state: ElementState::Released, .. } if self.held.take().is_some() => {
+                // Sharp again.
+                self.redraw();
+            }
+            WindowEvent::MouseInput { state: ElementState::Pressed, button, .. } if !response.consumed => {
+                let button = match button {
+                    MouseButton::Left => Button::Left,
+                    MouseButton::Middle => Button::Middle,
+                    MouseButton::Right => Button::Right,
+                    _ => return false,
+                };
+                if self.over_picture() {
+                    self.held = Some((button, self.cursor));
+                }
+            }
+            WindowEvent::MouseWheel { delta, .. } if !response.consumed && self.over_picture() => {
+                let scroll = match delta {
+                    MouseScrollDelta::LineDelta(_, lines) => Scroll::Lines(f64::from(*lines)),
+                    MouseScrollDelta::PixelDelta(pixels) => Scroll::Pixels(pixels.y),
+                };
+                self.viewer.handle(&Input::Scroll(scroll));
+                self.redraw();
+            }
+            WindowEvent::PinchGesture { delta, .. } => {
+                // A pinch to twice the size is as far as seven lines of the wheel.
+                self.viewer.handle(&Input::Scroll(Scroll::Lines(7.0 * delta)));
+                self.redraw();
+            }
+            WindowEvent::KeyboardInput { event, .. }
+                if event.state == ElementState::Pressed && !self.context.wants_keyboard_input() =>
+            {
+                if let Some(key) = name_of(&event.logical_key) {
+                    self.viewer.handle(&Input::Key(key));
+                    self.redraw();
+                }
+            }
+            WindowEvent::DroppedFile(path) => {
+                self.viewer.handle(&Input::Drop(path.clone()));
+                self.redraw();
+            }
+            _ => {}
+        }
+        false
+    }
+}
+
+/// A key as inputs name it.
+fn name_of(key: &Key) -> Option<String> {
+    match key {
+        Key::Character(text) => Some(text.to_lowercase()),
+        Key::Named(NamedKey::Space) => Some("space".to_owned()),
+        Key::Named(NamedKey::Home) => Some("home".to_owned()),
+        Key::Named(NamedKey::Escape) => Some("escape".to_owned()),
+        _ => None,
+    }
+}
+
+impl ApplicationHandler<Wake> for App {
+    fn resumed(&mut self, event_loop: &ActiveEventLoop) {
+        if self.open.is_some() {
+            return;
+        }
+        match self.open(event_loop) {
+            Ok(open) => self.open = Some(open),
+            Err(error) => self.end(event_loop, Err(error)),
+        }
+    }
+
+    fn user_event(&mut self, event_loop: &ActiveEventLoop, Wake: Wake) {
+        let Some(open) = &mut self.open else { return };
+        match open.viewer.take_loaded() {
+            Ok(true) => open.redraw(),
+            // A bar that moves ten times a second is smooth enough, and leaves the processor to what it tells of.
+            Ok(false) => open.due_at(open.last_drawn + PROGRESS_INTERVAL),
+            Err(error) => self.end(event_loop, Err(error)),
+        }
+    }
+
+    fn window_event(&mut self, event_loop: &ActiveEventLoop, _: WindowId, event: WindowEvent) {
+        let Some(open) = &mut self.open else { return };
+        if matches!(event, WindowEvent::RedrawRequested) {
+            match open.draw(&self.settings) {
+                Ok(false) => {}
+                Ok(true) => self.end(event_loop, Ok(())),
+                Err(error) => self.end(event_loop, Err(error)),
+            }
+        } else if open.on_event(&event) {
+            self.end(event_loop, Ok(()));
+        }
+    }
+
+    fn about_to_wait(&mut self, event_loop: &ActiveEventLoop) {
+        let Some(open) = &mut self.open else { return };
+        if open.play() {
+            return self.end(event_loop, Ok(()));
+        }
+        let flow = match open.due {
+            None => ControlFlow::Wait,
+            Some(due) if due <= Instant::now() => {
+                open.window.request_redraw();
+                ControlFlow::Wait
+            }
+            Some(due) => ControlFlow::WaitUntil(due),
+        };
+        event_loop.set_control_flow(flow);
+    }
+
+    fn exiting(&mut self, _: &ActiveEventLoop) {
+        // All that Vulkan made goes while the window is still there.
+        self.open = None;
+    }
+}
+
+impl From<winit::error::EventLoopError> for Error {
+    fn from(error: winit::error::EventLoopError) -> Self {
+        failed(error)
+    }
+}

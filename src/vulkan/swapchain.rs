@@ -1,0 +1,352 @@
+//! The swapchain: images that go to the window, and whose turn it is.
+//!
+//! Its images hold display values. Tone mapping has applied the gamma that the user asked for, so the format is plain UNORM:
+//! an sRGB format would encode them a second time. The colour space is the one that every window system has, in which
+//! it shows the bytes as they are.
+use super::device::Device;
+use super::error::{During, VulkanError};
+use super::frames::Semaphores;
+use super::memory::{Image, ImageShape};
+use super::surface::Surface;
+use super::{Frames, Result};
+use ash::{khr, vk};
+use std::sync::Arc;
+
+/// When finished frames reach the screen.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum PresentMode {
+    /// At the next vertical blank, one after another: no tearing. Every device has it.
+    #[default]
+    Fifo,
+    /// The same, but a late frame is shown at once, with tearing.
+    FifoRelaxed,
+    /// The newest at the next vertical blank: no tearing, and no waiting.
+    Mailbox,
+    /// At once, with tearing.
+    Immediate,
+}
+
+impl PresentMode {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::Fifo, Self::FifoRelaxed, Self::Mailbox, Self::Immediate];
+
+    /// What the command line calls it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Fifo => "fifo",
+            Self::FifoRelaxed => "fifo-relaxed",
+            Self::Mailbox => "mailbox",
+            Self::Immediate => "immediate",
+        }
+    }
+
+    fn raw(self) -> vk::PresentModeKHR {
+        match self {
+            Self::Fifo => vk::PresentModeKHR::FIFO,
+            Self::FifoRelaxed => vk::PresentModeKHR::FIFO_RELAXED,
+            Self::Mailbox => vk::PresentModeKHR::MAILBOX,
+            Self::Immediate => vk::PresentModeKHR::IMMEDIATE,
+        }
+    }
+}
+
+/// An image whose turn it is to be drawn.
+pub struct Turn {
+    /// The image; its contents are undefined.
+    pub image: Arc<Image>,
+    /// What the submission that draws it waits for and signals.
+    pub semaphores: Semaphores,
+    index: u32,
+}
+
+/// What became of a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Presented {
+    /// It is on its way to the screen.
+    Yes,
+    /// The window has changed under it: draw it again.
+    Again,
+}
+
+/// The images of a window, made anew whenever the window changes.
+pub struct Swapchain {
+    /// `None` while there is nothing to draw on: a window without area, a lost surface.
+    current: Option<Current>,
+    surface: Surface,
+    mode: PresentMode,
+    /// For each frame in flight, signalled when the image that it draws is free.
+    free: Vec<vk::Semaphore>,
+    next: usize,
+    device: Arc<Device>,
+    functions: khr::swapchain::Device,
+}
+
+/// The images at one size.
+struct Current {
+    raw: vk::SwapchainKHR,
+    images: Vec<Arc<Image>>,
+    /// For each image, signalled when it is drawn. Not one for each frame: presentation waits for it at a time that only
+    /// the next turn of the same image tells to be over.
+    drawn: Vec<vk::Semaphore>,
+    /// Whether the window has changed since.
+    stale: bool,
+}
+
+impl Swapchain {
+    /// The format of the images.
+    pub const FORMAT: vk::Format = vk::Format::B8G8R8A8_UNORM;
+
+    /// A swapchain of `surface` for so many frames in flight; it has images from the first [`Swapchain::turn`] on.
+    ///
+    /// # Errors
+    /// A device that cannot present, or no memory left.
+    pub fn new(device: &Arc<Device>, surface: Surface, mode: PresentMode, frames: usize) -> Result<Self> {
+        let functions = device.swapchain.clone().ok_or_else(|| VulkanError::Unsuitable {
+            device: device.description().name.clone(),
+            feature: "VK_KHR_swapchain".to_owned(),
+        })?;
+        let free = (0..frames).map(|_| semaphore(device, "image is free")).collect::<Result<_>>()?;
+        let mut swapchain = Self { current: None, surface, mode, free, next: 0, device: device.clone(), functions };
+        swapchain.mode = swapchain.available(mode)?;
+        Ok(swapchain)
+    }
+
+    /// How frames reach the screen.
+    pub fn mode(&self) -> PresentMode {
+        self.mode
+    }
+
+    /// Says that the window has changed: the next turn is one of images of its new size.
+    pub fn window_changed(&mut self) {
+        self.current.iter_mut().for_each(|current| current.stale = true);
+    }
+
+    /// The next image to draw, of about `size` in pixels (the window's; where the window system knows better, it decides).
+    /// None while the window has no area or the window system has no image to give: then it is worth asking again in a while.
+    /// `frames` is waited for until it has a place for the frame.
+    ///
+    /// # Errors
+    /// A lost device, no memory left, a window that is gone.
+    pub fn turn(&mut self, frames: &Frames, size: [u32; 2]) -> Result<Option<Turn>> {
+        // A surface may change again while its images are made; one that always does is not to hang the program.
+        const ATTEMPTS: usize = 8;
+        // Window systems that give no images back for hidden windows must not make the program hang.
+        const PATIENCE_NS: u64 = 200_000_000;
+        for _ in 0..ATTEMPTS {
+            if self.current.as_ref().is_none_or(|current| current.stale) && !self.renew(size)? {
+                return Ok(None);
+            }
+            let Some(current) = &mut self.current else { return Ok(None) };
+            // The frame that waited for this semaphore before has left the GPU.
+            frames.wait_for_place()?;
+            let free = self.free[self.next];
+            // SAFETY: the semaphore is unsignalled and nothing waits for it, as said above.
+            match unsafe { self.functions.acquire_next_image(current.raw, PATIENCE_NS, free, vk::Fence::null()) } {
+                Ok((index, suboptimal)) => {
+                    // It can be drawn and shown; the one after it will fit again.
+                    current.stale = suboptimal;
+                    self.next = (self.next + 1) % self.free.len();
+                    let semaphores = Semaphores { wait: Some(free), signal: Some(current.drawn[index as usize]) };
+                    let image = current.images[index as usize].clone();
+                    return Ok(Some(Turn { image, semaphores, index }));
+                }
+                Err(vk::Result::TIMEOUT | vk::Result::NOT_READY) => return Ok(None),
+                Err(vk::Result::ERROR_OUT_OF_DATE_KHR) => current.stale = true,
+                Err(vk::Result::ERROR_SURFACE_LOST_KHR) => self.renew_surface()?,
+                Err(result) => return Err(result).during("vkAcquireNextImageKHR", "window"),
+            }
+        }
+        Ok(None)
+    }
+
+    /// Sends the image of `turn` to the screen, when what was submitted to draw it has finished.
+    ///
+    /// # Errors
+    /// A lost device.
+    pub fn present(&mut self, turn: Turn) -> Result<Presented> {
+        let Some(current) = &mut self.current else { return Ok(Presented::Again) };
+        let wait: Vec<_> = turn.semaphores.signal.into_iter().collect();
+        let (swapchains, indices) = ([current.raw], [turn.index]);
+        let info = vk::PresentInfoKHR::default().wait_semaphores(&wait).swapchains(&swapchains).image_indices(&indices);
+        // SAFETY: the queue is held exclusively; the image was acquired for this turn and is in the layout for presenting.
+        let result = self.device.with_queue(|queue| unsafe { self.functions.queue_present(queue, &info) });
+        match result {
+            Ok(suboptimal) => {
+                current.stale |= suboptimal;
+                Ok(Presented::Yes)
+            }
+            Err(vk::Result::ERROR_OUT_OF_DATE_KHR) => {
+                current.stale = true;
+                Ok(Presented::Again)
+            }
+            Err(vk::Result::ERROR_SURFACE_LOST_KHR) => {
+                self.renew_surface()?;
+                Ok(Presented::Again)
+            }
+            Err(result) => Err(result).during("vkQueuePresentKHR", "window"),
+        }
+    }
+
+    /// Makes the surface anew, for windows that survive the loss of theirs.
+    fn renew_surface(&mut self) -> Result<()> {
+        tracing::info!("the window's surface was lost; making another");
+        self.discard();
+        self.surface.renew()
+    }
+
+    /// Makes the images anew for the window as it is now. False if it has no area.
+    fn renew(&mut self, size: [u32; 2]) -> Result<bool> {
+        let capabilities = match self.capabilities() {
+            Err(VulkanError::Call { result: vk::Result::ERROR_SURFACE_LOST_KHR, .. }) => {
+                self.renew_surface()?;
+                self.capabilities()?
+            }
+            other => other?,
+        };
+        let vk::SurfaceCapabilitiesKHR { current_extent, min_image_extent, max_image_extent, .. } = capabilities;
+        // Where the images decide the size of the window (Wayland), the extent is said to be undefined.
+        let extent = match current_extent.width {
+            u32::MAX => vk::Extent2D {
+                width: size[0].clamp(min_image_extent.width, max_image_extent.width),
+                height: size[1].clamp(min_image_extent.height, max_image_extent.height),
+            },
+            _ => current_extent,
+        };
+        if extent.width == 0 || extent.height == 0 || size.contains(&0) {
+            self.discard();
+            return Ok(false);
+        }
+        self.check_format()?;
+        // One more than the least, so that drawing does not wait for the window system to give one back.
+        let most = if capabilities.max_image_count == 0 { u32::MAX } else { capabilities.max_image_count };
+        let old = self.current.take();
+        let opaque = vk::CompositeAlphaFlagsKHR::OPAQUE;
+        let composite = if capabilities.supported_composite_alpha.contains(opaque) {
+            opaque
+        } else {
+            vk::CompositeAlphaFlagsKHR::INHERIT
+        };
+        let info = vk::SwapchainCreateInfoKHR::default()
+            .surface(self.surface.raw)
+            .min_image_count((capabilities.min_image_count + 1).min(most))
+            .image_format(Self::FORMAT)
+            .image_color_space(vk::ColorSpaceKHR::SRGB_NONLINEAR)
+            .image_extent(extent)
+            .image_array_layers(1)
+            .image_usage(Self::USAGE & capabilities.supported_usage_flags)
+            .pre_transform(capabilities.current_transform)
+            .composite_alpha(composite)
+            .present_mode(self.mode.raw())
+            .clipped(true)
+            .old_swapchain(old.as_ref().map_or(vk::SwapchainKHR::null(), |old| old.raw));
+        // SAFETY: the surface is alive; the old swapchain is destroyed after this, and not used before.
+        let raw = unsafe { self.functions.create_swapchain(&info, None) };
+        if let Some(old) = old {
+            self.destroy(old);
+        }
+        let raw = raw.during("vkCreateSwapchainKHR", "window")?;
+        self.device.set_name(raw, "window");
+        // SAFETY: plain query of the swapchain just made.
+        let images = unsafe { self.functions.get_swapchain_images(raw) };
+        let shape = ImageShape::plane(Self::FORMAT, extent.width, extent.height);
+        let mut current = Current { raw, images: Vec::new(), drawn: Vec::new(), stale: false };
+        let filled = images.during("vkGetSwapchainImagesKHR", "window").and_then(|images| {
+            for image in images {
+                current.images.push(Arc::new(Image::of_swapchain(&self.device, "window", shape, image)?));
+                current.drawn.push(semaphore(&self.device, "image is drawn")?);
+            }
+            Ok(())
+        });
+        if let Err(error) = filled {
+            self.destroy(current);
+            return Err(error);
+        }
+        tracing::debug!("swapchain: {} images of {} x {}", current.images.len(), extent.width, extent.height);
+        self.current = Some(current);
+        Ok(true)
+    }
+
+    /// The picture is blitted into its images, the panel is drawn over it. Only screenshots read them, and are all that a window
+    /// system without that use lacks.
+    const USAGE: vk::ImageUsageFlags = vk::ImageUsageFlags::from_raw(
+        vk::ImageUsageFlags::COLOR_ATTACHMENT.as_raw()
+            | vk::ImageUsageFlags::TRANSFER_DST.as_raw()
+            | vk::ImageUsageFlags::TRANSFER_SRC.as_raw(),
+    );
+
+    fn capabilities(&self) -> Result<vk::SurfaceCapabilitiesKHR> {
+        let Surface { raw, functions, .. } = &self.surface;
+        // SAFETY: the device is of the surface's instance.
+        unsafe { functions.get_physical_device_surface_capabilities(self.device.physical, *raw) }
+            .during("vkGetPhysicalDeviceSurfaceCapabilitiesKHR", "window")
+    }
+
+    /// An error where the window cannot be given display values as they are.
+    fn check_format(&self) -> Result<()> {
+        let Surface { raw, functions, .. } = &self.surface;
+        // SAFETY: the device is of the surface's instance.
+        let formats = unsafe { functions.get_physical_device_surface_formats(self.device.physical, *raw) }
+            .during("vkGetPhysicalDeviceSurfaceFormatsKHR", "window")?;
+        if formats.iter().any(|format| format.format == Self::FORMAT) {
+            return Ok(());
+        }
+        Err(VulkanError::Unsuitable {
+            device: self.device.description().name.clone(),
+            feature: format!("windows of format {:?}", Self::FORMAT),
+        })
+    }
+
+    /// `wanted` where the device has it for this window, else the one that every device has.
+    fn available(&self, wanted: PresentMode) -> Result<PresentMode> {
+        let Surface { raw, functions, .. } = &self.surface;
+        // SAFETY: the device is of the surface's instance.
+        let modes = unsafe { functions.get_physical_device_surface_present_modes(self.device.physical, *raw) }
+            .during("vkGetPhysicalDeviceSurfacePresentModesKHR", "window")?;
+        if modes.contains(&wanted.raw()) {
+            return Ok(wanted);
+        }
+        let has: Vec<_> =
+            PresentMode::ALL.iter().filter(|mode| modes.contains(&mode.raw())).map(|mode| mode.name()).collect();
+        tracing::warn!("--present-mode {}: this window has only {}; using fifo", wanted.name(), has.join(", "));
+        Ok(PresentMode::Fifo)
+    }
+
+    /// Lets the images go, once nothing uses them.
+    fn discard(&mut self) {
+        if let Some(current) = self.current.take() {
+            self.destroy(current);
+        }
+    }
+
+    fn destroy(&self, Current { raw, images, drawn, .. }: Current) {
+        // Their views go first, and presentation has to be over, which the timeline of submissions does not tell.
+        drop(images);
+        if let Err(error) = self.device.wait_idle() {
+            tracing::error!("{error}");
+        }
+        // SAFETY: the queue is idle, so nothing draws or presents these.
+        unsafe {
+            drawn.into_iter().for_each(|semaphore| self.device.raw.destroy_semaphore(semaphore, None));
+            self.functions.destroy_swapchain(raw, None);
+        }
+    }
+}
+
+impl Drop for Swapchain {
+    fn drop(&mut self) {
+        self.discard();
+        if let Err(error) = self.device.wait_idle() {
+            tracing::error!("{error}");
+        }
+        // SAFETY: the queue is idle, so nothing waits for these.
+        self.free.iter().for_each(|semaphore| unsafe { self.device.raw.destroy_semaphore(*semaphore, None) });
+    }
+}
+
+fn semaphore(device: &Device, name: &str) -> Result<vk::Semaphore> {
+    // SAFETY: plain creation; destroyed with the swapchain.
+    let raw = unsafe { device.raw.create_semaphore(&vk::SemaphoreCreateInfo::default(), None) }
+        .during("vkCreateSemaphore", name)?;
+    device.set_name(raw, name);
+    Ok(raw)
+}

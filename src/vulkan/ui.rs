@@ -1,0 +1,141 @@
+//! Draws what egui has laid out, by egui-ash-renderer.
+use super::Result;
+use super::commands::Commands;
+use super::device::Device;
+use super::error::{During, VulkanError};
+use super::memory::Image;
+use ash::vk;
+use egui::epaint::{ClippedPrimitive, ColorImage, ImageDelta, TextureId, textures::TexturesDelta};
+use egui_ash_renderer::{DynamicRendering, Options, Renderer, RendererError};
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// A frame of egui, as triangles.
+#[derive(Default)]
+pub struct UiFrame {
+    /// What to draw.
+    pub primitives: Vec<ClippedPrimitive>,
+    /// Pixels of an egui point.
+    pub pixels_per_point: f32,
+}
+
+/// What the user interface is drawn by.
+pub struct UiPainter {
+    // It has pipeline, textures and vertices of its own; locked, as recording a frame changes the latter.
+    renderer: Mutex<Option<Renderer>>,
+    /// The textures as they are: see [`UiPainter::update`].
+    textures: HashMap<TextureId, ColorImage>,
+    command_pool: vk::CommandPool,
+    device: Arc<Device>,
+}
+
+impl UiPainter {
+    /// Compiles its shaders for colour targets of `format` that hold display values, and so many frames in flight.
+    ///
+    /// # Errors
+    /// No memory left.
+    pub fn new(device: &Arc<Device>, format: vk::Format, frames: usize) -> Result<Self> {
+        let attachments = DynamicRendering { color_attachment_format: format, depth_attachment_format: None };
+        let options = Options { in_flight_frames: frames, srgb_framebuffer: false, ..Options::default() };
+        let renderer = Renderer::with_default_allocator(
+            &device.instance.raw,
+            device.physical,
+            device.raw.clone(),
+            attachments,
+            options,
+        );
+        let info = vk::CommandPoolCreateInfo::default()
+            .flags(vk::CommandPoolCreateFlags::TRANSIENT)
+            .queue_family_index(device.queue_family);
+        let renderer = Mutex::new(Some(renderer.map_err(refused)?));
+        // SAFETY: plain creation; destroyed when dropped.
+        let command_pool =
+            unsafe { device.raw.create_command_pool(&info, None) }.during("vkCreateCommandPool", "panel")?;
+        device.set_name(command_pool, "panel");
+        Ok(Self { renderer, textures: HashMap::new(), command_pool, device: device.clone() })
+    }
+
+    /// Brings the textures (glyphs, above all) up to date, before the frame that needs them is recorded.
+    ///
+    /// # Errors
+    /// No memory left.
+    pub fn update(&mut self, changes: &TexturesDelta) -> Result<()> {
+        if changes.set.is_empty() && changes.free.is_empty() {
+            return Ok(());
+        }
+        let mut whole = Vec::new();
+        for (id, change) in &changes.set {
+            // The renderer would drop the rest of a texture that changes in part (it takes it from an undefined layout), so
+            // parts are put together here, and the whole is uploaded.
+            let egui::ImageData::Color(part) = &change.image;
+            let texture = match (change.pos, self.textures.get_mut(id)) {
+                (Some([left, top]), Some(texture)) => {
+                    for row in 0..part.height() {
+                        let start = (top + row) * texture.width() + left;
+                        let source = &part.pixels[row * part.width()..][..part.width()];
+                        texture.pixels[start..start + part.width()].copy_from_slice(source);
+                    }
+                    texture.clone()
+                }
+                _ => {
+                    self.textures.insert(*id, (**part).clone());
+                    (**part).clone()
+                }
+            };
+            whole.retain(|(other, _)| other != id);
+            whole.push((*id, ImageDelta::full(texture, change.options)));
+        }
+        changes.free.iter().for_each(|id| drop(self.textures.remove(id)));
+        // Frames that are still drawn have the old ones.
+        self.device.wait_idle()?;
+        let (pool, renderer) = (self.command_pool, self.renderer.get_mut().unwrap_or_else(PoisonError::into_inner));
+        let Some(renderer) = renderer else { return Ok(()) };
+        self.device.with_queue(|queue| renderer.set_textures(queue, pool, &whole)).map_err(refused)?;
+        renderer.free_textures(&changes.free).map_err(refused)
+    }
+}
+
+impl Commands {
+    /// Draws `frame` over `target`, whose contents stay.
+    ///
+    /// # Errors
+    /// No memory left for triangles.
+    pub fn draw_ui(&mut self, painter: &UiPainter, frame: &UiFrame, target: &Image) -> Result<()> {
+        let [width, height, _] = target.shape.extent;
+        let extent = vk::Extent2D { width, height };
+        let colors = [vk::RenderingAttachmentInfo::default()
+            .image_view(target.view)
+            .image_layout(vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL)
+            .load_op(vk::AttachmentLoadOp::LOAD)
+            .store_op(vk::AttachmentStoreOp::STORE)];
+        let info = vk::RenderingInfo::default().render_area(extent.into()).layer_count(1).color_attachments(&colors);
+        // SAFETY: the view is alive and in the layout named above, by the caller's barriers; ended below.
+        unsafe { self.device.dynamic_rendering.cmd_begin_rendering(self.raw, &info) };
+        let mut renderer = painter.renderer.lock().unwrap_or_else(PoisonError::into_inner);
+        let drawn = renderer
+            .as_mut()
+            .map_or(Ok(()), |painter| painter.cmd_draw(self.raw, extent, frame.pixels_per_point, &frame.primitives));
+        // SAFETY: begun above.
+        unsafe { self.device.dynamic_rendering.cmd_end_rendering(self.raw) };
+        drawn.map_err(refused)
+    }
+}
+
+fn refused(error: RendererError) -> VulkanError {
+    match error {
+        RendererError::Vulkan(result) => VulkanError::Call { call: "egui", object: "panel".to_owned(), result },
+        other => VulkanError::Memory { object: "panel".to_owned(), cause: other.to_string() },
+    }
+}
+
+impl Drop for UiPainter {
+    fn drop(&mut self) {
+        // The renderer destroys what it has at once, so no frame may still be drawing it.
+        if let Err(error) = self.device.wait_idle() {
+            tracing::error!("{error}");
+        }
+        drop(self.renderer.get_mut().unwrap_or_else(PoisonError::into_inner).take());
+        // SAFETY: the queue is idle, so none of its commands are in use.
+        unsafe { self.device.raw.destroy_command_pool(self.command_pool, None) };
+    }
+}

@@ -1,0 +1,150 @@
+//! Long computations stop soon after they are told to: a window waits for them when it closes.
+mod common;
+use common::{Validated, data, model, ready, sphere};
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+use threadlight::brdf::Brdf;
+use threadlight::environment::Environment;
+use threadlight::evaluate::reference::{ReferenceSettings, STAGES, progressive, reference};
+use threadlight::method::Method;
+use threadlight::passes::filter_environment;
+use threadlight::pipeline::render_geometry;
+use threadlight::prepare::Prepared;
+use threadlight::scene::{MaterialSource, Scene, Source};
+use threadlight::threads::{Kind, Observer, Settings, generate};
+use threadlight::vulkan::PipelineCache;
+use threadlight::{Error, Result};
+
+/// Longest time from the word to the end; a tenth of it or less where the processor has nothing else to do.
+const SOON: Duration = Duration::from_millis(900);
+
+struct Flag(AtomicBool);
+
+impl Observer for Flag {
+    fn progress(&self, _done: usize, _total: usize) {}
+    fn cancelled(&self) -> bool {
+        self.0.load(Ordering::Relaxed)
+    }
+}
+
+/// Starts `work`, cancels it after `after`, and returns how long it went on then; it must still have been at it.
+fn time_to_stop<T: Send>(after: Duration, work: impl FnOnce(&Flag) -> Result<T> + Send) -> Duration {
+    let flag = Flag(AtomicBool::new(false));
+    std::thread::scope(|scope| {
+        let working = scope.spawn(|| work(&flag));
+        std::thread::sleep(after);
+        assert!(!working.is_finished(), "it was too quick to be cancelled");
+        flag.0.store(true, Ordering::Relaxed);
+        let start = Instant::now();
+        let ended = working.join().unwrap();
+        assert!(matches!(ended, Err(Error::Cancelled)), "it did not stop");
+        start.elapsed()
+    })
+}
+
+#[test]
+fn threads_stop_being_made_at_once() {
+    let narrow = Brdf::builtin("chrome").unwrap();
+    for (kind, count) in [(Kind::Fitted, 128), (Kind::Paper, 1024)] {
+        let settings = Settings { kind, count, ..Settings::default() };
+        for after in [10, 100, 300, 1000].map(Duration::from_millis) {
+            let time = time_to_stop(after, |flag| generate(&narrow, &settings, flag));
+            println!("{} {count}, cancelled after {after:?}: {time:?}", kind.name());
+            assert!(time < SOON, "{} {count}, cancelled after {after:?}: {time:?}", kind.name());
+        }
+    }
+}
+
+/// A narrow lobe on a diffuse base, under a captured map where there is one, from nearby: pixels that take long.
+fn hard_scene() -> Prepared {
+    let material: MaterialSource =
+        model("model = 'plastic'\ndistribution = 'ggx'\nalpha = 0.003\nior = 1.5\ndiffuse = [0.3, 0.08, 0.04]");
+    let mut scene: Scene = sphere(material, "studio", 1, (640, 480));
+    let map: Option<PathBuf> = data().map(|data| data.join("env/studio_small_03_1k.hdr")).filter(|map| map.exists());
+    if let Some(map) = map {
+        scene.environment.source = Source::File(map);
+    }
+    scene.shading.method = "reference".into();
+    ready(&scene)
+}
+
+#[test]
+fn the_reference_stops_at_once_and_comes_in_stages() {
+    let gpu = Validated::new();
+    let prepared = hard_scene();
+    for after in [100, 1000, 3000].map(Duration::from_millis) {
+        let settings = ReferenceSettings { tolerance: 1e-6, ..ReferenceSettings::default() };
+        let time = time_to_stop(after, |flag| reference(&prepared, &gpu.device, &settings, flag));
+        println!("reference, cancelled after {after:?}: {time:?}");
+        assert!(time < SOON, "cancelled after {after:?}: {time:?}");
+    }
+
+    let mut small = sphere(MaterialSource::Builtin("gold".into()), "studio", 1, (48, 36));
+    small.shading.method = "reference".into();
+    let prepared = ready(&small);
+    let geometry = render_geometry(&gpu.device, None, &prepared).unwrap();
+    let truth = reference(&prepared, &gpu.device, &ReferenceSettings::default(), &()).unwrap();
+    let mut estimates = Vec::new();
+    progressive(&prepared, &geometry, STAGES, &(), &mut |estimate| estimates.push(estimate)).unwrap();
+    assert_eq!(estimates.len(), STAGES.len());
+    for (estimate, stage) in estimates.iter().zip(STAGES) {
+        assert_eq!((estimate.stage, estimate.radiance.len()), (*stage, 48 * 36));
+        assert!(estimate.error_estimate > 0.0 && estimate.error_estimate < stage.tolerance);
+        for (i, (found, expected)) in estimate.radiance.iter().zip(&truth.radiance).enumerate() {
+            let (x, y) = (i % 48, i / 48);
+            if estimate.is_estimated(x, y) {
+                let shown = |value: f32| value.clamp(0.0, 1.0).powf(1.0 / 2.2);
+                let error = (0..3).map(|c| (shown(found[c]) - shown(expected[c])).abs()).fold(0.0, f32::max);
+                assert!(error < 4.0 * stage.tolerance as f32, "{stage:?} at {x}, {y}: {error}");
+            } else {
+                let own = y / stage.step * stage.step * 48 + x / stage.step * stage.step;
+                assert_eq!(*found, estimate.radiance[own]);
+            }
+        }
+    }
+    assert_eq!(estimates.last().unwrap().radiance, truth.radiance);
+    gpu.finish();
+}
+
+#[test]
+fn an_environment_stops_being_blurred_at_once() {
+    let gpu = Validated::new();
+    let map = data().map(|data| data.join("env/studio_small_03_1k.hdr")).filter(|map| map.exists());
+    let load = || match &map {
+        Some(map) => Environment::load(map).unwrap(),
+        None => Environment::builtin("studio").unwrap(),
+    };
+    let cache = PipelineCache::new(&gpu.device, None).unwrap();
+    let start = Instant::now();
+    let environment = load();
+    println!("loaded in {:?}", start.elapsed());
+    environment.box_filtered();
+    println!("box-filtered after {:?}", start.elapsed());
+    environment.irradiance();
+    println!("irradiance after {:?}", start.elapsed());
+    for after in [20, 200, 1000].map(Duration::from_millis) {
+        let environment = load();
+        let blur = |flag: &Flag| filter_environment(&gpu.device, &cache, None, Method::Fitted, &environment, flag);
+        let time = time_to_stop(after, blur);
+        println!("blur, cancelled after {after:?}: {time:?}");
+        assert!(time < SOON, "cancelled after {after:?}: {time:?}");
+    }
+    drop(cache);
+    gpu.finish();
+}
+
+#[test]
+fn the_first_stages_of_a_large_reference_come_soon() {
+    let gpu = Validated::new();
+    let mut scene = sphere(MaterialSource::Builtin("gold".into()), "studio", 1, (640, 480));
+    scene.shading.method = "reference".into();
+    let prepared = ready(&scene);
+    let geometry = render_geometry(&gpu.device, None, &prepared).unwrap();
+    let start = Instant::now();
+    progressive(&prepared, &geometry, &STAGES[..2], &(), &mut |estimate| {
+        println!("{:?} after {:?}: within {:.1e}", estimate.stage, start.elapsed(), estimate.error_estimate);
+    })
+    .unwrap();
+    gpu.finish();
+}

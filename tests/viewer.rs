@@ -1,0 +1,304 @@
+//! The viewer in a window of a virtual X server, on the test device, with validation.
+#![cfg(all(feature = "viewer", target_os = "linux"))]
+
+use std::io::{BufRead, BufReader, Read};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+use tempfile::TempDir;
+use threadlight::output::{Picture, read_image};
+
+/// A virtual X server, ended when dropped.
+struct Display {
+    server: Child,
+    name: String,
+}
+
+impl Display {
+    /// None, and a word on why, where there is no Xvfb.
+    fn open() -> Option<Self> {
+        let server = Command::new("Xvfb")
+            .args(["-displayfd", "1", "-screen", "0", "1600x1000x24", "-nolisten", "tcp"])
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn();
+        let mut server = match server {
+            Ok(server) => server,
+            Err(cause) => {
+                println!("skipped: Xvfb cannot be run ({cause}); ci/setup installs it");
+                return None;
+            }
+        };
+        let mut number = String::new();
+        BufReader::new(server.stdout.take().expect("piped")).read_line(&mut number).expect("Xvfb names its display");
+        assert!(!number.trim().is_empty(), "Xvfb found no display");
+        Some(Self { server, name: format!(":{}", number.trim()) })
+    }
+}
+
+impl Drop for Display {
+    fn drop(&mut self) {
+        let _ = self.server.kill();
+        let _ = self.server.wait();
+    }
+}
+
+/// A viewer in a folder of its own.
+struct Viewer {
+    display: Display,
+    folder: TempDir,
+}
+
+/// What a viewer leaves.
+struct Ended {
+    success: bool,
+    /// Its log.
+    log: Vec<String>,
+}
+
+impl Viewer {
+    fn new() -> Option<Self> {
+        Some(Self { display: Display::open()?, folder: tempfile::tempdir().expect("a folder") })
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn write(&self, name: &str, contents: impl AsRef<[u8]>) -> PathBuf {
+        std::fs::write(self.path(name), contents).expect("a file");
+        self.path(name)
+    }
+
+    /// `threadlight`, on the test device, with the caches of all tests.
+    fn threadlight(&self, arguments: &[&str]) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_threadlight"));
+        command.args(arguments).current_dir(self.folder.path());
+        command.env("THREADLIGHT_CACHE", Path::new(env!("CARGO_TARGET_TMPDIR")).join("viewer"));
+        command.env("DISPLAY", &self.display.name).env_remove("WAYLAND_DISPLAY").env_remove("RUST_LOG");
+        if let Ok(device) = std::env::var("THREADLIGHT_TEST_DEVICE") {
+            command.args(["--device", &device]);
+        }
+        command
+    }
+
+    fn start(&self, arguments: &[&str]) -> Child {
+        let mut command = self.threadlight(&[&["view", "--validate", "-vv"], arguments].concat());
+        command.stderr(Stdio::piped()).spawn().expect("a viewer")
+    }
+
+    /// Plays `replay` until the viewer ends.
+    fn play(&self, arguments: &[&str], replay: &str) -> Ended {
+        self.write("replay.jsonl", replay);
+        let viewer = self.start(&[arguments, &["--replay", "replay.jsonl"]].concat());
+        let output = viewer.wait_with_output().expect("an end");
+        let log: Vec<_> = String::from_utf8_lossy(&output.stderr).lines().map(str::to_owned).collect();
+        Ended { success: output.status.success(), log }
+    }
+
+    /// `name`, rendered without a window out of the scene file `scene`.
+    fn render(&self, scene: &str, name: &str) -> Picture {
+        let status = self.threadlight(&["render", scene, "-o", name]).status().expect("a rendering");
+        assert!(status.success());
+        self.picture(name)
+    }
+
+    fn picture(&self, name: &str) -> Picture {
+        read_image(&self.path(name)).expect("a picture")
+    }
+}
+
+impl Ended {
+    fn expect_success(&self) {
+        let problems: Vec<_> =
+            self.log.iter().filter(|line| line.contains("validation") || line.contains("ERROR")).collect();
+        assert!(
+            self.success && problems.is_empty(),
+            "{:#?}",
+            if problems.is_empty() { self.log.iter().collect() } else { problems }
+        );
+    }
+
+    /// The passes of each frame, in order.
+    fn frames(&self) -> impl Iterator<Item = Vec<&str>> {
+        let frames = self.log.iter().filter_map(|line| line.split("frame: ").nth(1));
+        frames.map(|passes| passes.split_whitespace().collect())
+    }
+}
+
+/// Small, so that lavapipe is quick.
+const SMALL: [&str; 2] = ["--size", "160x120"];
+
+#[test]
+fn a_session_can_be_saved_and_rendered_to_the_bit() {
+    let Some(viewer) = Viewer::new() else { return };
+    let mut replay = "\"wait\"\n".to_owned();
+    for step in 0..20 {
+        replay += &format!("{{\"resize\": [{}, {}]}}\n", 160 + 7 * (step % 5), 120 + 11 * (step % 3));
+    }
+    replay += r#"
+        {"resize": [170, 130]}
+        {"minimise": true}
+        {"minimise": false}
+        "wait"
+        {"drag": {"button": "left", "from": [80, 60], "by": [21, -9]}}
+        {"drag": {"button": "right", "from": [80, 60], "by": [-5, 4]}}
+        {"drag": {"button": "left", "from": [80, 60], "by": [30, 0], "control": true}}
+        {"scroll": {"lines": 1}}
+        {"set": {"material": {"builtin": "clay"}}}
+        {"set": {"method": "paper"}}
+        {"set": {"threads": 16}}
+        {"set": {"exposure": 1.3}}
+        "wait"
+        {"save_picture": "saved.png"}
+        {"save_picture": "saved.exr"}
+        {"save_scene": "saved.toml"}
+        "quit""#;
+    viewer.play(&SMALL, &replay).expect_success();
+    let scene = std::fs::read_to_string(viewer.path("saved.toml")).expect("a scene");
+    for part in ["clay", "paper", "width = 170", "height = 130", "[camera]", "exposure = 1.3"] {
+        assert!(scene.contains(part), "{part} is not in\n{scene}");
+    }
+    assert!(viewer.render("saved.toml", "again.png") == viewer.picture("saved.png"));
+    assert!(viewer.render("saved.toml", "again.exr").rgba == viewer.picture("saved.exr").rgba);
+    assert_eq!(std::fs::read(viewer.path("again.png")).unwrap(), std::fs::read(viewer.path("saved.png")).unwrap());
+}
+
+#[test]
+fn the_screenshot_shows_picture_and_panel_and_only_what_has_changed_runs() {
+    let Some(viewer) = Viewer::new() else { return };
+    let ended = viewer.play(
+        &[&SMALL[..], &["--frames", "2", "--screenshot", "window.png"]].concat(),
+        r#""wait"
+           {"set": {"exposure": 2}}
+           "wait"
+           {"set": {"material": {"builtin": "clay"}}}
+           "wait""#,
+    );
+    ended.expect_success();
+    let of_picture = ["geometry_cache", "classify", "shade", "background", "tone_map"];
+    let made: Vec<Vec<_>> = ended
+        .frames()
+        .map(|frame| frame.into_iter().filter(|pass| of_picture.contains(pass)).collect::<Vec<_>>())
+        .filter(|passes| !passes.is_empty())
+        .collect();
+    // The first picture, the brighter one, the other material: geometry once, shading twice.
+    assert_eq!(made, [&of_picture[..], &of_picture[4..], &of_picture[1..]]);
+    let window = viewer.picture("window.png");
+    assert_eq!((window.width, window.height), (460, 240));
+    let distinct = |columns: std::ops::Range<u32>| {
+        let texels = (0..window.height).flat_map(|y| columns.clone().map(move |x| (y * 460 + x) as usize));
+        let colors = texels.map(|at| window.rgba[at].map(|value| (value * 255.0) as u8));
+        colors.collect::<std::collections::BTreeSet<_>>().len()
+    };
+    assert!(distinct(0..160) > 100 && distinct(160..460) > 20, "{} {}", distinct(0..160), distinct(160..460));
+}
+
+#[test]
+fn a_broken_file_is_told_and_changes_nothing() {
+    let Some(viewer) = Viewer::new() else { return };
+    viewer.write("broken.binary", b"not a table");
+    viewer.write("broken.obj", b"f 1 2 3\n");
+    viewer.write("letter.txt", b"hello");
+    let ended = viewer.play(
+        &[&SMALL[..], &["--frames", "1", "--screenshot", "window.png"]].concat(),
+        r#""wait"
+           {"save_scene": "before.toml"}
+           {"save_picture": "before.png"}
+           {"drop": "letter.txt"}
+           {"drop": "broken.obj"}
+           "wait"
+           {"drop": "broken.binary"}
+           "wait"
+           {"key": "escape"}
+           {"save_scene": "after.toml"}
+           {"save_picture": "after.png"}
+           {"drop": "broken.binary"}
+           "wait""#,
+    );
+    ended.expect_success();
+    for name in ["letter.txt", "broken.obj", "broken.binary"] {
+        assert!(ended.log.iter().any(|line| line.contains("WARN") && line.contains(name)), "{:#?}", ended.log);
+    }
+    let read = |name| std::fs::read(viewer.path(name)).expect("a file");
+    assert_eq!(read("before.toml"), read("after.toml"));
+    assert_eq!(read("before.png"), read("after.png"));
+    // The message is on a red ground, over the picture.
+    let window = viewer.picture("window.png");
+    let red = window.rgba.iter().filter(|[r, g, b, _]| *r > 3.0 * g && *r > 3.0 * b && *r > 0.3).count();
+    assert!(red > 500, "{red} red pixels");
+}
+
+#[test]
+fn closing_while_threads_are_made_takes_less_than_a_second() {
+    let Some(viewer) = Viewer::new() else { return };
+    // Minutes of work: more than anybody waits for.
+    viewer.write(
+        "replay.jsonl",
+        r#""wait"
+           {"set": {"threads": 128}}
+           {"move": [10, 10]}
+           "quit""#,
+    );
+    let arguments = [&SMALL[..], &["--material", "silver", "--no-cache", "--replay", "replay.jsonl"]].concat();
+    let mut child = viewer.start(&arguments);
+    let mut log = BufReader::new(child.stderr.take().expect("piped"));
+    let mut line = String::new();
+    while log.read_line(&mut line).expect("a log") > 0 && !line.contains("closing") {
+        line.clear();
+    }
+    let start = Instant::now();
+    assert!(line.contains("closing"), "the viewer ended without closing");
+    let mut rest = String::new();
+    log.read_to_string(&mut rest).expect("a log");
+    let status = child.wait().expect("an end");
+    assert!(status.success() && !rest.contains("validation"), "{rest}");
+    assert!(start.elapsed() < Duration::from_secs(1), "{:?}", start.elapsed());
+}
+
+#[test]
+fn a_still_window_costs_nothing() {
+    let Some(viewer) = Viewer::new() else { return };
+    let mut child = viewer.start(&SMALL);
+    let (send, lines) = std::sync::mpsc::channel();
+    let log = BufReader::new(child.stderr.take().expect("piped"));
+    let reader = std::thread::spawn(move || log.lines().map_while(Result::ok).try_for_each(|line| send.send(line)));
+    // Until the picture is there, and egui has settled.
+    let wait = Duration::from_secs(120);
+    while !lines.recv_timeout(wait).expect("a picture").contains("shade") {}
+    while lines.recv_timeout(Duration::from_secs(3)).is_ok() {}
+    let ticks = || {
+        let stat = std::fs::read_to_string(format!("/proc/{}/stat", child.id())).expect("a process");
+        let fields: Vec<_> = stat.rsplit(')').next().expect("fields").split_whitespace().collect();
+        // Fields 14 and 15 of the line are user and system time; these count from the third.
+        fields[11..=12].iter().map(|field| field.parse::<u64>().expect("a number")).sum::<u64>()
+    };
+    let before = ticks();
+    std::thread::sleep(Duration::from_secs(3));
+    let used = ticks() - before;
+    let drawn = lines.try_iter().filter(|line| line.contains("frame: ")).count();
+    child.kill().expect("a running viewer");
+    child.wait().expect("an end");
+    let _ = reader.join();
+    println!("in 3 s: {used} ticks of processor time, {drawn} frames");
+    // A tick is a hundredth of a second.
+    assert!(used <= 2 && drawn == 0, "{used} ticks, {drawn} frames");
+}
+
+#[test]
+fn bad_arguments_are_said_before_a_window_opens() {
+    let Some(viewer) = Viewer::new() else { return };
+    viewer.write("bad.jsonl", "{\"jump\": 3}\n");
+    for (arguments, words) in [
+        (&["--replay", "bad.jsonl"][..], &["bad.jsonl", "line 1", "jump"][..]),
+        (&["--screenshot", "x.jpg"], &["x.jpg"]),
+        (&["--present-mode", "warp"], &["warp", "fifo"]),
+        (&["--material", "missing.binary"], &["missing.binary"]),
+        (&["--method", "reference"], &["reference"]),
+    ] {
+        let output = viewer.threadlight(&[&["view", "--frames", "1"], arguments].concat()).output().expect("an end");
+        let text = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{text}");
+        assert!(words.iter().all(|word| text.contains(word)) && text.trim().lines().count() == 1, "{text}");
+    }
+}
