@@ -3,7 +3,7 @@ use glam::{DMat3, DVec3, dvec3};
 
 use super::cubature::Cubature;
 use super::light::{CellPlace, Light};
-use crate::brdf::{Brdf, half_vector_width};
+use crate::brdf::{Brdf, lobe_radius};
 use crate::environment::Environment;
 
 /// A pixel gives up at so many cells.
@@ -42,22 +42,30 @@ impl Point {
         Self { frame: DMat3::from_cols(x, n.cross(x), n), w_o: dvec3(theta_o.sin(), 0.0, theta_o.cos()), material }
     }
 
-    /// f(w_i, w_o) (n . w_i) per channel, in 1/sr, for unit `direction` in the axes of the environment.
-    #[inline]
-    fn f_cos(&self, brdf: &Brdf, direction: DVec3) -> DVec3 {
-        let w_i = self.frame.transpose() * direction;
-        if w_i.z > 0.0 { brdf.evaluate(w_i, self.w_o) * w_i.z } else { DVec3::ZERO }
+    /// Adds f(w_i, w_o) (n . w_i) per channel, in 1/sr, for unit `directions` in the axes of the environment.
+    fn add_f_cos(&self, brdf: &Brdf, directions: &[DVec3], sums: &mut [DVec3]) {
+        let to_local = self.frame.transpose();
+        let (mut w_i, mut places) = (Vec::with_capacity(directions.len()), Vec::with_capacity(directions.len()));
+        for (place, direction) in directions.iter().enumerate() {
+            let direction = to_local * *direction;
+            if direction.z > 0.0 {
+                w_i.push(direction);
+                places.push(place);
+            }
+        }
+        for ((place, w_i), f) in places.into_iter().zip(&w_i).zip(brdf.evaluate_all(&w_i, self.w_o)) {
+            sums[place] += f * w_i.z;
+        }
     }
 
-    /// Whether a lobe whose half vectors are within `width` (radians) of the normal may hide between the nodes of a cell: the
-    /// cell's half vectors then spread farther than both the lobe and their distance from the normal.
-    fn may_hide_lobe(&self, width: f64, place: CellPlace) -> bool {
+    /// Whether a lobe whose half vectors are within `radius` (radians) of the normal may hide between the nodes of a cell, which are
+    /// half an edge apart: the cell holds the mirror direction, or nearly so, and is wider than the lobe.
+    fn may_hide_lobe(&self, radius: f64, place: CellPlace) -> bool {
         let w_i = self.frame.transpose() * place.middle();
-        let half_vector = (w_i + self.w_o).normalize_or_zero();
-        let cos_theta_d = half_vector.dot(self.w_o).max(MIN_COS_THETA_D);
-        // Reflection doubles angles in the plane of incidence; across it, it shrinks them by the cosine.
-        let spread = place.side() / (2.0 * cos_theta_d);
-        w_i.z > -place.side() && spread > width && spread > half_vector.distance(DVec3::Z)
+        let mirror = dvec3(-self.w_o.x, 0.0, self.w_o.z);
+        // Reflection doubles angles, but across the plane of incidence shrinks them by the cosine.
+        let narrow = 2.0 * radius * self.w_o.z.max(MIN_COS_THETA_D);
+        place.side() > narrow && w_i.distance(mirror) < place.side()
     }
 }
 
@@ -99,7 +107,7 @@ impl Display {
 pub struct Integrator<'a> {
     light: Light<'a>,
     intensity: f64,
-    /// With the widths of their lobes.
+    /// With the radii of their lobes.
     brdfs: Vec<(&'a Brdf, f64)>,
     pub(super) subpixels: usize,
 }
@@ -112,7 +120,7 @@ impl<'a> Integrator<'a> {
         brdfs: impl IntoIterator<Item = &'a Brdf>,
         subpixels: u32,
     ) -> Self {
-        let brdfs = brdfs.into_iter().map(|brdf| (brdf, half_vector_width(brdf))).collect();
+        let brdfs = brdfs.into_iter().map(|brdf| (brdf, lobe_radius(brdf))).collect();
         Self { light: Light::new(environment), intensity, brdfs, subpixels: (subpixels * subpixels) as usize }
     }
 
@@ -122,21 +130,24 @@ impl<'a> Integrator<'a> {
     /// With more points than sub-pixels, or of materials that are not there.
     pub fn pixel(&self, points: &[Point], tolerance: f64, display: Display) -> PixelEstimate {
         assert!(points.len() <= self.subpixels, "at most one point a sub-pixel");
-        let f_cos =
-            |direction: DVec3| points.iter().map(|point| point.f_cos(self.brdfs[point.material].0, direction)).sum();
+        let f_cos = |directions: &[DVec3]| {
+            let mut sums = vec![DVec3::ZERO; directions.len()];
+            points.iter().for_each(|point| point.add_f_cos(self.brdfs[point.material].0, directions, &mut sums));
+            sums
+        };
         let must_split = |place| points.iter().any(|point| point.may_hide_lobe(self.brdfs[point.material].1, place));
         let mut cubature = Cubature::new(&self.light, f_cos, must_split);
         let scale = self.intensity / self.subpixels as f64;
         loop {
             let radiance = scale * cubature.integral;
-            let radiance_error = scale * ERROR_LEFT * cubature.squares.powf(0.5);
+            let radiance_error = scale * ERROR_LEFT * cubature.squares.map(f64::sqrt);
             let channel = |i: usize| display.error(radiance[i], radiance_error[i]);
             let display_error = DVec3::from_array([0, 1, 2].map(channel));
             // A channel matters as much as its error is seen.
             let seen = display_error / radiance_error.max(DVec3::splat(f64::MIN_POSITIVE));
             let done = rms(display_error) <= tolerance || cubature.len() >= MOST_CELLS;
             if done || !cubature.refine(seen * seen) {
-                let evaluations = cubature.evaluations * points.len() as u64;
+                let evaluations = (cubature.evaluations() * points.len()) as u64;
                 return PixelEstimate { radiance, radiance_error, display_error, evaluations };
             }
         }

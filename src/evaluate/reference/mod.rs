@@ -5,7 +5,7 @@
 //! the integral of radiance times each polynomial is known exactly (`light`). So every pixel of the environment counts in full, and only
 //! the BRDF has to be resolved: cells are split where that changes the result most, pixel by pixel, until what splitting still
 //! changes is below the tolerance (`cubature`). Around mirror directions cells are split from the start until they
-//! are as small as the lobe (`lobe`), so that none is missed, however narrow.
+//! are as small as the lobe (`brdf::lobe_radius`), so that none is missed, however narrow.
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
