@@ -6,6 +6,9 @@
 //! the BRDF has to be resolved: cells are split where that changes the result most, pixel by pixel, until what splitting still
 //! changes is below the tolerance (`cubature`). Around mirror directions cells are split from the start until they
 //! are as small as the lobe (`brdf::lobe_radius`), so that none is missed, however narrow.
+//!
+//! [`Environment::radiance`]: crate::environment::Environment::radiance
+//! [`Brdf::evaluate`]: crate::brdf::Brdf::evaluate
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
