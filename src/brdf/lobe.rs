@@ -11,15 +11,29 @@ const NARROWEST_RAD: f64 = 1e-4;
 /// The angle of the half vector to the normal within which f stays within a quarter of what it is in the mirror direction;
 /// a right angle if it does so everywhere. In radians. Seen along the normal, where lobes are widest.
 pub fn half_vector_width(brdf: &Brdf) -> f64 {
-    let f = |theta_h: f64| {
-        let theta_i = 2.0 * theta_h;
-        brdf.evaluate(dvec3(0.0, theta_i.sin(), theta_i.cos()), DVec3::Z).element_sum()
-    };
-    let peak = f(0.0);
-    let widths = std::iter::successors(Some(NARROWEST_RAD), |width| Some(1.25 * width));
+    let peak = profile(brdf, 0.0);
+    first_angle(|angle| (profile(brdf, angle) - peak).abs() > 0.25 * peak)
+}
+
+/// The angle of the half vector to the normal from which f falls to less than a third at twice the angle: nearer to the normal
+/// there is but a plateau, or a cusp of little energy. A right angle if there is no such lobe. In radians. Seen along the normal.
+pub fn lobe_radius(brdf: &Brdf) -> f64 {
+    // Beyond 45 degrees f is 0, which is no lobe.
+    first_angle(|angle| 2.0 * angle < 0.5 * FRAC_PI_2 && profile(brdf, angle) > 3.0 * profile(brdf, 2.0 * angle))
+}
+
+/// f, summed over channels, where the half vector is at `theta_h` to the normal.
+fn profile(brdf: &Brdf, theta_h: f64) -> f64 {
+    let theta_i = 2.0 * theta_h;
+    brdf.evaluate(dvec3(0.0, theta_i.sin(), theta_i.cos()), DVec3::Z).element_sum()
+}
+
+/// The first angle, of ever larger ones, of which `is_so`; a right angle if there is none.
+fn first_angle(is_so: impl Fn(f64) -> bool) -> f64 {
+    let angles = std::iter::successors(Some(NARROWEST_RAD), |angle| Some(1.25 * angle));
     // Half vectors beyond 45 degrees belong to light below the horizon.
-    let mut above_horizon = widths.take_while(|&width| width < 0.5 * FRAC_PI_2);
-    above_horizon.find(|&width| (f(width) - peak).abs() > 0.25 * peak).unwrap_or(FRAC_PI_2)
+    let mut above_horizon = angles.take_while(|&angle| angle < 0.5 * FRAC_PI_2);
+    above_horizon.find(|&angle| is_so(angle)).unwrap_or(FRAC_PI_2)
 }
 
 #[cfg(test)]
@@ -30,10 +44,12 @@ mod tests {
     fn widths_follow_roughness() {
         for (alpha, distribution) in [(0.001, "ggx"), (0.02, "beckmann"), (0.2, "ggx")] {
             let parameters = format!("distribution = '{distribution}'\nalpha = {alpha}\neta = 0.2\nk = 3.9");
-            let width = half_vector_width(&Brdf::from_parameters("conductor", parameters.parse().unwrap()).unwrap());
-            assert!((0.3..1.0).contains(&(width / alpha)), "{distribution} {alpha}: {width}");
+            let brdf = Brdf::from_parameters("conductor", parameters.parse().unwrap()).unwrap();
+            for width in [half_vector_width(&brdf), lobe_radius(&brdf)] {
+                assert!((0.3..1.0).contains(&(width / alpha)), "{distribution} {alpha}: {width}");
+            }
         }
         let lambert = Brdf::from_parameters("lambert", "reflectance = 0.5".parse().unwrap()).unwrap();
-        assert_eq!(half_vector_width(&lambert), FRAC_PI_2);
+        assert_eq!((half_vector_width(&lambert), lobe_radius(&lambert)), (FRAC_PI_2, FRAC_PI_2));
     }
 }

@@ -209,7 +209,8 @@ mod tests {
         let strip = environment(256, 128, |x, y| [if y == 64 && (100..140).contains(&x) { 5e3 } else { 0.1 }; 3]);
         let found = SmallSources::of(&strip).list;
         assert_eq!(found.len(), MAX_SOURCES);
-        let pixel = 0.0102;
+        // A pixel's side is 2 pi / 256; the standard deviation of its tent, sqrt(1/6) of that.
+        let pixel = std::f64::consts::TAU / 256.0 / 6f64.sqrt();
         for source in &found {
             let [longer, shorter] = source.axes;
             assert!((shorter.length() / pixel - 1.0).abs() < 0.01, "{source:?}");

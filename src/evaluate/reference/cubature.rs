@@ -1,44 +1,53 @@
 //! Adaptive quadrature over the sphere: cells are split where that changes the integral most.
 use std::collections::BinaryHeap;
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
+use rustc_hash::{FxBuildHasher, FxHashMap};
 
-use super::light::{CELL_NODES, CellPlace, FINE_NODES, FIRST_LEVEL, LAST_LEVEL, Light, NODES, interpolate};
+use super::light::{CellPlace, FINE_NODES, FIRST_LEVEL, LAST_LEVEL, Light, NODES, NodePlace, interpolate};
+
+/// Room for nodes to start with: few pixels have more.
+const USUAL_NODES: usize = 3000;
+
+/// The part of a cell's change that its parts' errors are at least, shared out as their light is: under a lamp, where few nodes
+/// count, changes vanish by chance.
+const LEAST_LEFT: f64 = 1.0 / 8.0;
 
 /// An estimate of the integral of radiance times `g` over the sphere, that can be made better.
 pub struct Cubature<'a, G> {
     light: &'a Light<'a>,
     g: G,
+    /// What `g` was found to be at nodes: most are shared by neighbouring cells.
+    known: FxHashMap<NodePlace, DVec3>,
     /// The estimate.
     pub integral: DVec3,
     /// The sum over cells of the squares of their errors, per channel.
     pub squares: DVec3,
-    /// How often `g` was evaluated.
-    pub evaluations: u64,
     cells: Vec<Cell>,
     /// How much a cell matters, as the bits of a number that is not negative, and which it is.
     worst: BinaryHeap<(u64, usize)>,
 }
 
 /// A cell that is not split yet.
+#[derive(Clone, Copy)]
 struct Cell {
     place: CellPlace,
-    /// g at the nodes.
-    values: [DVec3; CELL_NODES],
+    /// How much the integral over the cell changed when the cell was made.
+    change: DVec3,
     /// Estimated error of the integral over the cell, squared.
     squares: DVec3,
 }
 
-impl<'a, G: Fn(DVec3) -> DVec3> Cubature<'a, G> {
+impl<'a, G: Fn(&[DVec3]) -> Vec<DVec3>> Cubature<'a, G> {
     /// The estimate from cells of the first level, each split once, and on while `must_split` says so.
     pub fn new(light: &'a Light, g: G, must_split: impl Fn(CellPlace) -> bool) -> Self {
         let (integral, squares) = (DVec3::ZERO, DVec3::ZERO);
-        let mut cubature =
-            Self { light, g, integral, squares, evaluations: 0, cells: vec![], worst: BinaryHeap::new() };
+        let (known, worst) = (FxHashMap::with_capacity_and_hasher(USUAL_NODES, FxBuildHasher), BinaryHeap::new());
+        let mut cubature = Self { light, g, known, integral, squares, cells: vec![], worst };
         let mut waiting: Vec<Cell> = CellPlace::all(FIRST_LEVEL).map(|place| cubature.first_cell(place)).collect();
         while let Some(cell) = waiting.pop() {
             cubature.squares -= cell.squares;
-            for part in cubature.parts(&cell) {
+            for part in cubature.parts(cell) {
                 if must_split(part.place) { waiting.push(part) } else { cubature.keep(part, DVec3::ONE) }
             }
         }
@@ -48,11 +57,11 @@ impl<'a, G: Fn(DVec3) -> DVec3> Cubature<'a, G> {
     /// Splits the cell that matters most, where channels have these weights in the errors' squares; whether there was one left.
     pub fn refine(&mut self, channel_weights: DVec3) -> bool {
         let Some((_, index)) = self.worst.pop() else { return false };
-        // Its place is taken by one of its parts.
-        let cell = std::mem::replace(&mut self.cells[index].squares, DVec3::ZERO);
-        self.squares = (self.squares - cell).max(DVec3::ZERO);
-        let (place, values) = (self.cells[index].place, self.cells[index].values);
-        for part in self.parts(&Cell { place, values, squares: DVec3::ZERO }) {
+        // It stays in the list, without an error.
+        let cell = self.cells[index];
+        self.cells[index].squares = DVec3::ZERO;
+        self.squares = (self.squares - cell.squares).max(DVec3::ZERO);
+        for part in self.parts(cell) {
             self.keep(part, channel_weights);
         }
         true
@@ -63,45 +72,63 @@ impl<'a, G: Fn(DVec3) -> DVec3> Cubature<'a, G> {
         self.cells.len()
     }
 
-    fn first_cell(&mut self, place: CellPlace) -> Cell {
-        let directions = place.directions::<NODES>();
-        let values = std::array::from_fn(|i| (self.g)(directions[i / NODES][i % NODES]));
-        let weights = self.light.weights(place);
-        self.integral += weights.iter().zip(&values).map(|(weight, value)| weight.as_dvec3() * *value).sum::<DVec3>();
-        self.evaluations += CELL_NODES as u64;
-        Cell { place, values, squares: DVec3::ZERO }
+    /// How often `g` was evaluated.
+    pub fn evaluations(&self) -> usize {
+        self.known.len()
     }
 
-    /// Splits `cell`: the estimate changes by what its polynomial misses at the new nodes, and that is the parts' error.
-    fn parts(&mut self, cell: &Cell) -> [Cell; 4] {
-        let mut values = interpolate(&cell.values);
-        let mut missed = [[DVec3::ZERO; FINE_NODES]; FINE_NODES];
-        for (j, row) in cell.place.directions::<FINE_NODES>().iter().enumerate() {
-            for (i, direction) in row.iter().enumerate() {
-                // The others are nodes of the cell itself.
-                if i % 2 == 1 || j % 2 == 1 {
-                    let value = (self.g)(*direction);
-                    missed[j][i] = value - values[j][i];
-                    values[j][i] = value;
-                }
-            }
-        }
-        self.evaluations += (FINE_NODES * FINE_NODES - CELL_NODES) as u64;
+    fn first_cell(&mut self, place: CellPlace) -> Cell {
+        let values = self.values(place.nodes::<NODES>());
+        let weights = self.light.weights(place);
+        let values = values.as_flattened();
+        self.integral += weights.iter().zip(values).map(|(weight, value)| weight.as_dvec3() * *value).sum::<DVec3>();
+        Cell { place, change: DVec3::ZERO, squares: DVec3::ZERO }
+    }
+
+    /// Splits a cell: the estimate changes by what its polynomial misses at the new nodes, and that is the parts' error.
+    fn parts(&mut self, cell: Cell) -> [Cell; 4] {
+        let values = self.values(cell.place.nodes::<FINE_NODES>());
+        let interpolated = interpolate(&values);
+        let weights = cell.place.parts().map(|part| self.light.weights(part).map(Vec3::as_dvec3));
+        let light = weights.map(|weights| weights.iter().map(|weight| weight.abs()).sum::<DVec3>());
+        let whole_light = light.iter().sum::<DVec3>().max(DVec3::splat(f64::MIN_POSITIVE));
         let mut part = 0;
         cell.place.parts().map(|place| {
             let (left, top) = (part % 2 * (NODES - 1), part / 2 * (NODES - 1));
-            part += 1;
-            let mut error = DVec3::ZERO;
-            for (i, weight) in self.light.weights(place).iter().enumerate() {
-                let change = weight.as_dvec3() * missed[top + i / NODES][left + i % NODES];
-                self.integral += change;
+            let mut change = DVec3::ZERO;
+            for (i, weight) in weights[part].iter().enumerate() {
+                let (row, column) = (top + i / NODES, left + i % NODES);
+                let term = *weight * (values[row][column] - interpolated[row][column]);
+                self.integral += term;
                 // What cancels here by chance may not do so within the part.
-                error += change.abs();
+                change += term.abs();
             }
+            let error = change.max(LEAST_LEFT * light[part] / whole_light * cell.change);
             let squares = error * error;
             self.squares += squares;
-            Cell { place, values: std::array::from_fn(|i| values[top + i / NODES][left + i % NODES]), squares }
+            part += 1;
+            Cell { place, change, squares }
         })
+    }
+
+    /// `g` at nodes.
+    fn values<const N: usize>(&mut self, nodes: [[(NodePlace, DVec3); N]; N]) -> [[DVec3; N]; N] {
+        let mut values = [[DVec3::ZERO; N]; N];
+        let (mut new, mut directions) = (Vec::with_capacity(N * N), Vec::with_capacity(N * N));
+        for ((place, direction), value) in nodes.as_flattened().iter().zip(values.as_flattened_mut()) {
+            match self.known.get(place) {
+                Some(known) => *value = *known,
+                None => {
+                    new.push((*place, value));
+                    directions.push(*direction);
+                }
+            }
+        }
+        for ((place, value), found) in new.into_iter().zip((self.g)(&directions)) {
+            *value = found;
+            self.known.insert(place, found);
+        }
+        values
     }
 
     fn keep(&mut self, cell: Cell, channel_weights: DVec3) {

@@ -58,16 +58,25 @@ impl CellPlace {
         DVec3::new(theta.sin() * phi.sin(), theta.cos(), -theta.sin() * phi.cos())
     }
 
-    /// The directions of nodes in `N` equal steps from edge to edge along each axis, row by row.
-    pub fn directions<const N: usize>(self) -> [[DVec3; N]; N] {
-        let angle = |index: u32, i: usize| (f64::from(index) + i as f64 / (N - 1) as f64) * self.side();
-        let phis: [_; N] = std::array::from_fn(|i| angle(self.column, i).sin_cos());
+    /// Nodes in `N` equal steps from edge to edge along each axis, row by row: names and directions. `N` - 1 divides 4.
+    pub fn nodes<const N: usize>(self) -> [[(NodePlace, DVec3); N]; N] {
+        let step = 4 / (N - 1) as u32;
+        let fraction = |index: u32, i: usize| 4 * index + step * i as u32;
+        let angle = |index: u32, i: usize| f64::from(fraction(index, i)) * (0.25 * self.side());
+        let finest = |fraction: u32| fraction << (LAST_LEVEL - self.level);
+        let phis: [_; N] = std::array::from_fn(|i| (finest(fraction(self.column, i)), angle(self.column, i).sin_cos()));
         std::array::from_fn(|j| {
             let (sin_theta, cos_theta) = angle(self.row, j).sin_cos();
-            phis.map(|(sin_phi, cos_phi)| DVec3::new(sin_theta * sin_phi, cos_theta, -sin_theta * cos_phi))
+            let row = finest(fraction(self.row, j));
+            phis.map(|(column, (sin_phi, cos_phi))| {
+                ([column, row], DVec3::new(sin_theta * sin_phi, cos_theta, -sin_theta * cos_phi))
+            })
         })
     }
 }
+
+/// A node's column and row, in quarters of a cell of the last level.
+pub type NodePlace = [u32; 2];
 
 /// The integrals of radiance times each node's polynomial over a cell, in radiance times sr. In single precision, as texels
 /// are: 1e-7 of the cell's light.
@@ -156,11 +165,10 @@ fn sum_of_parts(parts: [&Weights; 4]) -> Weights {
     whole.map(|weight| weight.as_vec3())
 }
 
-/// Interpolates from nodes of a cell to those of its parts.
-pub fn interpolate(coarse: &[DVec3; CELL_NODES]) -> [[DVec3; FINE_NODES]; FINE_NODES] {
-    let along: [[DVec3; FINE_NODES]; NODES] = std::array::from_fn(|row| {
-        FINE_VALUES.map(|values| (0..NODES).map(|i| coarse[row * NODES + i] * values[i]).sum())
-    });
+/// What a cell's polynomial is at the nodes of its parts, from the values there: every other one is at a node of the cell.
+pub fn interpolate(fine: &[[DVec3; FINE_NODES]; FINE_NODES]) -> [[DVec3; FINE_NODES]; FINE_NODES] {
+    let along: [[DVec3; FINE_NODES]; NODES] =
+        std::array::from_fn(|row| FINE_VALUES.map(|values| (0..NODES).map(|i| fine[2 * row][2 * i] * values[i]).sum()));
     FINE_VALUES.map(|values| std::array::from_fn(|column| (0..NODES).map(|i| along[i][column] * values[i]).sum()))
 }
 
@@ -280,8 +288,8 @@ mod tests {
     fn interpolation_reproduces_polynomials_at_nodes_of_parts() {
         let g = |s: f64, t: f64| DVec3::new(s * s, t - s * t, 1.0 + s * s * t * t);
         let at = |i: usize, count: usize| i as f64 / (count - 1) as f64;
-        let coarse = std::array::from_fn(|i| g(at(i % NODES, NODES), at(i / NODES, NODES)));
-        for (j, row) in interpolate(&coarse).into_iter().enumerate() {
+        let values = std::array::from_fn(|j| std::array::from_fn(|i| g(at(i, FINE_NODES), at(j, FINE_NODES))));
+        for (j, row) in interpolate(&values).into_iter().enumerate() {
             for (i, value) in row.into_iter().enumerate() {
                 assert!((value - g(at(i, FINE_NODES), at(j, FINE_NODES))).length() < 1e-12);
             }

@@ -5,7 +5,10 @@
 //! the integral of radiance times each polynomial is known exactly (`light`). So every pixel of the environment counts in full, and only
 //! the BRDF has to be resolved: cells are split where that changes the result most, pixel by pixel, until what splitting still
 //! changes is below the tolerance (`cubature`). Around mirror directions cells are split from the start until they
-//! are as small as the lobe (`lobe`), so that none is missed, however narrow.
+//! are as small as the lobe (`brdf::lobe_radius`), so that none is missed, however narrow.
+//!
+//! [`Environment::radiance`]: crate::environment::Environment::radiance
+//! [`Brdf::evaluate`]: crate::brdf::Brdf::evaluate
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
@@ -14,8 +17,6 @@ use std::time::Instant;
 use glam::{DMat3, DVec3, UVec2, dvec3};
 use rayon::prelude::*;
 
-use crate::brdf::{Brdf, half_vector_width};
-use crate::environment::Environment;
 use crate::passes::View;
 use crate::pipeline::render_geometry;
 use crate::prepare::Prepared;
@@ -27,34 +28,20 @@ use crate::{Error, Result};
 mod cache;
 mod cubature;
 mod gpu;
+mod integrator;
 mod light;
 mod progressive;
 #[cfg(test)]
 mod tests;
 
-use cubature::Cubature;
-use light::{CellPlace, Light};
+use integrator::rms;
+pub use integrator::{Display, Integrator, MAX_THETA_O_DEG, PixelEstimate, Point};
 pub use progressive::{Estimate, STAGES, Stage, progressive};
 
 /// Tolerance where none is given: a twentieth of a step of an 8-bit display value.
 pub const TOLERANCE: f64 = 2e-4;
 /// The same on the GPU, where each half of an error takes four times the samples: a quarter of a step.
 pub const GPU_TOLERANCE: f64 = 1e-3;
-/// A pixel gives up at so many cells.
-const MOST_CELLS: usize = 1 << 18;
-/// After so many splits of a pixel's cells, well under a millisecond, the observer is asked: a pixel may take seconds.
-const SPLITS_A_LOOK: usize = 64;
-/// What the view angle is held below: at 90 degrees f is 0 and no slice is left. A renderer only meets it where an
-/// interpolated normal turns from the eye.
-pub const MAX_THETA_O_DEG: f64 = 89.99;
-/// At grazing angles lobes grow ever thinner across. Beyond this (87 degrees, a rim of 0.1 % of a sphere) cells are small enough to find
-/// part of them, and what is found is split like all else.
-const MIN_COS_THETA_D: f64 = 0.05;
-/// What is left of a cell's error by splitting it: see the test that estimates are honest.
-const ERROR_LEFT: f64 = 0.5;
-/// Above display white, where display values no longer tell, linear radiance is held to 1/0.05 = 20 times the tolerance, relatively.
-const ABOVE_WHITE: f64 = 0.05;
-
 /// Where the reference is made.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Processor {
@@ -183,61 +170,6 @@ pub fn reference(
     Ok(image)
 }
 
-/// A point to shade: its frame in the environment's axes, and its view.
-#[derive(Clone, Copy, Debug)]
-pub struct Point {
-    /// Columns: x, the part of w_o orthogonal to n; y = z cross x; z = n.
-    frame: DMat3,
-    /// Towards the eye, in that frame; at most [`MAX_THETA_O_DEG`] from z.
-    w_o: DVec3,
-    /// Index of the material.
-    material: usize,
-}
-
-impl Point {
-    /// The point of unit normal `n` seen from unit `w_o`, both in the axes of the environment.
-    pub fn new(n: DVec3, w_o: DVec3, material: usize) -> Self {
-        let cos_theta_o = n.dot(w_o);
-        let across = w_o - cos_theta_o * n;
-        let sin_theta_o = across.length();
-        // Seen along the normal any axis will do; 1e-12 is ten thousand roundings, so the axis is still good to 1e-4 there.
-        let x = if sin_theta_o > 1e-12 { across / sin_theta_o } else { n.any_orthonormal_vector() };
-        let theta_o = sin_theta_o.atan2(cos_theta_o).min(MAX_THETA_O_DEG.to_radians());
-        Self { frame: DMat3::from_cols(x, n.cross(x), n), w_o: dvec3(theta_o.sin(), 0.0, theta_o.cos()), material }
-    }
-
-    /// f(w_i, w_o) (n . w_i) per channel, in 1/sr, for unit `direction` in the axes of the environment.
-    #[inline]
-    fn f_cos(&self, brdf: &Brdf, direction: DVec3) -> DVec3 {
-        let w_i = self.frame.transpose() * direction;
-        if w_i.z > 0.0 { brdf.evaluate(w_i, self.w_o) * w_i.z } else { DVec3::ZERO }
-    }
-
-    /// Whether a lobe whose half vectors are within `width` (radians) of the normal may hide between the nodes of a cell: the
-    /// cell's half vectors then spread farther than both the lobe and their distance from the normal.
-    fn may_hide_lobe(&self, width: f64, place: CellPlace) -> bool {
-        let w_i = self.frame.transpose() * place.middle();
-        let half_vector = (w_i + self.w_o).normalize_or_zero();
-        let cos_theta_d = half_vector.dot(self.w_o).max(MIN_COS_THETA_D);
-        // Reflection doubles angles in the plane of incidence; across it, it shrinks them by the cosine.
-        let spread = place.side() / (2.0 * cos_theta_d);
-        w_i.z > -place.side() && spread > width && spread > half_vector.distance(DVec3::Z)
-    }
-}
-
-/// The radiance of a pixel and what is known of its error.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PixelEstimate {
-    /// Linear radiance times coverage.
-    pub radiance: DVec3,
-    /// Standard error of it.
-    pub radiance_error: DVec3,
-    /// Standard error of the display values.
-    pub display_error: DVec3,
-    /// How often the integrand was evaluated.
-    pub evaluations: u64,
-}
-
 /// A pixel that sees a surface.
 struct Texel {
     /// Linear radiance times coverage, and coverage.
@@ -247,52 +179,13 @@ struct Texel {
     estimate: PixelEstimate,
 }
 
-/// How a radiance is shown, for errors to be measured in what is seen.
-#[derive(Clone, Copy, Debug)]
-pub struct Display {
-    /// Factor on radiance.
-    pub exposure: f64,
-    /// Display values are radiance to the power of 1/gamma.
-    pub gamma: f64,
-}
-
 impl Display {
     fn of(view: &View) -> Self {
         Self { exposure: f64::from(view.exposure), gamma: f64::from(view.gamma) }
     }
-
-    fn value(&self, radiance: f64) -> f64 {
-        (self.exposure * radiance).clamp(0.0, 1.0).powf(1.0 / self.gamma)
-    }
-
-    /// The error of a display value, from `radiance` and its standard error.
-    fn error(&self, radiance: f64, error: f64) -> f64 {
-        let shown = 0.5 * (self.value(radiance + error) - self.value(radiance - error));
-        if self.exposure * radiance > 1.0 { shown.max(ABOVE_WHITE * error / radiance) } else { shown }
-    }
 }
 
-/// Evaluates equation (1) for one environment and some materials.
-pub struct Integrator<'a> {
-    light: Light<'a>,
-    intensity: f64,
-    /// With the widths of their lobes.
-    brdfs: Vec<(&'a Brdf, f64)>,
-    subpixels: usize,
-}
-
-impl<'a> Integrator<'a> {
-    /// For `environment` times `intensity`, materials `brdfs`, and pixels of up to `subpixels` squared points.
-    pub fn new(
-        environment: &'a Environment,
-        intensity: f64,
-        brdfs: impl IntoIterator<Item = &'a Brdf>,
-        subpixels: u32,
-    ) -> Self {
-        let brdfs = brdfs.into_iter().map(|brdf| (brdf, half_vector_width(brdf))).collect();
-        Self { light: Light::new(environment), intensity, brdfs, subpixels: (subpixels * subpixels) as usize }
-    }
-
+impl Integrator<'_> {
     /// The picture of `geometry`, texels as [`crate::pipeline::Rendering::geometry`] has them.
     ///
     /// # Errors
@@ -375,49 +268,4 @@ impl<'a> Integrator<'a> {
             })
             .collect()
     }
-
-    /// The sum over `points` divided by the number of sub-pixels, to within `tolerance` as `display` shows it.
-    ///
-    /// # Panics
-    /// With more points than sub-pixels, or of materials that are not there.
-    pub fn pixel(&self, points: &[Point], tolerance: f64, display: Display) -> PixelEstimate {
-        self.observed_pixel(points, tolerance, display, &()).expect("nobody cancels")
-    }
-
-    /// The same; the only error is that `observer` cancels it.
-    fn observed_pixel(
-        &self,
-        points: &[Point],
-        tolerance: f64,
-        display: Display,
-        observer: &dyn Observer,
-    ) -> Result<PixelEstimate> {
-        assert!(points.len() <= self.subpixels, "at most one point a sub-pixel");
-        let f_cos =
-            |direction: DVec3| points.iter().map(|point| point.f_cos(self.brdfs[point.material].0, direction)).sum();
-        let must_split = |place| points.iter().any(|point| point.may_hide_lobe(self.brdfs[point.material].1, place));
-        let mut cubature = Cubature::new(&self.light, f_cos, must_split);
-        let scale = self.intensity / self.subpixels as f64;
-        for split in 1.. {
-            let radiance = scale * cubature.integral;
-            let radiance_error = scale * ERROR_LEFT * cubature.squares.powf(0.5);
-            let channel = |i: usize| display.error(radiance[i], radiance_error[i]);
-            let display_error = DVec3::from_array([0, 1, 2].map(channel));
-            // A channel matters as much as its error is seen.
-            let seen = display_error / radiance_error.max(DVec3::splat(f64::MIN_POSITIVE));
-            let done = rms(display_error) <= tolerance || cubature.len() >= MOST_CELLS;
-            if done || !cubature.refine(seen * seen) {
-                let evaluations = cubature.evaluations * points.len() as u64;
-                return Ok(PixelEstimate { radiance, radiance_error, display_error, evaluations });
-            }
-            if split % SPLITS_A_LOOK == 0 && observer.cancelled() {
-                return Err(Error::Cancelled);
-            }
-        }
-        unreachable!("there is no end to splits")
-    }
-}
-
-fn rms(channels: DVec3) -> f64 {
-    (channels.length_squared() / 3.0).sqrt()
 }

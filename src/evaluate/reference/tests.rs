@@ -1,7 +1,11 @@
 //! The reference against closed forms, the albedo, and itself at more points.
 use std::f64::consts::{FRAC_1_PI, PI, TAU};
 
+use glam::{DVec3, dvec3};
+
 use super::*;
+use crate::brdf::Brdf;
+use crate::environment::Environment;
 use crate::environment::tests::environment;
 
 const DISPLAY: Display = Display { exposure: 1.0, gamma: 2.2 };
@@ -38,8 +42,13 @@ fn facing_the_sun(map: &Environment, theta_o_deg: f64) -> Point {
 
 /// A point seen from `theta_o_deg`, its normal towards +Y.
 fn seen_from(theta_o_deg: f64) -> Point {
+    of_material(0, theta_o_deg)
+}
+
+/// The same of any material.
+fn of_material(material: usize, theta_o_deg: f64) -> Point {
     let (sin_theta_o, cos_theta_o) = theta_o_deg.to_radians().sin_cos();
-    Point::new(DVec3::Y, dvec3(0.6 * sin_theta_o, cos_theta_o, 0.8 * sin_theta_o), 0)
+    Point::new(DVec3::Y, dvec3(0.6 * sin_theta_o, cos_theta_o, 0.8 * sin_theta_o), material)
 }
 
 #[test]
@@ -177,9 +186,8 @@ fn sub_pixels_share_the_work_and_average() {
     let map = sky(500.0);
     let brdfs = [conductor(0.2), lambert()];
     let integrator = Integrator::new(&map, 1.0, &brdfs, 2);
-    let points = [0.0, 20.0, 40.0].map(|theta_o_deg| Point { material: 1, ..seen_from(theta_o_deg) });
-    let mixed = [points[0], Point { material: 0, ..points[1] }, points[2]];
-    for points in [points, mixed] {
+    for materials in [[1, 1, 1], [1, 0, 1]] {
+        let points = [0, 1, 2].map(|i| of_material(materials[i], 20.0 * i as f64));
         let together = integrator.pixel(&points, 1e-4, DISPLAY).radiance;
         let single = |point| integrator.pixel(&[point], 2e-5, DISPLAY).radiance;
         // Each alone counts a quarter, as one of four sub-pixels.
