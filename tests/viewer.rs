@@ -4,6 +4,7 @@
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 use threadlight::output::{Picture, read_image};
@@ -43,10 +44,14 @@ impl Drop for Display {
     }
 }
 
+/// Held by each viewer: some are timed, and others would take the processor from them.
+static ALONE: Mutex<()> = Mutex::new(());
+
 /// A viewer in a folder of its own.
 struct Viewer {
     display: Display,
     folder: TempDir,
+    _alone: MutexGuard<'static, ()>,
 }
 
 /// What a viewer leaves.
@@ -58,7 +63,9 @@ struct Ended {
 
 impl Viewer {
     fn new() -> Option<Self> {
-        Some(Self { display: Display::open()?, folder: tempfile::tempdir().expect("a folder") })
+        // Another test that failed is no reason to fail.
+        let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
+        Some(Self { display: Display::open()?, folder: tempfile::tempdir().expect("a folder"), _alone })
     }
 
     fn path(&self, name: &str) -> PathBuf {

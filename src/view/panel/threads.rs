@@ -6,6 +6,7 @@ use crate::evaluate::Display;
 use crate::view::threads_seen::{self, Surface, in_picture};
 use crate::view::viewer::Viewer;
 use egui::{TextureHandle, TextureOptions, Ui};
+use std::path::Path;
 use std::sync::Arc;
 
 /// The environment's thumbnail as it was last uploaded, with its environment, intensity and display.
@@ -28,7 +29,9 @@ impl State {
             let material = &prepared.materials[surface.map_or(0, |surface| surface.material)];
             match surface {
                 Some(surface) => {
-                    ui.label(format!("{}, theta_o = {:.1}°", material.name, surface.theta_o_rad.to_degrees()))
+                    // Names of materials from files are paths.
+                    let name = Path::new(&material.name).file_name().unwrap_or_default().to_string_lossy();
+                    ui.label(format!("{name}, theta_o = {:.1}°", surface.theta_o_rad.to_degrees()))
                 }
                 None => ui.weak("move the cursor over an object"),
             };
