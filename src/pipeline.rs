@@ -1,6 +1,7 @@
 //! The method on one screen: the frame as a graph of passes, and the renderer that runs it.
 use crate::graph::{Buffer, Executable, Image};
 use crate::method::Method;
+use crate::output::ExrHeader;
 use crate::passes::*;
 use crate::prepare::{Prepared, PreparedMaterial};
 use crate::vulkan::{Device, Frames, PassTime, PipelineCache};
@@ -218,6 +219,20 @@ impl Renderer {
 }
 
 impl Rendering {
+    /// What an EXR file of it, rendered from `prepared` on the device of this name, says of how it was made.
+    pub fn exr_header(&self, prepared: &Prepared, device: &str) -> ExrHeader {
+        let materials: Vec<_> = prepared.materials.iter().map(|material| material.name.as_str()).collect();
+        ExrHeader {
+            method: prepared.method.name().to_owned(),
+            threads: prepared.sampling.count,
+            material: materials.join(", "),
+            environment: prepared.environment.name.clone(),
+            device: device.to_owned(),
+            seconds: self.frame_ms * 1e-3,
+            ..ExrHeader::default()
+        }
+    }
+
     /// Time on the GPU of all passes but those that copy results back, in milliseconds.
     pub fn gpu_ms(&self) -> f64 {
         self.passes.iter().filter(|pass| !pass.is_readback()).map(|pass| pass.gpu_ms).sum()

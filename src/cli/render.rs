@@ -10,7 +10,7 @@ use std::path::PathBuf;
 use threadlight::Error;
 use threadlight::evaluate::reference::{self, Processor, ReferenceImage, ReferenceSettings};
 use threadlight::method::Method;
-use threadlight::output::{self, ExrHeader, Format};
+use threadlight::output::{self, Format};
 use threadlight::pipeline::{Renderer, Rendering, Wanted};
 use threadlight::prepare::{Prepared, prepare};
 use threadlight::scene::Background;
@@ -166,7 +166,7 @@ impl Render {
             let transparent = scene.image.background == Background::None;
             match format {
                 Some(Format::Exr) => {
-                    let mut header = self.exr_header(&prepared, &rendering, &device_name);
+                    let mut header = rendering.exr_header(&prepared, &device_name);
                     if let Some(reference) = &reference {
                         let number = |name: &str, value: f64| (name.to_owned(), value.to_string());
                         header.more.push(number("tolerance", reference.tolerance));
@@ -187,19 +187,6 @@ impl Render {
             anyhow::bail!("validation: {} messages, the first: {}", messages.len(), first.replace('\n', " "));
         }
         Ok(())
-    }
-
-    fn exr_header(&self, prepared: &Prepared, rendering: &Rendering, device: &str) -> ExrHeader {
-        let materials: Vec<_> = prepared.materials.iter().map(|material| material.name.as_str()).collect();
-        ExrHeader {
-            method: prepared.method.name().to_owned(),
-            threads: prepared.sampling.count,
-            material: materials.join(", "),
-            environment: prepared.environment.name.clone(),
-            device: device.to_owned(),
-            seconds: rendering.frame_ms * 1e-3,
-            ..ExrHeader::default()
-        }
     }
 }
 

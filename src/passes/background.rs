@@ -34,7 +34,8 @@ impl Background {
     /// # Errors
     /// No device memory left, or a map wider or higher than the device's images can be.
     pub fn new(device: &Arc<Device>, cache: &PipelineCache, environment: &Environment) -> Result<Self> {
-        check_map_size(device, environment, "scale it down, or leave the background out with --background none")?;
+        let remedy = "scale it down, or leave the background out with --background none";
+        check_map_size(device, environment, [environment.width, environment.height], remedy)?;
         // A sun as bright as the largest half float is white on any display, so here, unlike in shading, it is cut off.
         let texel = |rgb: &[f32; 3]| [rgb[0], rgb[1], rgb[2], 1.0].map(|value| f16::from_f32(value.min(65504.0)));
         let texels: Vec<[f16; 4]> = environment.texels.iter().map(texel).collect();
@@ -50,10 +51,14 @@ impl Background {
     }
 }
 
-/// An error for a map wider or higher than the device's images can be.
-pub(super) fn check_map_size(device: &Device, environment: &Environment, remedy: &str) -> Result<()> {
+/// An error for a map of `environment`, of this width and height, if the device's images cannot be as large.
+pub(super) fn check_map_size(
+    device: &Device,
+    environment: &Environment,
+    [width, height]: [usize; 2],
+    remedy: &str,
+) -> Result<()> {
     let largest = device.limits().max_image_dimension2_d as usize;
-    let (width, height) = (environment.width, environment.height);
     if width.max(height) <= largest {
         return Ok(());
     }

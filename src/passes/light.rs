@@ -1,10 +1,10 @@
 //! What shading looks up of the environment, on the device: only what its method and its materials need.
 use super::background::check_map_size;
-use super::vmf_pyramid;
+use super::vmf_pyramid::blurred;
 use crate::Result;
 use crate::brdf::half_vector_width;
 use crate::environment::sources::{CLEAR, clearance};
-use crate::environment::{Environment, LightMap, Pyramid, Source, VmfPyramid};
+use crate::environment::{Environment, LightMap, Pyramid, Source};
 use crate::method::Method;
 use crate::prepare::PreparedMaterial;
 use crate::threads::Threads;
@@ -108,7 +108,7 @@ impl DeviceLight {
         environment: &Environment,
         materials: &[PreparedMaterial],
     ) -> Result<()> {
-        let blurred = |part| blurred(device, cache, cache_folder, part);
+        let blurred = |part| blurred(device, cache, cache_folder, part, &());
         let rest = blurred(environment.rest())?;
         self.finest_level = (rest.finest_width_rad() / FINEST_WIDTH_RAD).log2() as f32;
         self.extras = Extras::of(environment, materials, self.finest_level);
@@ -170,21 +170,9 @@ impl DeviceLight {
     }
 }
 
-/// `part` blurred by the kernels of fitted threads: from memory, disk or the device.
-fn blurred<'e>(
-    device: &Arc<Device>,
-    cache: &PipelineCache,
-    cache_folder: Option<&Path>,
-    part: &'e Environment,
-) -> Result<&'e VmfPyramid> {
-    part.vmf_filtered(cache_folder, &(), |source| vmf_pyramid(device, cache, source, &()))
-}
-
 /// Uploads `map`, of `environment`: its radiance over `scale`.
 fn upload_map(device: &Arc<Device>, environment: &Environment, map: &LightMap, scale: f32) -> Result<vulkan::Image> {
-    if map.width > 1 {
-        check_map_size(device, environment, "scale it down, or use --method filtered")?;
-    }
+    check_map_size(device, environment, [map.width, map.height], "scale it down, or use --method filtered")?;
     let shape = ImageShape::plane(vk::Format::R32G32B32A32_SFLOAT, map.width as u32, map.height as u32);
     let texels: Vec<_> = map.texels.iter().map(|&[r, g, b, a]| [r / scale, g / scale, b / scale, a]).collect();
     Ok(vulkan::Image::with_texels(device, "environment map", shape, &[bytemuck::cast_slice(&texels).to_vec()])?)

@@ -47,13 +47,24 @@ pub fn filter_environment(
     let shader = method.shader()?;
     if shader.declares("irradiance_map")? {
         for part in std::iter::once(environment.rest()).chain(environment.sources_alone()) {
-            part.vmf_filtered(cache_folder, observer, |source| vmf_pyramid(device, cache, source, observer))?;
+            blurred(device, cache, cache_folder, part, observer)?;
         }
         environment.rest().watched_irradiance(observer)?;
     } else if shader.declares("environment_pyramid")? {
         environment.watched_box_filtered(observer)?;
     }
     Ok(())
+}
+
+/// `part` of an environment blurred by the kernels of fitted threads: from memory, disk or the device.
+pub(super) fn blurred<'e>(
+    device: &Arc<Device>,
+    cache: &PipelineCache,
+    cache_folder: Option<&Path>,
+    part: &'e Environment,
+    observer: &dyn Observer,
+) -> Result<&'e VmfPyramid> {
+    part.vmf_filtered(cache_folder, observer, |source| vmf_pyramid(device, cache, source, observer))
 }
 
 /// The pyramid of vMF kernels of the environment whose box-filtered one is `source`, made on `device`. `observer` hears of submissions.

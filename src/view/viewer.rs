@@ -7,7 +7,7 @@ use super::orbit::{Bounds, Orbit, environment_turn_deg};
 use super::pace::Pace;
 use super::session::{Change, Session};
 use super::stage::{Drawn, Extras, Picture, Stage};
-use crate::output::{self, ExrHeader, Format};
+use crate::output::{self, Format};
 use crate::passes::{Area, Counters, View, filter_environment};
 use crate::pipeline::{Renderer, Wanted};
 use crate::prepare::{Prepared, prepare_again, view_of};
@@ -493,22 +493,12 @@ impl Viewer {
         renderer.view = self.view(&loaded)?;
         let wanted = Wanted { radiance: format == Format::Exr, display: format == Format::Png, geometry: false };
         let rendering = renderer.render(wanted, 1)?;
-        let Prepared { method, sampling, environment, materials, .. } = &*loaded.prepared;
         let (width, height) = (renderer.view.width, renderer.view.height);
         let alpha = self.session.shown().image.background == Background::None;
         match format {
             Format::Png => output::write_png(path, width, height, &rendering.display, alpha)?,
             Format::Exr => {
-                let names: Vec<_> = materials.iter().map(|material| material.name.as_str()).collect();
-                let header = ExrHeader {
-                    method: method.name().to_owned(),
-                    threads: sampling.count,
-                    material: names.join(", "),
-                    environment: environment.name.clone(),
-                    device: self.device.description().name.clone(),
-                    seconds: rendering.frame_ms * 1e-3,
-                    ..ExrHeader::default()
-                };
+                let header = rendering.exr_header(&loaded.prepared, &self.device.description().name);
                 output::write_exr(path, width, height, &rendering.radiance, alpha, &header)?;
             }
         }
