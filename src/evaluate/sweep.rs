@@ -93,6 +93,8 @@ pub fn run(
 ) -> Result<()> {
     let total = sweep.row_count();
     observer.progress(0, total);
+    // What one picture has in common with the next is uploaded and compiled once.
+    let mut previous: Option<(Renderer, Prepared)> = None;
     sweep.cases.for_each_place(observer, &mut |place| {
         let (width, height, display) = (place.prepared.view.width, place.prepared.view.height, place.display);
         let comparable =
@@ -109,7 +111,11 @@ pub fn run(
                 return Err(Error::Cancelled);
             }
             place.choose(estimator)?;
-            let renderer = Renderer::new(device, sweep.cases.cache.as_deref(), place.prepared)?;
+            let cache = sweep.cases.cache.as_deref();
+            let renderer = match &previous {
+                Some((renderer, before)) => renderer.again(cache, before, place.prepared)?,
+                None => Renderer::new(device, cache, place.prepared)?,
+            };
             let wanted = Wanted { radiance: true, ..Wanted::default() };
             // A frame that does not count: drivers compile then.
             renderer.render(wanted, 1)?;
@@ -120,6 +126,7 @@ pub fn run(
             if sweep.keep_pictures {
                 measured.pictures.push(over_grey(&rendering.radiance, width, height, display));
             }
+            previous = Some((renderer, place.prepared.clone()));
             observer.progress(measured.rows.len(), total);
         }
         Ok(())
