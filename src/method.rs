@@ -107,12 +107,12 @@ impl Method {
         self.threads().map_or(100, |kind| kind.default_count() as u32)
     }
 
-    /// Whether a pixel within one smooth surface is one sum at its mean normal, not a partition among its sub-pixels:
     /// Whether its shader evaluates BRDFs under `environment`: fitted threads hold all that is needed, but for small bright sources.
     pub fn evaluates_brdf(self, environment: &Environment) -> bool {
         self != Self::Fitted || !environment.small_sources().list.is_empty()
     }
 
+    /// Whether a pixel within one smooth surface is one sum at its mean normal, not a partition among its sub-pixels:
     /// SHARES_SURFACE in the shader.
     pub fn shares_surface(self) -> bool {
         matches!(self, Self::Fitted)

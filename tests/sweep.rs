@@ -37,7 +37,7 @@ fn sweep(folder: &TempDir) -> Sweep {
         seed: 0,
         cache: None,
     };
-    Sweep { cases, repeat: 1, whole_picture: false, keep_pictures: false }
+    Sweep { cases, repeat: 1, whole_picture: false, expected: false, keep_pictures: false }
 }
 
 /// The picture with 16 threads of `paper`, as if it were the truth.

@@ -80,19 +80,34 @@ struct AtSources {
     vec3 cosine;
 };
 
+// Of a square of light around a direction of this z, whose standard deviation along z is this: the mean of max(z, 0), and the mean
+// of z with that as weight.
+vec2 risen(float z, float deviation) {
+    // Light straight above has none.
+    float half_side = max(sqrt(3.0) * deviation, 1e-6);
+    if (z >= half_side) {
+        return vec2(z, z + half_side * half_side / (3.0 * z));
+    }
+    float above = max(z + half_side, 0.0);
+    return vec2(above * above / (4.0 * half_side), 2.0 / 3.0 * above);
+}
+
 AtSources at_sources(Surface surface, Material material, vec3 w_o, vec3 mirror) {
     AtSources sum = AtSources(vec3(0.0), vec3(0.0));
     for (uint s = 0; s < source_count; ++s) {
         Source source = sources[s];
-        // Gauss and Legendre's points on a square of the source's variance; from afar, where a lobe is eight times wider, its middle.
-        int side = clearance(source, material, mirror) > 16.0 ? 1 : 3;
+        // Gauss and Legendre's points on a square of the source's variance; from afar, where a lobe is four times wider, its middle.
+        int side = clearance(source, material, mirror) > 8.0 ? 1 : 3;
+        float deviation = length(vec2(dot(source.axis[0].xyz, surface.frame[2]), dot(source.axis[1].xyz, surface.frame[2])));
         for (int i = 0; i < side * side; ++i) {
             ivec2 place = ivec2(i % side, i / side) - side / 2;
             vec2 at = sqrt(3.0 * 0.6) * vec2(place);
             vec2 weights = side == 1 ? vec2(1.0) : mix(vec2(4.0 / 9.0), vec2(2.5 / 9.0), notEqual(place, ivec2(0)));
             vec3 w_i = normalize((source.direction.xyz + at.x * source.axis[0].xyz + at.y * source.axis[1].xyz) * surface.frame);
-            if (w_i.z > 0.0) {
-                vec3 power = weights.x * weights.y * w_i.z * source.power.rgb;
+            vec2 above = risen(w_i.z, deviation / float(side));
+            if (above.x > 0.0) {
+                vec3 power = weights.x * weights.y * above.x * source.power.rgb;
+                w_i = normalize(vec3(w_i.xy, above.y));
                 sum.f_cos += power * brdf(material, w_i, w_o);
                 sum.cosine += power;
             }

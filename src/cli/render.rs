@@ -8,6 +8,7 @@ use clap::value_parser;
 use std::io::Write;
 use std::path::PathBuf;
 use threadlight::Error;
+use threadlight::evaluate::expected::prepare_within;
 use threadlight::evaluate::reference::{self, Processor, ReferenceImage, ReferenceSettings};
 use threadlight::method::Method;
 use threadlight::output::{self, Format};
@@ -22,6 +23,7 @@ Examples:
   threadlight render -o image.png                       the built-in scene
   threadlight render --material silver --environment sun --size 1280x960 -o silver.png
   threadlight render --mesh dragon.obj --material alumina-oxide.binary --environment lebombo.hdr -o dragon.exr
+  threadlight render --error 0.002 -o good.png          as few threads as that takes
   threadlight render scene.toml --repeat 20 --stats times.json
   threadlight render --method reference --tolerance 1e-3 -o truth.exr
   threadlight render --method reference --reference-on gpu -o truth.exr
@@ -33,6 +35,9 @@ Examples:
 pub struct Render {
     #[command(flatten)]
     scene: SceneFlags,
+    /// Takes as few threads as give an expected RMS of display values of at most X, instead of --threads.
+    #[arg(long, value_name = "X", conflicts_with = "threads", value_parser = number(f64::MIN_POSITIVE..=1.0, "a positive number up to 1"))]
+    error: Option<f64>,
     /// Method `reference` goes on until its estimated error of display values is below this: each pixel's on the
     /// CPU (default 2e-4), their RMS over the picture on the GPU (default 1e-3).
     #[arg(long, value_name = "X", value_parser = number(f64::MIN_POSITIVE..=1.0, "a positive number up to 1"))]
@@ -81,6 +86,9 @@ struct Stats<'a> {
     thread_cache: &'a str,
     device_memory_bytes: u64,
     validation_messages: usize,
+    /// Only with `--error`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    expected_rms: Option<f64>,
     /// Only for method `reference`.
     #[serde(flatten)]
     reference: Option<ReferenceStats>,
@@ -121,20 +129,30 @@ impl Render {
             ("--tolerance", self.tolerance.is_some() && !is_reference),
             ("--reference-on", self.reference_on.is_some() && !is_reference),
             ("--print-plan", self.print_plan && is_reference),
+            ("--error", self.error.is_some() && is_reference),
         ];
         if let Some((flag, _)) = useless.into_iter().find(|(_, useless)| *useless) {
             let problem = format!("is of no use to method \"{}\"", scene.shading.method);
             return Err(Error::input(flag, problem, "leave it out, or choose another --method").into());
         }
-        let progress = Progress::new("threads")?;
-        let prepared = prepare(&scene, cache.as_deref(), &progress)?;
-        progress.finish();
-
         let instance = Instance::new(self.machine.validate).map_err(Error::from)?;
         let messages = instance.messages();
         let device = Device::new(&instance, self.machine.device.as_deref()).map_err(Error::from)?;
         drop(instance);
         let device_name = device.description().name.clone();
+
+        let progress = Progress::new("threads")?;
+        let (prepared, expected_rms) = match self.error {
+            Some(most) => {
+                let (prepared, rms) = prepare_within(&scene, most, &device, cache.as_deref(), &progress)?;
+                (prepared, Some(rms))
+            }
+            None => (prepare(&scene, cache.as_deref(), &progress)?, None),
+        };
+        progress.finish();
+        if let Some(rms) = expected_rms {
+            eprintln!("{} threads or samples: expected RMS {rms:.1e}", prepared.sampling.count);
+        }
         let (rendering, reference) = if prepared.method == Method::Reference {
             progress.restart("reference");
             let processor = self.reference_on.unwrap_or_default();
@@ -172,6 +190,7 @@ impl Render {
                         header.more.push(number("tolerance", reference.tolerance));
                         header.more.push(number("error_estimate", reference.error_estimate));
                     }
+                    header.more.extend(expected_rms.map(|rms| ("expected_rms".to_owned(), rms.to_string())));
                     output::write_exr(path, view.width, view.height, &rendering.radiance, transparent, &header)?;
                 }
                 _ => output::write_png(path, view.width, view.height, &rendering.display, transparent)?,
@@ -179,7 +198,7 @@ impl Render {
         }
         let messages = messages.all();
         if let Some(path) = &self.stats {
-            let stats = Stats { reference, ..stats(&prepared, &rendering, &device_name, messages.len()) };
+            let stats = Stats { reference, expected_rms, ..stats(&prepared, &rendering, &device_name, messages.len()) };
             let text = serde_json::to_string_pretty(&stats).context("--stats")? + "\n";
             output::write_whole(path, text.as_bytes())?;
         }
@@ -215,6 +234,7 @@ fn stats<'a>(
         thread_cache: if prepared.thread_cache == CacheState::Hit { "hit" } else { "miss" },
         device_memory_bytes: rendering.device_memory_bytes,
         validation_messages,
+        expected_rms: None,
         reference: None,
     }
 }

@@ -72,6 +72,17 @@ impl Threads {
         let [rows, count] = threads.size();
         let how = if state == CacheState::Hit { "read from the cache" } else { "made" };
         eprintln!("{count} threads x {rows} rows {how} in {:.2} s", time.as_secs_f64());
+        if let threads::Threads::Fitted(table) = &threads {
+            let percent = |error: f32| 100.0 * error;
+            let [least, most] = [f32::min, f32::max].map(|of| table.relative_error.iter().copied().fold(f32::NAN, of));
+            let mean = table.mean_relative_error();
+            eprintln!(
+                "expected error: {:.2} % of radiance, under lights of all sizes ({:.2} to {:.2} % by row)",
+                percent(mean),
+                percent(least),
+                percent(most)
+            );
+        }
         if let Some(path) = &self.output {
             threads::write(&threads, path)?;
         }

@@ -145,8 +145,8 @@ pub fn compare(a: &Comparable, b: &Comparable, mask_background: bool) -> Result<
     };
     let flip = flip_map(&display_a, &display_b, width, height);
     Ok(Metrics {
-        rms: (display.sum_of_squares / (3 * pixels) as f64).sqrt(),
-        rms_linear: (linear.sum_of_squares / (3 * pixels) as f64).sqrt(),
+        rms: display.rms(pixels),
+        rms_linear: linear.rms(pixels),
         max: display.max,
         ssim,
         flip: mean(compared.iter().zip(&flip)).unwrap_or(0.0),
@@ -170,17 +170,22 @@ pub(super) fn compared_pixels(a: &Comparable, b: &Comparable, mask_background: b
 
 /// Of all channels.
 #[derive(Default)]
-struct Differences {
+pub(super) struct Differences {
     sum_of_squares: f64,
     max: f64,
 }
 
 impl Differences {
-    fn of(a: &[[f32; 3]], b: &[[f32; 3]]) -> Self {
+    pub(super) fn of(a: &[[f32; 3]], b: &[[f32; 3]]) -> Self {
         a.as_flattened().iter().zip(b.as_flattened()).fold(Self::default(), |sofar, (a, b)| {
             let difference = (f64::from(*a) - f64::from(*b)).abs();
             Self { sum_of_squares: sofar.sum_of_squares + difference * difference, max: sofar.max.max(difference) }
         })
+    }
+
+    /// Root of the mean square over the channels of so many pixels.
+    pub(super) fn rms(&self, pixels: u64) -> f64 {
+        (self.sum_of_squares / (3 * pixels) as f64).sqrt()
     }
 }
 

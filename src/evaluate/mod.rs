@@ -5,6 +5,7 @@
 //! | what the truth is | [`reference`](mod@reference) |
 //! | how much two pictures differ | [`metrics`], [`ssim`] |
 //! | where they differ | [`difference`] |
+//! | how much they will differ, and how many threads that takes | [`expected`] |
 //! | what is measured: materials, environments, scenes, methods, counts | [`cases`] |
 //! | error and time of all of these: tables 2 to 4, figures 10 to 12 | [`sweep`] |
 //! | time of a frame beside its floor, and as things double: table 1 | [`speed`] |
@@ -14,6 +15,7 @@
 
 pub mod cases;
 pub mod difference;
+pub mod expected;
 pub mod gallery;
 pub mod metrics;
 pub mod plots;

@@ -4,7 +4,8 @@ use std::sync::Arc;
 use image::RgbImage;
 use serde::{Deserialize, Serialize};
 
-use super::cases::{Cases, Place};
+use super::cases::{Cases, OnlyCancels, Place};
+use super::expected::TrueSample;
 use super::metrics::{Comparable, Metrics, compare};
 use super::reference_picture::ReferencePicture;
 use super::sheet::over_grey;
@@ -23,6 +24,8 @@ pub struct Sweep {
     pub repeat: u32,
     /// Count background pixels too. They are equal in all pictures, so that they only thin the error out.
     pub whole_picture: bool,
+    /// Estimate errors from a few hundred pixels, too: see [`TrueSample`].
+    pub expected: bool,
     /// Keep the pictures too, to look at.
     pub keep_pictures: bool,
 }
@@ -62,6 +65,9 @@ pub struct Row {
     pub frame_ms: f64,
     /// Lookups in the environment that shading made.
     pub lookups: u64,
+    /// What `rms` was expected to be, where that was asked for: see [`TrueSample::expected_rms`].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub expected_rms: Option<f64>,
 }
 
 /// All measurements.
@@ -106,6 +112,8 @@ pub fn run(
             measured.references.push((names, over_grey(&truth.radiance, width, height, display)));
         }
         let truth = comparable(&truth.radiance);
+        let sample = || TrueSample::new(place.prepared, device, sweep.cases.cache.as_deref(), &OnlyCancels(observer));
+        let sample = sweep.expected.then(sample).transpose()?;
         for estimator in sweep.cases.estimators() {
             if observer.cancelled() {
                 return Err(Error::Cancelled);
@@ -122,7 +130,8 @@ pub fn run(
             let rendering = renderer.render(wanted, sweep.repeat)?;
             let metrics = compare(&comparable(&rendering.radiance), &truth, !sweep.whole_picture)
                 .map_err(|error| error.within(format!("{} on {}", place.material, place.scene)))?;
-            measured.rows.push(row(place, &metrics, &rendering));
+            let expected_rms = sample.as_ref().map(|sample| sample.expected_rms(&rendering.radiance));
+            measured.rows.push(Row { expected_rms, ..row(place, &metrics, &rendering) });
             if sweep.keep_pictures {
                 measured.pictures.push(over_grey(&rendering.radiance, width, height, display));
             }
@@ -157,5 +166,6 @@ fn row(place: &Place, metrics: &Metrics, rendering: &Rendering) -> Row {
         gpu_ms: rendering.gpu_ms(),
         frame_ms: rendering.frame_ms,
         lookups: rendering.lookups,
+        expected_rms: None,
     }
 }

@@ -219,6 +219,7 @@ pub(super) mod tests {
                             gpu_ms: 0.5 + cost * f64::from(threads),
                             frame_ms: 1.0 + cost * f64::from(threads),
                             lookups: u64::from(threads) * 1000,
+                            expected_rms: None,
                         });
                     }
                 }

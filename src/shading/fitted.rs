@@ -89,13 +89,25 @@ pub(super) fn needs_subpixels(point: &Point) -> bool {
     share_of_brdf(point.lobe_width(), light.source_list, mirror, blur) < 1.0
 }
 
+/// Twin of `risen`.
+fn risen(z: f32, deviation: f32) -> [f32; 2] {
+    let half_side = (3.0_f32.sqrt() * deviation).max(1e-6);
+    if z >= half_side {
+        return [z, z + half_side * half_side / (3.0 * z)];
+    }
+    let above = (z + half_side).max(0.0);
+    [above * above / (4.0 * half_side), 2.0 / 3.0 * above]
+}
+
 /// Twin of `at_sources`: powers of all sources times f cos, and times cos.
 fn at_sources(point: &Point, sources: &[Source], w_o: Vec3, mirror: Vec3) -> (Vec3, Vec3) {
     let (mut f_cos, mut cosine) = (Vec3::ZERO, Vec3::ZERO);
     for source in sources {
         let away = source.direction.as_vec3().distance(mirror);
-        let from_afar = clearance(away, source.width_rad() as f32, point.lobe_width()) > 16.0;
+        let from_afar = clearance(away, source.width_rad() as f32, point.lobe_width()) > 8.0;
         let side = if from_afar { 1 } else { 3 };
+        let deviation = source.axes.map(|axis| axis.as_vec3().dot(point.surface.frame.z_axis));
+        let deviation = deviation[0].hypot(deviation[1]);
         for i in 0..side * side {
             let place = IVec2::new(i % side, i / side) - side / 2;
             let at = (3.0 * 0.6_f32).sqrt() * place.as_vec2();
@@ -107,8 +119,10 @@ fn at_sources(point: &Point, sources: &[Source], w_o: Vec3, mirror: Vec3) -> (Ve
             let [x, y] = source.axes.map(DVec3::as_vec3);
             let towards = source.direction.as_vec3() + at.x * x + at.y * y;
             let w_i = (point.surface.frame.transpose() * towards).normalize();
-            if w_i.z > 0.0 {
-                let power = weight(place.x) * weight(place.y) * w_i.z * source.power.as_vec3();
+            let [cos, middle] = risen(w_i.z, deviation / side as f32);
+            if cos > 0.0 {
+                let power = weight(place.x) * weight(place.y) * cos * source.power.as_vec3();
+                let w_i = w_i.with_z(middle).normalize();
                 f_cos += power * point.brdf(w_i, w_o);
                 cosine += power;
             }

@@ -27,6 +27,7 @@ The JSON is a list of rows with these fields, in this order:
   gpu_ms                                            time of the passes that make linear radiance
   frame_ms                                          from recording until the picture is read back
   lookups                                           lookups in the environment
+  expected_rms                                      only with --expected: what rms was expected to be
 
 The plots are SVG, log-log, a line a method: rms_over_threads.svg (the paper's figure 12) and rms_over_gpu_ms.svg, and
 where there are several materials, MATERIAL_rms_over_threads.svg and MATERIAL_rms_over_gpu_ms.svg.";
@@ -42,6 +43,9 @@ pub struct BenchError {
     /// Count background pixels too; they are equal in all pictures.
     #[arg(long)]
     whole_picture: bool,
+    /// Estimate the error of each picture from a few hundred pixels, too, as `threadlight render --error` does.
+    #[arg(long)]
+    expected: bool,
     /// Render this often; times are medians.
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = value_parser!(u32).range(1..))]
     repeat: u32,
@@ -59,7 +63,13 @@ impl BenchError {
             counts: &[1, 4, 16, 32, 64, 100, 512],
             size: None,
         })?;
-        let sweep = Sweep { cases, repeat: self.repeat, whole_picture: self.whole_picture, keep_pictures: false };
+        let sweep = Sweep {
+            cases,
+            repeat: self.repeat,
+            whole_picture: self.whole_picture,
+            expected: self.expected,
+            keep_pictures: false,
+        };
         let device = self.cases.open_device()?;
         let progress = Progress::of("bench error", "pictures")?;
         let mut measured = Measured::default();

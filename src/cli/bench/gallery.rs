@@ -70,6 +70,7 @@ impl BenchGallery {
             cases: Cases { materials: compared, ..materials.clone() },
             repeat: 3,
             whole_picture: false,
+            expected: false,
             keep_pictures: true,
         };
 

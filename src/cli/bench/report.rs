@@ -70,6 +70,7 @@ impl BenchReport {
             cases: if earlier.is_some() { only_first.clone() } else { cases.clone() },
             repeat: self.repeat,
             whole_picture: false,
+            expected: true,
             keep_pictures: true,
         };
         let speed = Speed { cases: only_first.clone(), threads: self.threads, repeat: self.repeat };

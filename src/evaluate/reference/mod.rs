@@ -171,9 +171,9 @@ pub fn reference(
 }
 
 /// A pixel that sees a surface.
-struct Texel {
+pub(super) struct Texel {
     /// Linear radiance times coverage, and coverage.
-    rgba: [f32; 4],
+    pub(super) rgba: [f32; 4],
     /// Sub-pixels that see a surface.
     points: usize,
     estimate: PixelEstimate,
@@ -231,7 +231,7 @@ impl Integrator<'_> {
     }
 
     /// The pixel in column `x` and row `y` of the picture of `geometry`; none where no surface is seen.
-    fn texel(
+    pub(super) fn texel(
         &self,
         view: &View,
         geometry: &[[u32; 2]],

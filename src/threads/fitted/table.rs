@@ -65,6 +65,17 @@ impl FittedTable {
         &self.kernels[row * self.count..][..self.count]
     }
 
+    /// Expected error relative to the radiance, RMS over rows as a sphere shows them: sin(theta_o) cos(theta_o) of its picture each.
+    pub fn mean_relative_error(&self) -> f32 {
+        let rows = self.relative_error.iter().enumerate().map(|(row, error)| {
+            let weight = (2.0 * crate::threads::theta_o(row, self.rows)).sin() as f32;
+            (weight, weight * error * error)
+        });
+        let (weights, squares) = rows.fold((0.0, 0.0), |(w, s), (weight, square)| (w + weight, s + square));
+        // A single row, seen along the normal, has no area.
+        if weights > 0.0 { (squares / weights).sqrt() } else { self.relative_error.first().copied().unwrap_or(0.0) }
+    }
+
     /// The level of the sharpest kernel.
     pub fn sharpest_level(&self) -> f32 {
         self.kernels.iter().map(|kernel| kernel.unpack().level).fold(f32::INFINITY, f32::min)

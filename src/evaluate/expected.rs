@@ -1,0 +1,148 @@
+//! The error that a picture is to be expected to have, from a few hundred of its pixels, and the fewest threads that stay within one.
+use std::path::Path;
+use std::sync::Arc;
+
+use rayon::prelude::*;
+
+use super::metrics::{Comparable, Differences, Display};
+use super::reference::{Integrator, TOLERANCE};
+use crate::error::{Error, Result};
+use crate::pipeline::{Renderer, Wanted, render_geometry};
+use crate::prepare::{Prepared, check_count, prepare, prepare_again};
+use crate::scene::Scene;
+use crate::threads::{MAX_COUNT, Observer};
+use crate::vulkan::Device;
+
+/// Pixels that are looked at. Errors gather in a part of a picture, at rims and highlights, say a tenth of it: 50 pixels
+/// of that give their mean square within a third, two standard deviations.
+const PIXELS: usize = 512;
+
+/// The truth at some of the pixels that see a surface, spread evenly over a picture.
+pub struct TrueSample {
+    /// Indices of the pixels, row by row.
+    pixels: Vec<usize>,
+    truth: Comparable,
+    display: Display,
+}
+
+impl TrueSample {
+    /// The reference at a few hundred pixels of `prepared`, whatever its method and threads; as `device` rasterises them.
+    ///
+    /// # Errors
+    /// Whatever Vulkan refuses, or cancelled.
+    pub fn new(
+        prepared: &Prepared,
+        device: &Arc<Device>,
+        cache: Option<&Path>,
+        observer: &dyn Observer,
+    ) -> Result<Self> {
+        let view = &prepared.view;
+        let geometry = render_geometry(device, cache, prepared)?;
+        let brdfs = prepared.materials.iter().map(|material| &material.brdf);
+        let integrator = Integrator::new(&prepared.environment, view.intensity, brdfs, view.subpixels);
+        let place = |pixel: usize| [pixel % view.width as usize, pixel / view.width as usize];
+        let is_covered = |pixel: &usize| {
+            let [x, y] = place(*pixel);
+            !integrator.points(view, &geometry, x, y).is_empty()
+        };
+        let covered: Vec<_> = (0..(view.width * view.height) as usize).filter(is_covered).collect();
+        let pixels = spread(&covered, PIXELS);
+        let radiance = |&pixel: &usize| {
+            let texel = integrator.texel(view, &geometry, place(pixel), TOLERANCE, observer)?;
+            Ok(texel.map_or([0.0; 4], |texel| texel.rgba))
+        };
+        let radiance = pixels.par_iter().map(radiance).collect::<Result<Vec<_>>>()?;
+        let display = Display { exposure: f64::from(view.exposure), gamma: f64::from(view.gamma) };
+        Ok(Self { truth: Comparable::from_radiance(pixels.len(), 1, &radiance, true, display), pixels, display })
+    }
+
+    /// The RMS of display values to be expected of a picture: that of the pixels that were looked at. 0 where no surface is seen.
+    /// `radiance` is as [`Rendering::radiance`](crate::pipeline::Rendering::radiance) has it, without the environment behind.
+    pub fn expected_rms(&self, radiance: &[[f32; 4]]) -> f64 {
+        let here: Vec<_> = self.pixels.iter().map(|&pixel| radiance[pixel]).collect();
+        let here = Comparable::from_radiance(here.len(), 1, &here, true, self.display);
+        Differences::of(&here.display, &self.truth.display).rms(self.pixels.len().max(1) as u64)
+    }
+}
+
+/// `count` of `all`, or all if there are no more: one of each of so many stretches of equal length, always the same.
+fn spread(all: &[usize], count: usize) -> Vec<usize> {
+    let count = count.min(all.len());
+    // Multiples of the golden ratio keep clear of whatever period the rows of a picture have.
+    let within = |i: usize| (i as f64 * 0.618_034).fract();
+    (0..count).map(|i| all[((i as f64 + within(i)) * all.len() as f64 / count as f64) as usize]).collect()
+}
+
+/// Prepares `scene` with the fewest threads (or samples) of 1, 2, 3, 4, 6, 8, 12, 16, ... by which the expected RMS of display values is
+/// at most `most`; with that RMS. `observer` hears of threads.
+///
+/// # Errors
+/// As for [`prepare`]; whatever Vulkan refuses; as many as there can be are not enough.
+pub fn prepare_within(
+    scene: &Scene,
+    most: f64,
+    device: &Arc<Device>,
+    cache: Option<&Path>,
+    observer: &dyn Observer,
+) -> Result<(Prepared, f64)> {
+    let mut scene = scene.clone();
+    let mut tried: Option<(Prepared, Renderer, f64)> = None;
+    let mut sample = None;
+    for count in counts() {
+        scene.shading.threads = Some(count);
+        let prepared = match &tried {
+            Some((before, ..)) if check_count(before.method, count, before.view.subpixels).is_err() => break,
+            Some((before, ..)) => prepare_again(&scene, Some(before), cache, observer)?,
+            None => prepare(&scene, cache, observer)?,
+        };
+        // Only surfaces are looked at.
+        let alone = Prepared { show_environment: false, ..prepared.clone() };
+        let renderer = match &tried {
+            Some((before, renderer, _)) => renderer.again(cache, before, &alone)?,
+            None => Renderer::new(device, cache, &alone)?,
+        };
+        let sample = match &sample {
+            Some(sample) => sample,
+            None => sample.insert(TrueSample::new(&alone, device, cache, observer)?),
+        };
+        let rendering = renderer.render(Wanted { radiance: true, ..Wanted::default() }, 1)?;
+        let rms = sample.expected_rms(&rendering.radiance);
+        tracing::info!("{count} threads or samples: expected RMS {rms:.2e}");
+        if rms <= most {
+            return Ok((prepared, rms));
+        }
+        tried = Some((alone, renderer, rms));
+    }
+    let (before, _, least) = tried.expect("one thread is never too many");
+    let Prepared { method, sampling, .. } = before;
+    let problem =
+        format!("{most:e} is not reached: {} threads or samples of \"{}\" have {least:.1e}", sampling.count, method.name());
+    Err(Error::input("--error", problem, "allow more, or use --method fitted, combined or reference"))
+}
+
+/// Powers of two and half as much again.
+fn counts() -> impl Iterator<Item = u32> {
+    let most = MAX_COUNT as u32;
+    std::iter::once(1).chain((1..=most.ilog2()).flat_map(|power| [1 << power, 3 << (power - 1)])).filter(move |count| *count <= most)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn counts_rise_to_the_most_that_there_are() {
+        let counts: Vec<_> = counts().collect();
+        assert_eq!(counts[..9], [1, 2, 3, 4, 6, 8, 12, 16, 24]);
+        assert!(counts.windows(2).all(|pair| pair[0] < pair[1]) && counts.last() == Some(&(MAX_COUNT as u32)));
+    }
+
+    #[test]
+    fn pixels_are_spread_over_all() {
+        let all: Vec<_> = (0..1000).map(|i| 3 * i).collect();
+        assert_eq!(spread(&all[..7], 10), all[..7]);
+        assert_eq!(spread(&[], 10), []);
+        let some = spread(&all, 100);
+        assert!(some.iter().enumerate().all(|(i, pixel)| (30 * i..30 * (i + 1)).contains(pixel)), "{some:?}");
+    }
+}
