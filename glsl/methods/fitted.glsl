@@ -67,10 +67,10 @@ vec3 mirrored(Surface surface, vec3 w_o) {
     return surface.frame * vec3(-w_o.x, -w_o.y, w_o.z);
 }
 
-// A sun that is mirrored within a pixel is too small and too bright for a blur to tell what is seen of it.
+// A sun that is mirrored within a pixel, or so near that its highlight bends within it, is too bright for a sum at one normal.
 bool needs_subpixels(Surface surface, Material material) {
-    // Normals mirrored turn twice as far.
-    float blur = 2.0 * sqrt(surface.normal_variance);
+    // Normals mirrored turn twice as far; three standard deviations of that.
+    float blur = 3.0 * 2.0 * sqrt(surface.normal_variance);
     return share_of_brdf(material, mirrored(surface, view_direction(surface)), blur) < 1.0;
 }
 
