@@ -115,15 +115,20 @@ pub fn prepare_within(
     }
     let (before, _, least) = tried.expect("one thread is never too many");
     let Prepared { method, sampling, .. } = before;
-    let problem =
-        format!("{most:e} is not reached: {} threads or samples of \"{}\" have {least:.1e}", sampling.count, method.name());
+    let problem = format!(
+        "{most:e} is not reached: {} threads or samples of \"{}\" have {least:.1e}",
+        sampling.count,
+        method.name()
+    );
     Err(Error::input("--error", problem, "allow more, or use --method fitted, combined or reference"))
 }
 
 /// Powers of two and half as much again.
 fn counts() -> impl Iterator<Item = u32> {
     let most = MAX_COUNT as u32;
-    std::iter::once(1).chain((1..=most.ilog2()).flat_map(|power| [1 << power, 3 << (power - 1)])).filter(move |count| *count <= most)
+    std::iter::once(1)
+        .chain((1..=most.ilog2()).flat_map(|power| [1 << power, 3 << (power - 1)]))
+        .filter(move |count| *count <= most)
 }
 
 #[cfg(test)]
@@ -141,7 +146,7 @@ mod tests {
     fn pixels_are_spread_over_all() {
         let all: Vec<_> = (0..1000).map(|i| 3 * i).collect();
         assert_eq!(spread(&all[..7], 10), all[..7]);
-        assert_eq!(spread(&[], 10), []);
+        assert!(spread(&[], 10).is_empty());
         let some = spread(&all, 100);
         assert!(some.iter().enumerate().all(|(i, pixel)| (30 * i..30 * (i + 1)).contains(pixel)), "{some:?}");
     }

@@ -69,8 +69,17 @@ struct Curve {
     points: Vec<(f64, f64)>,
     /// Which colour and marker.
     style: usize,
-    /// Drawn dashed and without markers: a bound rather than a measurement of the method.
-    dashed: bool,
+    drawn: Drawn,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Drawn {
+    /// A line with markers.
+    Line,
+    /// Dashed and without markers: a bound rather than a measurement of the method.
+    Dashed,
+    /// Markers alone.
+    Points,
 }
 
 /// RMS over the number of threads, `rms_over_threads`, and over time on the GPU, `rms_over_gpu_ms`: a line a method, means over
@@ -107,6 +116,40 @@ pub fn error_charts(rows: &[Row]) -> Vec<Chart> {
     charts
 }
 
+/// The RMS that was expected of each row over what it is, `expected_over_measured`, with the bounds of a factor of 2; none where nothing
+/// was expected.
+pub fn expectation_chart(rows: &[Row]) -> Option<Chart> {
+    let points = |method: &String| -> Vec<(f64, f64)> {
+        let here = rows.iter().filter(|row| row.method == *method);
+        here.filter_map(|row| row.expected_rms.map(|expected| (row.rms, expected))).collect()
+    };
+    let methods = in_order(rows.iter().filter(|row| row.expected_rms.is_some()).map(|row| &row.method));
+    let of_method = |(style, method): (usize, &String)| Curve {
+        name: method.clone(),
+        points: points(method),
+        style,
+        drawn: Drawn::Points,
+    };
+    let mut curves: Vec<_> = methods.into_iter().enumerate().map(of_method).collect();
+    let measured = || curves.iter().flat_map(|curve| &curve.points).map(|point| point.0).filter(|rms| *rms > 0.0);
+    let ends = [measured().fold(f64::INFINITY, f64::min), measured().fold(0.0, f64::max)];
+    if ends[1] == 0.0 {
+        return None;
+    }
+    for (name, factor) in [("twice", 2.0), ("equal", 1.0), ("half", 0.5)] {
+        let points = ends.map(|rms| (rms, factor * rms)).to_vec();
+        curves.push(Curve { name: name.to_owned(), points, style: GREY, drawn: Drawn::Dashed });
+    }
+    let axis = |label: &str| Axis { label: label.to_owned(), ticks: Vec::new() };
+    Some(Chart {
+        name: "expected_over_measured".to_owned(),
+        title: "RMS of display values, expected from some pixels and measured over all".to_owned(),
+        x: axis("measured"),
+        y: axis("expected"),
+        curves,
+    })
+}
+
 /// Mean RMS over mean `x` of each method, a point for each count.
 fn error_curves(rows: &[&Row], x: fn(&Row) -> f64) -> Vec<Curve> {
     let curve = |(style, method): (usize, &String)| {
@@ -119,7 +162,7 @@ fn error_curves(rows: &[&Row], x: fn(&Row) -> f64) -> Vec<Curve> {
             (mean_of(x), mean_of(|row| row.rms))
         };
         let points = counts(rows.iter().map(|row| row.threads)).into_iter().map(point).collect();
-        Curve { name: method.clone(), points, style, dashed: false }
+        Curve { name: method.clone(), points, style, drawn: Drawn::Line }
     };
     in_order(rows.iter().map(|row| &row.method)).into_iter().enumerate().map(curve).collect()
 }
@@ -138,8 +181,8 @@ pub fn speed_charts(timings: &Timings) -> Vec<Chart> {
             counts(frames.iter().map(|frame| frame.threads)).into_iter().map(point).collect()
         };
         let (all, floor) = (points(|frame| frame.gpu_ms), points(|frame| frame.floor_ms));
-        curves.push(Curve { name: method.clone(), points: all, style, dashed: false });
-        curves.push(Curve { name: format!("{method}, floor"), points: floor, style, dashed: true });
+        curves.push(Curve { name: method.clone(), points: all, style, drawn: Drawn::Line });
+        curves.push(Curve { name: format!("{method}, floor"), points: floor, style, drawn: Drawn::Dashed });
     }
     let mut charts = vec![Chart {
         name: "frame_over_threads".to_owned(),
@@ -177,11 +220,12 @@ fn growth_curves(growths: &[&Growth]) -> Vec<Curve> {
         };
         let first = quantities[0];
         let point = |&quantity: &u64| (quantity as f64 / first as f64, ms(quantity) / ms(first));
-        curves.push(Curve { name: what.clone(), points: quantities.iter().map(point).collect(), style, dashed: false });
+        let points = quantities.iter().map(point).collect();
+        curves.push(Curve { name: what.clone(), points, style, drawn: Drawn::Line });
     }
     let last = curves.iter().flat_map(|curve| &curve.points).map(|point| point.0).fold(1.0, f64::max);
     let points = vec![(1.0, 1.0), (last, last)];
-    curves.push(Curve { name: "in proportion".to_owned(), points, style: GREY, dashed: true });
+    curves.push(Curve { name: "in proportion".to_owned(), points, style: GREY, drawn: Drawn::Dashed });
     curves
 }
 
@@ -262,14 +306,16 @@ impl Chart {
             let points = drawn(curve);
             let legend_y = 60 + 26 * index as i32;
             let legend_line = [(4, legend_y), (36, legend_y)];
-            if curve.dashed {
+            if curve.drawn == Drawn::Dashed {
                 chart.draw_series(DashedLineSeries::new(points, 6, 5, line))?;
                 legend.draw(&plotters::element::DashedPathElement::new(legend_line, 6, 5, line))?;
             } else {
-                chart.draw_series(LineSeries::new(points.iter().copied(), line))?;
+                if curve.drawn == Drawn::Line {
+                    chart.draw_series(LineSeries::new(points.iter().copied(), line))?;
+                    legend.draw(&PathElement::new(legend_line, line))?;
+                }
                 let at = |point| EmptyElement::at(point) + Polygon::new(marker.clone(), colour.filled());
                 chart.draw_series(points.iter().map(|point| at(*point)))?;
-                legend.draw(&PathElement::new(legend_line, line))?;
                 legend.draw(&(EmptyElement::at((20, legend_y)) + Polygon::new(marker.clone(), colour.filled())))?;
             }
             let style = font(16).pos(Pos::new(HPos::Left, VPos::Center));
@@ -391,7 +437,7 @@ mod tests {
             Timings { frames: vec![frame(16), frame(64)], growths: vec![growth(10, None), growth(20, Some(2.0))] };
         let charts = speed_charts(&timings);
         assert_eq!(charts[0].curves[1].points, [(16.0, 8.0), (64.0, 32.0)]);
-        assert!(charts[0].curves[1].dashed && charts[0].curves[1].style == charts[0].curves[0].style);
+        assert!(charts[0].curves[1].drawn == Drawn::Dashed && charts[0].curves[1].style == charts[0].curves[0].style);
         assert_eq!(charts[1].curves[0].points, [(1.0, 1.0), (2.0, 2.0)]);
         assert!(charts.iter().all(|chart| chart.svg().is_ok()));
         assert!(speed_charts(&Timings::default()).iter().all(|chart| chart.svg().is_ok()));

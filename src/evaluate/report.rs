@@ -8,7 +8,7 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::Row;
 use super::gallery::Named;
-use super::plots::{Chart, error_charts, speed_charts};
+use super::plots::{Chart, error_charts, expectation_chart, speed_charts};
 use super::speed::Timings;
 use super::tables::{Section, error_tables, frame_tables, growth_tables, in_order};
 use crate::error::{Error, Result};
@@ -66,6 +66,7 @@ impl Report {
             self.comparisons.iter().map(|(name, picture)| figure(picture, name)).collect::<Result<Vec<_>>>()?;
         let speed = charts(&speed_charts(&self.timings))?;
         let errors = charts(&error_charts(&self.rows))?;
+        let expectation = charts(expectation_chart(&self.rows).as_slice())?;
         let page = html! {
             (DOCTYPE)
             html lang="en" {
@@ -104,6 +105,14 @@ impl Report {
                         (sections(&error_tables(&self.rows)))
                         h2 { "Error over samples and over time (figure 12)" }
                         @for chart in &errors { (chart) }
+                        @for chart in &expectation {
+                            h2 { "Error expected and measured" }
+                            p {
+                                "What " code { "render --error" } " goes by: the RMS at 512 pixels at most, where the reference is \
+                                 computed, against that over the whole picture."
+                            }
+                            (chart)
+                        }
                     }
                     @if !comparisons.is_empty() {
                         h2 { "Methods by number of samples (figures 10 and 11)" }

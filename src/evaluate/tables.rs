@@ -5,6 +5,7 @@ use std::fmt;
 
 use super::Row;
 use super::speed::{Frame, Timings};
+use crate::method::Method;
 
 /// Tables under one heading.
 #[derive(Clone, Debug, PartialEq)]
@@ -57,7 +58,7 @@ pub fn text(sections: &[Section]) -> String {
 /// Tables for each material where there are several (the paper's tables 2 and 3), and over all of them (table 4).
 ///
 /// Each has the mean RMS and SSIM over its environments and scenes; the last also FLIP, the largest RMS of any material,
-/// environment and scene, and the mean time on the GPU.
+/// environment and scene, the mean time on the GPU, that of other methods at the error of fitted threads, and how good expectations were.
 pub fn error_tables(rows: &[Row]) -> Vec<Section> {
     let materials = in_order(rows.iter().map(|row| &row.material));
     let places = in_order(rows.iter().map(|row| (&row.environment, &row.scene))).len();
@@ -82,6 +83,8 @@ pub fn error_tables(rows: &[Row]) -> Vec<Section> {
     tables.push(error_table("FLIP", &rows, mean, |row| row.flip, 5));
     tables.push(error_table("RMS, worst", &rows, largest, |row| row.rms, 5));
     tables.push(error_table("GPU ms", &rows, mean, |row| row.gpu_ms, 3));
+    tables.extend(equal_error_table(&rows));
+    tables.extend(expectation_table(&rows));
     sections.push(Section { title: format!("{title}{over_places}"), tables });
     sections
 }
@@ -106,6 +109,66 @@ fn error_table(
         head: counts.iter().map(u32::to_string).collect(),
         rows: in_order(rows.iter().map(|row| &row.method)).into_iter().map(row).collect(),
     }
+}
+
+/// How many times as long as fitted threads the other methods take for the same error: a column for each count of fitted threads, in
+/// which time and RMS are means over all rows. Between the counts of a method, time is a power of the error. A method that is still
+/// worse at the highest of its counts takes longer (`>`) than that does; one that is better with its lowest, less (`<`).
+fn equal_error_table(rows: &[&Row]) -> Option<Table> {
+    let curve = |method: &str| -> Vec<(u32, f64, f64)> {
+        let of_method: Vec<_> = rows.iter().filter(|row| row.method == method).collect();
+        let counts: BTreeSet<u32> = of_method.iter().map(|row| row.threads).collect();
+        let point = |count| {
+            let mean_of = |value: fn(&Row) -> f64| {
+                let here = of_method.iter().filter(|row| row.threads == count);
+                mean(&here.map(|row| value(row)).collect::<Vec<_>>())
+            };
+            (count, mean_of(|row| row.rms), mean_of(|row| row.gpu_ms))
+        };
+        counts.into_iter().map(point).collect()
+    };
+    let fitted = curve(Method::Fitted.name());
+    let others =
+        in_order(rows.iter().map(|row| &row.method)).into_iter().filter(|name| **name != Method::Fitted.name());
+    let row = |method: &String| {
+        let curve = curve(method);
+        let cell = |&(_, rms, ms): &(u32, f64, f64)| {
+            let (bound, time) = time_at(&curve, rms);
+            format!("{bound}{:.1}", time / ms)
+        };
+        (method.clone(), fitted.iter().map(cell).collect())
+    };
+    let table = Table {
+        title: "time, same RMS".to_owned(),
+        head: fitted.iter().map(|(count, ..)| count.to_string()).collect(),
+        rows: others.map(row).collect(),
+    };
+    (!table.head.is_empty() && !table.rows.is_empty()).then_some(table)
+}
+
+/// The time at which `curve`, of counts, errors and times, comes down to `rms`; or a bound of it.
+fn time_at(curve: &[(u32, f64, f64)], rms: f64) -> (&'static str, f64) {
+    match curve.iter().position(|&(_, error, _)| error <= rms) {
+        None => (">", curve.last().map_or(f64::NAN, |&(.., ms)| ms)),
+        Some(0) => ("<", curve[0].2),
+        Some(i) => {
+            let ((_, error_0, ms_0), (_, error_1, ms_1)) = (curve[i - 1], curve[i]);
+            let t = (error_0 / rms).ln() / (error_0 / error_1).ln();
+            ("", ms_0 * (ms_1 / ms_0).powf(t))
+        }
+    }
+}
+
+/// The part of the pictures, in percent, whose RMS is within a factor of 2 of what was expected of it; none where nothing was.
+fn expectation_table(rows: &[&Row]) -> Option<Table> {
+    let expected: Vec<&Row> = rows.iter().copied().filter(|row| row.expected_rms.is_some()).collect();
+    let within = |row: &Row| {
+        let ratio = row.expected_rms.map_or(f64::NAN, |expected| expected / row.rms);
+        // A picture without error, of which none was expected.
+        let both_none = row.rms == 0.0 && row.expected_rms == Some(0.0);
+        if both_none || (0.5..=2.0).contains(&ratio) { 100.0 } else { 0.0 }
+    };
+    (!expected.is_empty()).then(|| error_table("expected, %", &expected, mean, within, 1))
 }
 
 /// The paper's table 1 for each method in each place, with the floor: times in milliseconds.
@@ -258,6 +321,48 @@ mean of 2 materials, mean over 2 lights and scenes
   uniform            0.570     1.620     7.500
 ";
         assert!(text.ends_with(expected), "{text}");
+    }
+
+    #[test]
+    fn times_are_compared_at_equal_error() {
+        let row = |method: &str, threads: u32, rms: f64, gpu_ms: f64| Row {
+            method: method.into(),
+            threads,
+            rms,
+            gpu_ms,
+            ..rows()[0].clone()
+        };
+        let rows = [
+            row("fitted", 1, 0.2, 1.0),
+            row("fitted", 4, 0.02, 2.0),
+            row("fitted", 16, 0.0001, 4.0),
+            row("paper", 1, 0.1, 3.0),
+            row("paper", 100, 0.01, 300.0),
+        ];
+        let text = text(&error_tables(&rows));
+        // Between its counts: 3 * 100^log10(0.1 / 0.02) = 75 ms, against 2.
+        assert!(
+            text.contains(
+                "time, same RMS         1         4        16\n  paper               <3.0      37.5     >75.0\n"
+            ),
+            "{text}"
+        );
+        assert!(!text.contains("expected"), "{text}");
+    }
+
+    #[test]
+    fn expectations_are_good_within_a_factor_of_two() {
+        let mut rows = rows();
+        for (i, row) in rows.iter_mut().enumerate() {
+            row.expected_rms = Some(row.rms * if i % 24 < 6 { 2.1 } else { 0.6 });
+        }
+        let text = text(&error_tables(&rows));
+        assert!(
+            text.contains(
+                "expected, %            1        16       100\n  paper               75.0      75.0      75.0\n"
+            ),
+            "{text}"
+        );
     }
 
     #[test]

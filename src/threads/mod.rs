@@ -175,7 +175,7 @@ pub struct Settings {
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { kind: Kind::Paper, count: 100, rows: 90, seed: 0 }
+        Self { kind: Kind::default(), count: Kind::default().default_count(), rows: 90, seed: 0 }
     }
 }
 

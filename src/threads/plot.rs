@@ -131,13 +131,16 @@ fn draw<'a>(threads: &Threads, view: &View, canvas: &Canvas<'a>) -> Result<(), B
 mod tests {
     use super::*;
     use crate::brdf::Brdf;
-    use crate::threads::{Settings, generate};
+    use crate::threads::{Kind, Settings, generate};
 
     #[test]
     fn a_picture_of_both_views_is_written_whole_or_not_at_all() {
-        let table =
-            generate(&Brdf::builtin("gold").unwrap(), &Settings { count: 3, rows: 6, ..Settings::default() }, &())
-                .unwrap();
+        let table = generate(
+            &Brdf::builtin("gold").unwrap(),
+            &Settings { kind: Kind::Paper, count: 3, rows: 6, ..Settings::default() },
+            &(),
+        )
+        .unwrap();
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("threads.png");
         plot(&table, &path).unwrap();

@@ -19,7 +19,8 @@ Examples:
 
 Each picture is compared with the reference picture of its material, environment and scene, over the pixels that see a
 surface. Tables are printed: mean RMS and SSIM for each material (the paper's tables 2 and 3), and over all of them
-(table 4) with FLIP, the worst RMS and the time on the GPU.
+(table 4) with FLIP, the worst RMS, the time on the GPU and, where fitted threads were measured, how many times as long as they the
+other methods take for the same RMS.
 
 The JSON is a list of rows with these fields, in this order:
   method, threads, material, environment, scene     what was measured
@@ -30,7 +31,8 @@ The JSON is a list of rows with these fields, in this order:
   expected_rms                                      only with --expected: what rms was expected to be
 
 The plots are SVG, log-log, a line a method: rms_over_threads.svg (the paper's figure 12) and rms_over_gpu_ms.svg, and
-where there are several materials, MATERIAL_rms_over_threads.svg and MATERIAL_rms_over_gpu_ms.svg.";
+where there are several materials, MATERIAL_rms_over_threads.svg and MATERIAL_rms_over_gpu_ms.svg; with --expected, also
+expected_over_measured.svg.";
 
 /// Measures RMS, SSIM, FLIP and time on the GPU against the reference. Lists are separated by commas.
 #[derive(clap::Args)]
@@ -88,7 +90,8 @@ impl BenchError {
         writeln!(out, "The reference is within {reference_error:.1e} by its own estimate.")?;
         self.output.write_json(rows)?;
         if let Some(folder) = &self.output.plot {
-            plots::write(&plots::error_charts(rows), folder)?;
+            let expectations = plots::expectation_chart(rows);
+            plots::write(&plots::error_charts(rows).into_iter().chain(expectations).collect::<Vec<_>>(), folder)?;
         }
         Ok(())
     }

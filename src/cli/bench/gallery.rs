@@ -15,7 +15,7 @@ use threadlight::threads::MAX_COUNT;
 use threadlight::{Error, Result};
 
 const EXAMPLES: &str = "\
-Without --materials, all built-in ones are shown; without --methods, paper, importance and filtered; without --counts,
+Without --materials, all built-in ones are shown; without --methods, fitted, paper, importance and filtered; without --counts,
 1,4,16,64,100; without --size, pictures are 160x120; without --reference-tolerance, it is 1e-3.
 
 Examples:
@@ -59,7 +59,7 @@ impl BenchGallery {
         self.output.check()?;
         let materials = self.cases.cases(&Defaults {
             materials: Brdf::builtin_names().collect(),
-            methods: vec![Method::Paper, Method::Importance, Method::Filtered],
+            methods: vec![Method::Fitted, Method::Paper, Method::Importance, Method::Filtered],
             counts: &[1, 4, 16, 64, 100],
             size: Some((160, 120)),
         })?;

@@ -17,8 +17,8 @@ use threadlight::vulkan::Device;
 use threadlight::{Error, Result};
 
 const EXAMPLES: &str = "\
-Without --materials, gold and red-plastic are measured; without --methods, paper, importance and filtered; without --counts,
-1,4,16,64; without --size, pictures are 160x120; without --reference-tolerance, it is 1e-3.
+Without --materials, gold and red-plastic are measured; without --methods, fitted, paper, importance and filtered; without
+--counts, 1,4,16,64; without --size, pictures are 160x120; without --reference-tolerance, it is 1e-3.
 
 Examples:
   threadlight bench report report
@@ -61,7 +61,7 @@ impl BenchReport {
         let earlier = self.from.as_deref().map(read_rows).transpose()?;
         let cases = self.cases.cases(&Defaults {
             materials: vec!["gold", "red-plastic"],
-            methods: vec![Method::Paper, Method::Importance, Method::Filtered],
+            methods: vec![Method::Fitted, Method::Paper, Method::Importance, Method::Filtered],
             counts: &[1, 4, 16, 64],
             size: Some((160, 120)),
         })?;
@@ -75,8 +75,10 @@ impl BenchReport {
         };
         let speed = Speed { cases: only_first.clone(), threads: self.threads, repeat: self.repeat };
         let shown = Cases { materials: with_builtin(&cases.materials), ..only_first };
-        let highest = cases.counts.iter().copied().max().unwrap_or(self.threads);
-        let estimator = Estimator { method: cases.methods[0], count: highest };
+        let method = cases.methods[0];
+        let of_method = cases.estimators().into_iter().filter(|estimator| estimator.method == method);
+        let highest = of_method.map(|estimator| estimator.count).max().unwrap_or(method.default_count());
+        let estimator = Estimator { method, count: highest };
 
         let device = self.cases.open_device()?;
         let progress = Progress::of("errors", "done")?;

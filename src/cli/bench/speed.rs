@@ -10,7 +10,7 @@ use threadlight::method::Method;
 use threadlight::threads::MAX_COUNT;
 
 const EXAMPLES: &str = "\
-Without --materials, gold is measured; without --methods, paper; without --counts, 16,32,64,100,200,512; without --size,
+Without --materials, gold is measured; without --methods, fitted and paper; without --counts, 16,32,64,100,200,512; without --size,
 pictures have the scene's size.
 
 Examples:
@@ -59,7 +59,7 @@ impl BenchSpeed {
         self.output.check()?;
         let cases = self.cases.cases(&Defaults {
             materials: vec!["gold"],
-            methods: vec![Method::Paper],
+            methods: vec![Method::Fitted, Method::Paper],
             counts: &[16, 32, 64, 100, 200, 512],
             size: None,
         })?;
