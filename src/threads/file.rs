@@ -5,7 +5,7 @@
 //! | bytes | content |
 //! |---|---|
 //! | 8 | magic `THREADS\0` |
-//! | 4 | u32 format version, now 4 |
+//! | 4 | u32 format version, now 5 |
 //! | 4 | u32 length H of the header |
 //! | H | header, JSON: `method` ("fitted" or "paper"), `material`, `count`, `rows`, `seed` |
 //! | ... | the rows, then the threads, see below |
@@ -24,7 +24,6 @@
 //! by which von Mises-Fisher kernel the environment is to be blurred: of width 2^level / 256 radians if it is whole, by none at
 //! level -1, and otherwise by the linear blend of the two kernels of whole levels beside it.
 use std::f32::consts::FRAC_PI_2;
-use std::io::Write;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
@@ -33,6 +32,7 @@ use super::fitted::kernel::{SHARPEST_LEVEL, WIDEST_LEVEL};
 use super::fitted::{FittedTable, PackedKernel, UnpackedKernel};
 use super::{Kind, Sample, ThreadTable, Threads};
 use crate::error::{Error, Result};
+use crate::output::write_whole;
 
 /// Version of the file format and of the threads in it: to be raised when either changes, since caches depend on it.
 pub const FORMAT_VERSION: u32 = 5;
@@ -51,12 +51,7 @@ struct Header {
 
 /// Writes `threads` to `path`, whole or not at all.
 pub fn write(threads: &Threads, path: &Path) -> Result<()> {
-    let unwritable = |cause: std::io::Error| Error::unwritable(path, cause);
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut file = tempfile::NamedTempFile::new_in(folder).map_err(unwritable)?;
-    file.write_all(&encode(threads)).map_err(unwritable)?;
-    file.persist(path).map_err(|error| unwritable(error.error))?;
-    Ok(())
+    write_whole(path, &encode(threads))
 }
 
 /// Reads threads back. Errors: unreadable, not a thread file, of another version, damaged.

@@ -7,6 +7,7 @@ use plotters::prelude::*;
 
 use super::{Threads, theta_o};
 use crate::error::{Error, Result};
+use crate::output::write_whole;
 
 /// Each view is a square of this side.
 const VIEW_PX: u32 = 900;
@@ -66,13 +67,9 @@ pub fn plot(threads: &Threads, path: &Path) -> Result<()> {
     let filter = image::imageops::FilterType::Triangle;
     let small = image::imageops::resize(&large, size.0 / OVERSAMPLING, size.1 / OVERSAMPLING, filter);
 
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut file = tempfile::NamedTempFile::new_in(folder).map_err(|cause| unwritable(cause.to_string()))?;
-    small
-        .write_to(&mut std::io::BufWriter::new(file.as_file_mut()), image::ImageFormat::Png)
-        .map_err(|cause| unwritable(cause.to_string()))?;
-    file.persist(path).map_err(|error| unwritable(error.error.to_string()))?;
-    Ok(())
+    let mut png = std::io::Cursor::new(Vec::new());
+    small.write_to(&mut png, image::ImageFormat::Png).map_err(|error| unwritable(error.to_string()))?;
+    write_whole(path, &png.into_inner())
 }
 
 type Canvas<'a> = DrawingArea<BitMapBackend<'a>, plotters::coord::Shift>;
