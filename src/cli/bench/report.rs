@@ -40,9 +40,9 @@ pub struct BenchReport {
     /// Folder for report.html; made if it is not there.
     #[arg(value_name = "DIR")]
     folder: PathBuf,
-    /// Errors as `bench error --json` wrote them, in place of measuring them.
-    #[arg(long, value_name = "FILE")]
-    from: Option<PathBuf>,
+    /// Errors as `bench error --json` wrote them, all of several files, in place of measuring them.
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    from: Vec<PathBuf>,
     #[command(flatten)]
     cases: CasesArguments,
     /// Threads or samples while other things double, 1 to 1024.
@@ -58,7 +58,7 @@ pub struct BenchReport {
 impl BenchReport {
     pub fn run(self) -> anyhow::Result<()> {
         check_folder(&self.folder)?;
-        let earlier = self.from.as_deref().map(read_rows).transpose()?;
+        let earlier = self.from.iter().map(|path| read_rows(path)).collect::<Result<Vec<_>>>()?.concat();
         let cases = self.cases.cases(&Defaults {
             materials: vec!["gold", "red-plastic"],
             methods: vec![Method::Fitted, Method::Paper, Method::Importance, Method::Filtered],
@@ -67,7 +67,7 @@ impl BenchReport {
         })?;
         let only_first = first_place(&cases);
         let sweep = Sweep {
-            cases: if earlier.is_some() { only_first.clone() } else { cases.clone() },
+            cases: if earlier.is_empty() { cases.clone() } else { only_first.clone() },
             repeat: self.repeat,
             whole_picture: false,
             expected: true,
@@ -96,8 +96,8 @@ impl BenchReport {
         let captions = measured.references.iter().map(|(place, _)| place.join(", "));
         let pictures = gallery::comparison_sheets(&measured).into_iter().map(|(_, picture)| picture);
         report.comparisons = captions.zip(pictures).collect();
-        report.reference_error = earlier.is_none().then_some(measured.reference_error);
-        report.rows = earlier.unwrap_or(measured.rows);
+        report.reference_error = earlier.is_empty().then_some(measured.reference_error);
+        report.rows = if earlier.is_empty() { measured.rows } else { earlier };
 
         let html = report.html()?;
         std::fs::create_dir_all(&self.folder).map_err(|cause| Error::unwritable(&self.folder, cause))?;
