@@ -78,6 +78,8 @@ fn numbers_out_of_range_name_the_flag_and_the_range() {
         ("--rotation", "inf", "finite"),
         ("--seed", "-1", "--seed"),
         ("--repeat", "0", "0 is not in 1"),
+        ("--error", "0", "positive"),
+        ("--error", "nan", "positive"),
         ("--tolerance", "0", "positive"),
         ("--tolerance", "nan", "positive"),
     ] {
@@ -111,6 +113,8 @@ fn unknown_names_are_told_with_the_known_ones() {
     refuses(&folder, &render("--mesh cube"), &["cube", "sphere", ".obj"]);
     refuses(&folder, &render("--method magic"), &["magic", "paper"]);
     refuses(&folder, &render("--tolerance 1e-3"), &["--tolerance", "fitted"]);
+    refuses(&folder, &render("--error 0.1"), &["--error", "--threads"]);
+    refuses(&folder, "render --error 0.1 --method reference -o out/image.png", &["--error", "reference"]);
     refuses(&folder, &render("--reference-on gpu"), &["--reference-on", "fitted"]);
     refuses(&folder, &render("--method reference --reference-on tpu"), &["--reference-on", "tpu", "cpu, gpu"]);
     refuses(&folder, &render("--method reference --print-plan"), &["--print-plan", "reference"]);

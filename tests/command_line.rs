@@ -478,6 +478,7 @@ fn every_subcommand_has_help() {
         "--environment",
         "--method",
         "--tolerance",
+        "--error",
         "--reference-on",
         "--threads",
         "--subpixels",

@@ -67,11 +67,13 @@ vec3 mirrored(Surface surface, vec3 w_o) {
     return surface.frame * vec3(-w_o.x, -w_o.y, w_o.z);
 }
 
-// A sun that is mirrored within a pixel, or so near that its highlight bends within it, is too bright for a sum at one normal.
+// A sum at one normal does not do where normals vary more than half vectors within the lobe: what sub-pixels mirror there is not one
+// blur. Nor where a sun is mirrored within the pixel, or so near that its highlight bends within it.
 bool needs_subpixels(Surface surface, Material material) {
+    float deviation = sqrt(surface.normal_variance);
     // Normals mirrored turn twice as far; three standard deviations of that.
-    float blur = 3.0 * 2.0 * sqrt(surface.normal_variance);
-    return share_of_brdf(material, mirrored(surface, view_direction(surface)), blur) < 1.0;
+    return deviation > material.lobe_width
+        || share_of_brdf(material, mirrored(surface, view_direction(surface)), 3.0 * 2.0 * deviation) < 1.0;
 }
 
 // Powers of all sources times what is to be integrated over them.

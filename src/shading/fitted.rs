@@ -84,9 +84,10 @@ fn mirrored(surface: &Surface, w_o: Vec3) -> Vec3 {
 /// Twin of `needs_subpixels`.
 pub(super) fn needs_subpixels(point: &Point) -> bool {
     let Some(light) = &point.twin.blurred else { return false };
-    let blur = 3.0 * 2.0 * point.surface.normal_variance.sqrt();
+    let deviation = point.surface.normal_variance.sqrt();
     let mirror = mirrored(&point.surface, point.surface.view_direction());
-    share_of_brdf(point.lobe_width(), light.source_list, mirror, blur) < 1.0
+    deviation > point.lobe_width()
+        || share_of_brdf(point.lobe_width(), light.source_list, mirror, 3.0 * 2.0 * deviation) < 1.0
 }
 
 /// Twin of `risen`.
