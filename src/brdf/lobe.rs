@@ -15,11 +15,19 @@ pub fn half_vector_width(brdf: &Brdf) -> f64 {
     first_angle(|angle| (profile(brdf, angle) - peak).abs() > 0.25 * peak)
 }
 
-/// The angle of the half vector to the normal from which f falls to less than a third at twice the angle: nearer to the normal
-/// there is but a plateau, or a cusp of little energy. A right angle if there is no such lobe. In radians. Seen along the normal.
+/// What stands out of the least value of f by less than this part of it is no lobe.
+const LEAST_RISE: f64 = 0.1;
+
+/// The angle of the half vector to the normal from which f, as far as it is above its least value, falls to less than half at twice the
+/// angle: nearer to the normal there is but a plateau, or a cusp of little energy. A right angle if there is no such lobe. In radians.
+/// Seen along the normal.
 pub fn lobe_radius(brdf: &Brdf) -> f64 {
+    let least = angles().map(|angle| profile(brdf, angle)).fold(f64::INFINITY, f64::min).max(0.0);
+    let rise = |angle: f64| profile(brdf, angle) - least;
     // Beyond 45 degrees f is 0, which is no lobe.
-    first_angle(|angle| 2.0 * angle < 0.5 * FRAC_PI_2 && profile(brdf, angle) > 3.0 * profile(brdf, 2.0 * angle))
+    first_angle(|angle| {
+        2.0 * angle < 0.5 * FRAC_PI_2 && rise(angle) > LEAST_RISE * least && rise(angle) > 2.0 * rise(2.0 * angle)
+    })
 }
 
 /// f, summed over channels, where the half vector is at `theta_h` to the normal.
@@ -28,12 +36,15 @@ fn profile(brdf: &Brdf, theta_h: f64) -> f64 {
     brdf.evaluate(dvec3(0.0, theta_i.sin(), theta_i.cos()), DVec3::Z).element_sum()
 }
 
-/// The first angle, of ever larger ones, of which `is_so`; a right angle if there is none.
-fn first_angle(is_so: impl Fn(f64) -> bool) -> f64 {
+/// Ever larger angles of half vectors. Those beyond 45 degrees belong to light below the horizon.
+fn angles() -> impl Iterator<Item = f64> {
     let angles = std::iter::successors(Some(NARROWEST_RAD), |angle| Some(1.25 * angle));
-    // Half vectors beyond 45 degrees belong to light below the horizon.
-    let mut above_horizon = angles.take_while(|&angle| angle < 0.5 * FRAC_PI_2);
-    above_horizon.find(|&angle| is_so(angle)).unwrap_or(FRAC_PI_2)
+    angles.take_while(|&angle| angle < 0.5 * FRAC_PI_2)
+}
+
+/// The first of them of which `is_so`; a right angle if there is none.
+fn first_angle(is_so: impl Fn(f64) -> bool) -> f64 {
+    angles().find(|&angle| is_so(angle)).unwrap_or(FRAC_PI_2)
 }
 
 #[cfg(test)]
@@ -49,6 +60,10 @@ mod tests {
                 assert!((0.3..1.0).contains(&(width / alpha)), "{distribution} {alpha}: {width}");
             }
         }
+        // A lobe is found however much light is scattered beside it.
+        let parameters = "distribution = 'ggx'\nalpha = 0.05\nior = 1.5\ndiffuse = 0.9";
+        let plastic = lobe_radius(&Brdf::from_parameters("plastic", parameters.parse().unwrap()).unwrap());
+        assert!((0.3..1.0).contains(&(plastic / 0.05)), "{plastic}");
         let lambert = Brdf::from_parameters("lambert", "reflectance = 0.5".parse().unwrap()).unwrap();
         assert_eq!((half_vector_width(&lambert), lobe_radius(&lambert)), (FRAC_PI_2, FRAC_PI_2));
     }

@@ -8,7 +8,7 @@ use crate::passes::View;
 use crate::prepare::Prepared;
 
 /// Changes whenever the same question gets another answer.
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 
 /// Names everything that the reference depends on. Meshes and their transforms are in `geometry`.
 pub fn key(prepared: &Prepared, geometry: &[[u32; 2]], tolerance: f64) -> String {
