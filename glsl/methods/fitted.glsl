@@ -45,21 +45,26 @@ layout(set = 0, binding = 14, std430) readonly buffer Sources {
 // How far a source is from where the BRDF cannot be taken at a few points of it, because it is mirrored towards the eye and wider than
 // the lobe; in half standard deviations of the source. Within a half vector of lobe_width f loses a quarter, as a Gaussian does
 // at 0.76 of its width; reflection doubles that. Twin: src/environment/sources.rs, with CLEAR for the bounds of its use below.
-float clearance(Source source, Material material, vec3 mirror) {
-    float lobe = 2.6 * material.lobe_width;
-    return (distance(source.direction.xyz, mirror) + 4.0 * lobe) / (2.0 * source.direction.w);
+float clearance(Source source, float lobe_width, vec3 mirror) {
+    return (distance(source.direction.xyz, mirror) + 4.0 * 2.6 * lobe_width) / (2.0 * source.direction.w);
 }
 
 // How much of the answer to sources is the BRDF's: the rest is the kernels', which fit best where the mirrored view is. Sources count
 // as no narrower than `least_width`.
-float share_of_brdf(Material material, vec3 mirror, float least_width) {
+float share_of_brdf(float lobe_width, vec3 mirror, float least_width) {
     float share = 1.0;
     for (uint s = 0; s < source_count; ++s) {
         Source source = sources[s];
         source.direction.w = max(source.direction.w, least_width);
-        share = min(share, smoothstep(1.25, 2.5, clearance(source, material, mirror)));
+        share = min(share, smoothstep(1.25, 2.5, clearance(source, lobe_width, mirror)));
     }
     return share;
+}
+
+// lobe_width of what is seen from w_o: across the plane of incidence a lobe is narrower by the cosine. Twin of the bound:
+// LEAST_NARROWING in src/environment/sources.rs.
+float lobe_width_from(Material material, vec3 w_o) {
+    return material.lobe_width * max(w_o.z, 0.05);
 }
 
 // The mirrored view, in the environment's coordinates.
@@ -72,8 +77,9 @@ vec3 mirrored(Surface surface, vec3 w_o) {
 bool needs_subpixels(Surface surface, Material material) {
     float deviation = sqrt(surface.normal_variance);
     // Normals mirrored turn twice as far; three standard deviations of that.
+    vec3 w_o = view_direction(surface);
     return deviation > material.lobe_width
-        || share_of_brdf(material, mirrored(surface, view_direction(surface)), 3.0 * 2.0 * deviation) < 1.0;
+        || share_of_brdf(lobe_width_from(material, w_o), mirrored(surface, w_o), 3.0 * 2.0 * deviation) < 1.0;
 }
 
 // Powers of all sources times what is to be integrated over them.
@@ -99,7 +105,7 @@ AtSources at_sources(Surface surface, Material material, vec3 w_o, vec3 mirror) 
     for (uint s = 0; s < source_count; ++s) {
         Source source = sources[s];
         // Gauss and Legendre's points on a square of the source's variance; from afar, where a lobe is four times wider, its middle.
-        int side = clearance(source, material, mirror) > 8.0 ? 1 : 3;
+        int side = clearance(source, lobe_width_from(material, w_o), mirror) > 8.0 ? 1 : 3;
         float deviation = length(vec2(dot(source.axis[0].xyz, surface.frame[2]), dot(source.axis[1].xyz, surface.frame[2])));
         for (int i = 0; i < side * side; ++i) {
             ivec2 place = ivec2(i % side, i / side) - side / 2;
@@ -131,7 +137,7 @@ vec3 estimate(Surface surface, Material material, uint first, uint stride) {
     if (source_count > 0) {
         vec3 w_o = view_direction(surface);
         vec3 mirror = mirrored(surface, w_o);
-        of_kernels = 1.0 - share_of_brdf(material, mirror, 0.0);
+        of_kernels = 1.0 - share_of_brdf(lobe_width_from(material, w_o), mirror, 0.0);
         AtSources at = at_sources(surface, material, w_o, mirror);
         // The irradiance map has no sources.
         sum = mix(at.f_cos, at.cosine * cosine_part / radians(180.0), of_kernels);

@@ -4,7 +4,7 @@ use std::f32::consts::{FRAC_PI_2, PI};
 use glam::{DVec3, IVec2, Vec3};
 
 use super::{BlurredLight, Point, Surface};
-use crate::environment::sources::{CLEAR, clearance};
+use crate::environment::sources::{CLEAR, LEAST_NARROWING, clearance};
 use crate::environment::{LightMap, Source};
 use crate::threads::Threads;
 use crate::threads::fitted::kernel::FINEST_WIDTH_RAD;
@@ -76,6 +76,11 @@ fn share_of_brdf(lobe_width: f32, sources: &[Source], mirror: Vec3, least_width:
     sources.iter().map(share).fold(1.0, f32::min)
 }
 
+/// Twin of `lobe_width_from`.
+fn lobe_width_from(point: &Point, w_o: Vec3) -> f32 {
+    point.lobe_width() * w_o.z.max(LEAST_NARROWING)
+}
+
 /// Twin of `mirrored`.
 fn mirrored(surface: &Surface, w_o: Vec3) -> Vec3 {
     surface.frame * Vec3::new(-w_o.x, -w_o.y, w_o.z)
@@ -85,9 +90,10 @@ fn mirrored(surface: &Surface, w_o: Vec3) -> Vec3 {
 pub(super) fn needs_subpixels(point: &Point) -> bool {
     let Some(light) = &point.twin.blurred else { return false };
     let deviation = point.surface.normal_variance.sqrt();
-    let mirror = mirrored(&point.surface, point.surface.view_direction());
+    let w_o = point.surface.view_direction();
+    let mirror = mirrored(&point.surface, w_o);
     deviation > point.lobe_width()
-        || share_of_brdf(point.lobe_width(), light.source_list, mirror, 3.0 * 2.0 * deviation) < 1.0
+        || share_of_brdf(lobe_width_from(point, w_o), light.source_list, mirror, 3.0 * 2.0 * deviation) < 1.0
 }
 
 /// Twin of `risen`.
@@ -105,7 +111,7 @@ fn at_sources(point: &Point, sources: &[Source], w_o: Vec3, mirror: Vec3) -> (Ve
     let (mut f_cos, mut cosine) = (Vec3::ZERO, Vec3::ZERO);
     for source in sources {
         let away = source.direction.as_vec3().distance(mirror);
-        let from_afar = clearance(away, source.width_rad() as f32, point.lobe_width()) > 8.0;
+        let from_afar = clearance(away, source.width_rad() as f32, lobe_width_from(point, w_o)) > 8.0;
         let side = if from_afar { 1 } else { 3 };
         let deviation = source.axes.map(|axis| axis.as_vec3().dot(point.surface.frame.z_axis));
         let deviation = deviation[0].hypot(deviation[1]);
@@ -152,7 +158,7 @@ pub(super) fn estimate(point: &Point) -> Vec3 {
     if !light.source_list.is_empty() {
         let w_o = surface.view_direction();
         let mirror = mirrored(surface, w_o);
-        of_kernels = 1.0 - share_of_brdf(point.lobe_width(), light.source_list, mirror, 0.0);
+        of_kernels = 1.0 - share_of_brdf(lobe_width_from(point, w_o), light.source_list, mirror, 0.0);
         let (f_cos, cosine) = at_sources(point, light.source_list, w_o, mirror);
         sum = f_cos.lerp(cosine * cosine_part / PI, of_kernels);
     }
