@@ -13,8 +13,8 @@ use crate::scene::Scene;
 use crate::threads::{MAX_COUNT, Observer};
 use crate::vulkan::Device;
 
-/// Pixels that are looked at. Errors gather in a part of a picture, at rims and highlights, say a tenth of it: 50 pixels
-/// of that give their mean square within a third, two standard deviations.
+/// Pixels that are looked at. Errors gather in a part of a picture, at rims and highlights, say a tenth of it: of 50 normal numbers
+/// the mean square has a standard deviation of sqrt(2 / 50) of it, so the RMS one of a tenth.
 const PIXELS: usize = 512;
 
 /// The truth at some of the pixels that see a surface, spread evenly over a picture.
