@@ -62,7 +62,7 @@ float share_of_brdf(float lobe_width, vec3 mirror, float least_width) {
 }
 
 // lobe_width of what is seen from w_o: across the plane of incidence a lobe is narrower by the cosine. Twin of the bound:
-// LEAST_NARROWING in src/environment/sources.rs.
+// MIN_COS_THETA_D in src/brdf/lobe.rs.
 float lobe_width_from(Material material, vec3 w_o) {
     return material.lobe_width * max(w_o.z, 0.05);
 }
@@ -76,8 +76,8 @@ vec3 mirrored(Surface surface, vec3 w_o) {
 // blur. Nor where a sun is mirrored within the pixel, or so near that its highlight bends within it.
 bool needs_subpixels(Surface surface, Material material) {
     float deviation = sqrt(surface.normal_variance);
-    // Normals mirrored turn twice as far; three standard deviations of that.
     vec3 w_o = view_direction(surface);
+    // Normals mirrored turn twice as far; three standard deviations of that.
     return deviation > material.lobe_width
         || share_of_brdf(lobe_width_from(material, w_o), mirrored(surface, w_o), 3.0 * 2.0 * deviation) < 1.0;
 }
@@ -100,12 +100,12 @@ vec2 risen(float z, float deviation) {
     return vec2(above * above / (4.0 * half_side), 2.0 / 3.0 * above);
 }
 
-AtSources at_sources(Surface surface, Material material, vec3 w_o, vec3 mirror) {
+AtSources at_sources(Surface surface, Material material, float lobe_width, vec3 w_o, vec3 mirror) {
     AtSources sum = AtSources(vec3(0.0), vec3(0.0));
     for (uint s = 0; s < source_count; ++s) {
         Source source = sources[s];
         // Gauss and Legendre's points on a square of the source's variance; from afar, where a lobe is four times wider, its middle.
-        int side = clearance(source, lobe_width_from(material, w_o), mirror) > 8.0 ? 1 : 3;
+        int side = clearance(source, lobe_width, mirror) > 8.0 ? 1 : 3;
         float deviation = length(vec2(dot(source.axis[0].xyz, surface.frame[2]), dot(source.axis[1].xyz, surface.frame[2])));
         for (int i = 0; i < side * side; ++i) {
             ivec2 place = ivec2(i % side, i / side) - side / 2;
@@ -137,8 +137,9 @@ vec3 estimate(Surface surface, Material material, uint first, uint stride) {
     if (source_count > 0) {
         vec3 w_o = view_direction(surface);
         vec3 mirror = mirrored(surface, w_o);
-        of_kernels = 1.0 - share_of_brdf(lobe_width_from(material, w_o), mirror, 0.0);
-        AtSources at = at_sources(surface, material, w_o, mirror);
+        float lobe_width = lobe_width_from(material, w_o);
+        of_kernels = 1.0 - share_of_brdf(lobe_width, mirror, 0.0);
+        AtSources at = at_sources(surface, material, lobe_width, w_o, mirror);
         // The irradiance map has no sources.
         sum = mix(at.f_cos, at.cosine * cosine_part / radians(180.0), of_kernels);
     }

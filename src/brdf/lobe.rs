@@ -8,6 +8,10 @@ use super::Brdf;
 /// Half vectors closer to the normal than this count as one: a tenth of the narrowest lobe that a model may have.
 const NARROWEST_RAD: f64 = 1e-4;
 
+/// At grazing angles lobes grow ever thinner across the plane of incidence, by the cosine; who goes by their width takes it for no less than
+/// this: beyond 87 degrees is a rim of 0.1 % of a sphere.
+pub const MIN_COS_THETA_D: f64 = 0.05;
+
 /// The angle of the half vector to the normal within which f stays within a quarter of what it is in the mirror direction;
 /// a right angle if it does so everywhere. In radians. Seen along the normal, where lobes are widest.
 pub fn half_vector_width(brdf: &Brdf) -> f64 {

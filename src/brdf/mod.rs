@@ -14,7 +14,7 @@ mod lobe;
 mod microfacet;
 mod parameters;
 
-pub use lobe::{half_vector_width, lobe_radius};
+pub use lobe::{MIN_COS_THETA_D, half_vector_width, lobe_radius};
 pub use microfacet::{Distribution, fresnel_conductor, fresnel_dielectric};
 pub use parameters::{Domain, Parameter, Parameters};
 

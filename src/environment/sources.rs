@@ -26,9 +26,6 @@ const WIDEST_RAD: f64 = 0.006;
 /// Measured: earlier, rims of mirrored lamps are off in mirrors; later, in glossy plastics, of which kernels know less.
 pub const CLEAR: [f32; 2] = [1.25, 2.5];
 
-/// What a lobe is narrowed by at most where it is seen at grazing angles, by the cosine: beyond 87 degrees is a rim of 0.1 % of a sphere.
-pub const LEAST_NARROWING: f32 = 0.05;
-
 /// How far a source `away` from the mirrored view is from where the BRDF cannot be taken at a few points of it, because it is mirrored
 /// towards the eye and wider than the lobe; in half standard deviations, `width`, of the source. All in radians.
 /// Twin of `clearance` in glsl/methods/fitted.glsl.

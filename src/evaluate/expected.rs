@@ -7,8 +7,9 @@ use rayon::prelude::*;
 use super::metrics::{Comparable, Differences, Display};
 use super::reference::{Integrator, TOLERANCE};
 use crate::error::{Error, Result};
+use crate::method::Method;
 use crate::pipeline::{Renderer, Wanted, render_geometry};
-use crate::prepare::{Prepared, check_count, prepare, prepare_again};
+use crate::prepare::{Prepared, check_count, prepare_again};
 use crate::scene::Scene;
 use crate::threads::{MAX_COUNT, Observer};
 use crate::vulkan::Device;
@@ -52,7 +53,7 @@ impl TrueSample {
             Ok(texel.map_or([0.0; 4], |texel| texel.rgba))
         };
         let radiance = pixels.par_iter().map(radiance).collect::<Result<Vec<_>>>()?;
-        let display = Display { exposure: f64::from(view.exposure), gamma: f64::from(view.gamma) };
+        let display = Display::of(view);
         Ok(Self { truth: Comparable::from_radiance(pixels.len(), 1, &radiance, true, display), pixels, display })
     }
 
@@ -77,7 +78,7 @@ fn spread(all: &[usize], count: usize) -> Vec<usize> {
 /// at most `most`; with that RMS. `observer` hears of threads.
 ///
 /// # Errors
-/// As for [`prepare`]; whatever Vulkan refuses; as many as there can be are not enough.
+/// As for [`prepare_again`]; whatever Vulkan refuses; as many as there can be are not enough.
 pub fn prepare_within(
     scene: &Scene,
     most: f64,
@@ -85,20 +86,19 @@ pub fn prepare_within(
     cache: Option<&Path>,
     observer: &dyn Observer,
 ) -> Result<(Prepared, f64)> {
+    let method = Method::from_name(&scene.shading.method)?;
     let mut scene = scene.clone();
-    let mut tried: Option<(Prepared, Renderer, f64)> = None;
+    let subpixels = scene.image.subpixels;
+    let mut tried: Option<(Prepared, Renderer)> = None;
     let mut sample = None;
-    for count in counts() {
+    let mut reached = (0, f64::INFINITY);
+    for count in counts().take_while(|&count| check_count(method, count, subpixels).is_ok()) {
         scene.shading.threads = Some(count);
-        let prepared = match &tried {
-            Some((before, ..)) if check_count(before.method, count, before.view.subpixels).is_err() => break,
-            Some((before, ..)) => prepare_again(&scene, Some(before), cache, observer)?,
-            None => prepare(&scene, cache, observer)?,
-        };
+        let prepared = prepare_again(&scene, tried.as_ref().map(|(before, _)| before), cache, observer)?;
         // Only surfaces are looked at.
         let alone = Prepared { show_environment: false, ..prepared.clone() };
         let renderer = match &tried {
-            Some((before, renderer, _)) => renderer.again(cache, before, &alone)?,
+            Some((before, renderer)) => renderer.again(cache, before, &alone)?,
             None => Renderer::new(device, cache, &alone)?,
         };
         let sample = match &sample {
@@ -111,15 +111,11 @@ pub fn prepare_within(
         if rms <= most {
             return Ok((prepared, rms));
         }
-        tried = Some((alone, renderer, rms));
+        (tried, reached) = (Some((alone, renderer)), (count, rms));
     }
-    let (before, _, least) = tried.expect("one thread is never too many");
-    let Prepared { method, sampling, .. } = before;
-    let problem = format!(
-        "{most:e} is not reached: {} threads or samples of \"{}\" have {least:.1e}",
-        sampling.count,
-        method.name()
-    );
+    let (count, rms) = reached;
+    let problem =
+        format!("{most:e} is not reached: {count} threads or samples of \"{}\" have {rms:.1e}", method.name());
     Err(Error::input("--error", problem, "allow more, or use --method fitted, combined or reference"))
 }
 

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 use super::ssim::{RADIUS, WINDOW, ssim_map};
 use crate::error::{Error, Result};
 use crate::output::{Format, Picture};
+use crate::passes::View;
 
 /// How radiance L is displayed: clamp(exposure L, 0, 1)^(1/gamma).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -12,6 +13,18 @@ pub struct Display {
     pub exposure: f64,
     /// Above 0.
     pub gamma: f64,
+}
+
+impl Display {
+    /// How `view` shows it.
+    pub fn of(view: &View) -> Self {
+        Self { exposure: f64::from(view.exposure), gamma: f64::from(view.gamma) }
+    }
+
+    /// The display value of `radiance`, 0 to 1.
+    pub fn value(&self, radiance: f64) -> f64 {
+        (self.exposure * radiance).clamp(0.0, 1.0).powf(1.0 / self.gamma)
+    }
 }
 
 impl Default for Display {
@@ -66,11 +79,9 @@ impl Comparable {
     /// # Panics
     /// If there are not `width` x `height` pixels.
     pub fn from_radiance(width: usize, height: usize, rgba: &[[f32; 4]], alpha: bool, display: Display) -> Self {
-        let displayed =
-            |radiance: f32| (display.exposure * f64::from(radiance)).clamp(0.0, 1.0).powf(1.0 / display.gamma);
         Self::new(width, height, rgba, alpha, |[r, g, b, _]| {
             let radiance = [r, g, b];
-            (radiance, radiance.map(|value| displayed(value) as f32))
+            (radiance, radiance.map(|value| display.value(value.into()) as f32))
         })
     }
 

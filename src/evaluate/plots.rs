@@ -10,7 +10,7 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::Row;
 use super::speed::{Frame, Growth, Timings};
-use super::tables::{in_order, mean};
+use super::tables::{by_count, in_order, mean};
 use crate::error::{Error, Result};
 use crate::output::write_whole;
 
@@ -153,15 +153,8 @@ pub fn expectation_chart(rows: &[Row]) -> Option<Chart> {
 /// Mean RMS over mean `x` of each method, a point for each count.
 fn error_curves(rows: &[&Row], x: fn(&Row) -> f64) -> Vec<Curve> {
     let curve = |(style, method): (usize, &String)| {
-        let rows: Vec<_> = rows.iter().filter(|row| row.method == *method).collect();
-        let point = |count: f64| {
-            let mean_of = |value: fn(&Row) -> f64| {
-                let here = rows.iter().filter(|row| f64::from(row.threads) == count);
-                mean(&here.map(|row| value(row)).collect::<Vec<_>>())
-            };
-            (mean_of(x), mean_of(|row| row.rms))
-        };
-        let points = counts(rows.iter().map(|row| row.threads)).into_iter().map(point).collect();
+        let (x, errors) = (by_count(rows, method, x), by_count(rows, method, |row| row.rms));
+        let points = x.values().zip(errors.values()).map(|(x, rms)| (mean(x), mean(rms))).collect();
         Curve { name: method.clone(), points, style, drawn: Drawn::Line }
     };
     in_order(rows.iter().map(|row| &row.method)).into_iter().enumerate().map(curve).collect()

@@ -1,6 +1,6 @@
 //! Measurements as tables, in the layout of the paper's: errors with a row for each method and a column for each count (tables 2
 //! to 4), times with a row for each frame (table 1).
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
 use super::Row;
@@ -98,12 +98,11 @@ fn error_table(
     decimals: usize,
 ) -> Table {
     let counts: BTreeSet<u32> = rows.iter().map(|row| row.threads).collect();
-    let cell = |method: &str, count: u32| {
-        let here = rows.iter().filter(|row| row.method == *method && row.threads == count);
-        let values: Vec<f64> = here.map(|row| value(row)).collect();
-        if values.is_empty() { "-".to_owned() } else { format!("{:.decimals$}", summary(&values)) }
+    let row = |method: &String| {
+        let values = by_count(rows, method, &value);
+        let cell = |count| values.get(count).map_or("-".to_owned(), |values| format!("{:.decimals$}", summary(values)));
+        (method.clone(), counts.iter().map(cell).collect())
     };
-    let row = |method: &String| (method.clone(), counts.iter().map(|&count| cell(method, count)).collect());
     Table {
         title: title.to_owned(),
         head: counts.iter().map(u32::to_string).collect(),
@@ -116,16 +115,8 @@ fn error_table(
 /// worse at the highest of its counts takes longer (`>`) than that does; one that is better with its lowest, less (`<`).
 fn equal_error_table(rows: &[&Row]) -> Option<Table> {
     let curve = |method: &str| -> Vec<(u32, f64, f64)> {
-        let of_method: Vec<_> = rows.iter().filter(|row| row.method == method).collect();
-        let counts: BTreeSet<u32> = of_method.iter().map(|row| row.threads).collect();
-        let point = |count| {
-            let mean_of = |value: fn(&Row) -> f64| {
-                let here = of_method.iter().filter(|row| row.threads == count);
-                mean(&here.map(|row| value(row)).collect::<Vec<_>>())
-            };
-            (count, mean_of(|row| row.rms), mean_of(|row| row.gpu_ms))
-        };
-        counts.into_iter().map(point).collect()
+        let (errors, times) = (by_count(rows, method, |row| row.rms), by_count(rows, method, |row| row.gpu_ms));
+        errors.iter().zip(times.values()).map(|((&count, rms), ms)| (count, mean(rms), mean(ms))).collect()
     };
     let fitted = curve(Method::Fitted.name());
     let others =
@@ -233,6 +224,15 @@ fn costs(frame: &Frame) -> Vec<String> {
     cells.extend(pass_names(&[frame]).into_iter().map(|name| format!("{:.2}", frame.pass_ms(name))));
     cells.push(format!("{:.2}", frame.gpu_ms));
     cells
+}
+
+/// `value` of the rows of `method`, for each of its counts.
+pub(super) fn by_count(rows: &[&Row], method: &str, value: impl Fn(&Row) -> f64) -> BTreeMap<u32, Vec<f64>> {
+    let mut values: BTreeMap<u32, Vec<f64>> = BTreeMap::new();
+    for row in rows.iter().filter(|row| row.method == method) {
+        values.entry(row.threads).or_default().push(value(row));
+    }
+    values
 }
 
 /// Arithmetic mean.

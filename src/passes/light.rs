@@ -2,8 +2,8 @@
 use super::background::check_map_size;
 use super::vmf_pyramid::blurred;
 use crate::Result;
-use crate::brdf::half_vector_width;
-use crate::environment::sources::{CLEAR, LEAST_NARROWING, clearance};
+use crate::brdf::{MIN_COS_THETA_D, half_vector_width};
+use crate::environment::sources::{CLEAR, clearance};
 use crate::environment::{Environment, LightMap, Pyramid, Source};
 use crate::method::Method;
 use crate::prepare::PreparedMaterial;
@@ -43,7 +43,7 @@ impl Extras {
     fn of(environment: &Environment, materials: &[PreparedMaterial], finest_level: f32) -> Self {
         let sources = &environment.small_sources().list;
         let mirrors = |material: &PreparedMaterial| {
-            let lobe_width = LEAST_NARROWING * half_vector_width(&material.brdf) as f32;
+            let lobe_width = (MIN_COS_THETA_D * half_vector_width(&material.brdf)) as f32;
             sources.iter().any(|source| clearance(0.0, source.width_rad() as f32, lobe_width) < CLEAR[1])
         };
         let is_sharp = |material: &PreparedMaterial| match material.threads.as_deref() {

@@ -4,7 +4,8 @@ use std::f32::consts::{FRAC_PI_2, PI};
 use glam::{DVec3, IVec2, Vec3};
 
 use super::{BlurredLight, Point, Surface};
-use crate::environment::sources::{CLEAR, LEAST_NARROWING, clearance};
+use crate::brdf::MIN_COS_THETA_D;
+use crate::environment::sources::{CLEAR, clearance};
 use crate::environment::{LightMap, Source};
 use crate::threads::Threads;
 use crate::threads::fitted::kernel::FINEST_WIDTH_RAD;
@@ -78,7 +79,7 @@ fn share_of_brdf(lobe_width: f32, sources: &[Source], mirror: Vec3, least_width:
 
 /// Twin of `lobe_width_from`.
 fn lobe_width_from(point: &Point, w_o: Vec3) -> f32 {
-    point.lobe_width() * w_o.z.max(LEAST_NARROWING)
+    point.lobe_width() * w_o.z.max(MIN_COS_THETA_D as f32)
 }
 
 /// Twin of `mirrored`.
@@ -107,11 +108,11 @@ fn risen(z: f32, deviation: f32) -> [f32; 2] {
 }
 
 /// Twin of `at_sources`: powers of all sources times f cos, and times cos.
-fn at_sources(point: &Point, sources: &[Source], w_o: Vec3, mirror: Vec3) -> (Vec3, Vec3) {
+fn at_sources(point: &Point, sources: &[Source], lobe_width: f32, w_o: Vec3, mirror: Vec3) -> (Vec3, Vec3) {
     let (mut f_cos, mut cosine) = (Vec3::ZERO, Vec3::ZERO);
     for source in sources {
         let away = source.direction.as_vec3().distance(mirror);
-        let from_afar = clearance(away, source.width_rad() as f32, lobe_width_from(point, w_o)) > 8.0;
+        let from_afar = clearance(away, source.width_rad() as f32, lobe_width) > 8.0;
         let side = if from_afar { 1 } else { 3 };
         let deviation = source.axes.map(|axis| axis.as_vec3().dot(point.surface.frame.z_axis));
         let deviation = deviation[0].hypot(deviation[1]);
@@ -158,8 +159,9 @@ pub(super) fn estimate(point: &Point) -> Vec3 {
     if !light.source_list.is_empty() {
         let w_o = surface.view_direction();
         let mirror = mirrored(surface, w_o);
-        of_kernels = 1.0 - share_of_brdf(lobe_width_from(point, w_o), light.source_list, mirror, 0.0);
-        let (f_cos, cosine) = at_sources(point, light.source_list, w_o, mirror);
+        let lobe_width = lobe_width_from(point, w_o);
+        of_kernels = 1.0 - share_of_brdf(lobe_width, light.source_list, mirror, 0.0);
+        let (f_cos, cosine) = at_sources(point, light.source_list, lobe_width, w_o, mirror);
         sum = f_cos.lerp(cosine * cosine_part / PI, of_kernels);
     }
     for k in (point.first as usize..threads.count).step_by(point.stride) {

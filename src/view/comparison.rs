@@ -136,7 +136,7 @@ fn compared(
 ) -> Compared {
     let view = &prepared.view;
     let (width, height) = (view.width as usize, view.height as usize);
-    let shown = Display { exposure: view.exposure.into(), gamma: view.gamma.into() };
+    let shown = Display::of(view);
     let comparable = |radiance: &[[f32; 4]], step: usize| {
         let rows = (0..height).step_by(step);
         let pixels: Vec<_> =

@@ -3,8 +3,9 @@ use glam::{DMat3, DVec3, dvec3};
 
 use super::cubature::Cubature;
 use super::light::{CellPlace, Light};
-use crate::brdf::{Brdf, lobe_radius};
+use crate::brdf::{Brdf, MIN_COS_THETA_D, lobe_radius};
 use crate::environment::Environment;
+use crate::evaluate::metrics::Display;
 use crate::threads::Observer;
 use crate::{Error, Result};
 
@@ -15,9 +16,6 @@ const SPLITS_A_LOOK: usize = 64;
 /// What the view angle is held below: at 90 degrees f is 0 and no slice is left. A renderer only meets it where an
 /// interpolated normal turns from the eye.
 pub const MAX_THETA_O_DEG: f64 = 89.99;
-/// At grazing angles lobes grow ever thinner across. Beyond this (87 degrees, a rim of 0.1 % of a sphere) cells are small enough to find
-/// part of them, and what is found is split like all else.
-const MIN_COS_THETA_D: f64 = 0.05;
 /// What is left of a cell's error by splitting it: see the test that estimates are honest.
 const ERROR_LEFT: f64 = 0.5;
 /// Above display white, where display values no longer tell, linear radiance is held to 1/0.05 = 20 times the tolerance, relatively.
@@ -67,7 +65,8 @@ impl Point {
     fn may_hide_lobe(&self, radius: f64, place: CellPlace) -> bool {
         let w_i = self.frame.transpose() * place.middle();
         let mirror = dvec3(-self.w_o.x, 0.0, self.w_o.z);
-        // Reflection doubles angles, but across the plane of incidence shrinks them by the cosine.
+        // Reflection doubles angles, but across the plane of incidence shrinks them by the cosine. Beyond its bound cells are small enough to
+        // find part of a lobe, and what is found is split like all else.
         let narrow = 2.0 * radius * self.w_o.z.max(MIN_COS_THETA_D);
         place.side() > narrow && w_i.distance(mirror) < place.side()
     }
@@ -86,20 +85,7 @@ pub struct PixelEstimate {
     pub evaluations: u64,
 }
 
-/// How a radiance is shown, for errors to be measured in what is seen.
-#[derive(Clone, Copy, Debug)]
-pub struct Display {
-    /// Factor on radiance.
-    pub exposure: f64,
-    /// Display values are radiance to the power of 1/gamma.
-    pub gamma: f64,
-}
-
 impl Display {
-    pub(super) fn value(&self, radiance: f64) -> f64 {
-        (self.exposure * radiance).clamp(0.0, 1.0).powf(1.0 / self.gamma)
-    }
-
     /// The error of a display value, from `radiance` and its standard error.
     pub(super) fn error(&self, radiance: f64, error: f64) -> f64 {
         let shown = 0.5 * (self.value(radiance + error) - self.value(radiance - error));

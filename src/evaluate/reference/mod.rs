@@ -17,6 +17,7 @@ use std::time::Instant;
 use glam::{DMat3, DVec3, UVec2, dvec3};
 use rayon::prelude::*;
 
+use crate::evaluate::metrics::Display;
 use crate::passes::View;
 use crate::pipeline::render_geometry;
 use crate::prepare::Prepared;
@@ -35,7 +36,7 @@ mod progressive;
 mod tests;
 
 use integrator::rms;
-pub use integrator::{Display, Integrator, MAX_THETA_O_DEG, PixelEstimate, Point};
+pub use integrator::{Integrator, MAX_THETA_O_DEG, PixelEstimate, Point};
 pub use progressive::{Estimate, STAGES, Stage, progressive};
 
 /// Tolerance where none is given: a twentieth of a step of an 8-bit display value.
@@ -177,12 +178,6 @@ pub(super) struct Texel {
     /// Sub-pixels that see a surface.
     points: usize,
     estimate: PixelEstimate,
-}
-
-impl Display {
-    fn of(view: &View) -> Self {
-        Self { exposure: f64::from(view.exposure), gamma: f64::from(view.gamma) }
-    }
 }
 
 impl Integrator<'_> {
