@@ -17,6 +17,8 @@ const PHI_STEPS: usize = 128;
 pub struct Slice<'a> {
     brdf: &'a Brdf,
     w_o: DVec3,
+    /// Luminance of f below which nothing counts: 0, or see [`Slice::lobes`].
+    base: f64,
     albedo: DVec3,
     /// What `density` integrates to.
     total: f64,
@@ -32,6 +34,12 @@ fn reflect(w_o: DVec3, h: DVec3) -> DVec3 {
     (2.0 * w_o.dot(h) * h - w_o).normalize()
 }
 
+/// What of `f` is above a base of this luminance.
+fn above_base(f: DVec3, base: f64) -> DVec3 {
+    let value = luminance(f);
+    if value > base { f * ((value - base) / value) } else { DVec3::ZERO }
+}
+
 /// Half vector at x in [0, 1] and phi in units of the circle, counted from -x.
 fn half_vector(x: f64, turn: f64) -> DVec3 {
     let (sin_theta, cos_theta) = (FRAC_PI_2 * x * x).sin_cos();
@@ -45,15 +53,32 @@ impl<'a> Slice<'a> {
     /// Tabulates `brdf` seen from `theta_o` (radians, less than pi / 2). Where it reflects nothing the pdf is that of a
     /// diffuse surface, cos / pi: a thread then still has a direction, and its samples add up to the zero they should.
     pub fn new(brdf: &'a Brdf, theta_o: f64) -> Self {
-        let w_o = dvec3(theta_o.sin(), 0.0, theta_o.cos());
-        let slice = Self::tabulate(brdf, w_o, |w_i| brdf.evaluate(w_i, w_o) * w_i.z);
+        Self::above(brdf, dvec3(theta_o.sin(), 0.0, theta_o.cos()), 0.0)
+    }
+
+    /// The slice of what is above the median of f, by luminance: lobes without the base that they stand on. A tenth of the mass of
+    /// a glossy plastic is in its lobe; this has all of its mass there.
+    pub fn lobes(&self) -> Self {
+        const POINTS: usize = 512;
+        let mut values: Vec<f64> = fibonacci_lattice(POINTS)
+            .map(|uv| {
+                let w_i = (DVec2::from_angle(2.0 * PI * uv.y) * uv.x.sqrt()).extend((1.0 - uv.x).sqrt());
+                luminance(self.brdf.evaluate(w_i, self.w_o))
+            })
+            .collect();
+        values.sort_by(f64::total_cmp);
+        Self::above(self.brdf, self.w_o, values[POINTS / 2])
+    }
+
+    fn above(brdf: &'a Brdf, w_o: DVec3, base: f64) -> Self {
+        let slice = Self::tabulate(brdf, w_o, base, |w_i| above_base(brdf.evaluate(w_i, w_o), base) * w_i.z);
         if slice.total > 0.0 {
             return slice;
         }
-        Self { albedo: DVec3::ZERO, ..Self::tabulate(brdf, w_o, |w_i| DVec3::splat(w_i.z * FRAC_1_PI)) }
+        Self { albedo: DVec3::ZERO, ..Self::tabulate(brdf, w_o, base, |w_i| DVec3::splat(w_i.z * FRAC_1_PI)) }
     }
 
-    fn tabulate(brdf: &'a Brdf, w_o: DVec3, density: impl Fn(DVec3) -> DVec3) -> Self {
+    fn tabulate(brdf: &'a Brdf, w_o: DVec3, base: f64, density: impl Fn(DVec3) -> DVec3) -> Self {
         let mut albedo = DVec3::ZERO;
         let mut ring_cdf = vec![0.0];
         let mut azimuth_cdf = Vec::with_capacity(THETA_STEPS * (PHI_STEPS + 1));
@@ -91,7 +116,7 @@ impl<'a> Slice<'a> {
             let w_i = reflect(w_o, h);
             if w_i.z > 0.0 && w_o.dot(h) > 0.0 { luminance(density(w_i)) } else { 0.0 }
         });
-        Self { brdf, w_o, albedo, total, ring_cdf, azimuth_cdf, peak: reflect(w_o, peak) }
+        Self { brdf, w_o, base, albedo, total, ring_cdf, azimuth_cdf, peak: reflect(w_o, peak) }
     }
 
     /// The integral of f cos per channel: the directional albedo.
@@ -111,7 +136,7 @@ impl<'a> Slice<'a> {
 
     /// f(w_i, w_o) (n . w_i) per channel, in 1/sr.
     pub fn f_cos(&self, w_i: DVec3) -> DVec3 {
-        self.brdf.evaluate(w_i, self.w_o) * w_i.z
+        above_base(self.brdf.evaluate(w_i, self.w_o), self.base) * w_i.z
     }
 
     /// Where the pdf is greatest.

@@ -57,16 +57,17 @@ const SLICE_POINTS: usize = 1500;
 const LIGHT_POINTS: usize = 48;
 
 impl TestLights {
-    /// About `count` lights, half where `slice` has its mass and half anywhere. `seed` turns them.
+    /// About `count` lights, half where `slice` has its lobes and half anywhere. `seed` turns them.
     pub fn new(slice: &Slice, count: usize, seed: usize) -> Self {
         let per_scale = count / SCALES / 2;
+        let lobes = slice.lobes();
         let mut lights = Vec::with_capacity(count);
         for scale in 0..SCALES {
             // Sets of different scales, rows and seeds must not line up.
             let shift = |x: f64, by: usize| (x + 0.381_966 * by as f64).fract();
             let turn = scale + SCALES * seed;
             for uv in fibonacci_lattice(per_scale) {
-                let near = slice.direction(glam::dvec2(shift(uv.x, 3 * turn + 1), shift(uv.y, turn)));
+                let near = lobes.direction(glam::dvec2(shift(uv.x, 3 * turn + 1), shift(uv.y, turn)));
                 lights.push(Light { direction: near, scale });
             }
             for uv in fibonacci_lattice(per_scale) {
