@@ -26,7 +26,7 @@ const TIED: f64 = 1e-6;
 
 /// Test lights of a row: so many for each unknown of a channel, and at least so many.
 const LIGHTS_A_THREAD: usize = 12;
-const FEWEST_LIGHTS: usize = 600;
+const FEWEST_LIGHTS: usize = 1200;
 
 /// Kernels narrower than this, in radians, stay where a facet mirrors the view to; wider ones stay where they are.
 const FOLLOWS_BELOW_RAD: f64 = 0.15;

@@ -28,9 +28,9 @@ pub fn scale_rad(level: f64) -> f64 {
     FINEST_WIDTH_RAD * level.exp2()
 }
 
-/// vMF around a direction at `cos` from `w`, in 1/sr.
-pub fn vmf(cos: f64, kappa: f64) -> f64 {
-    kappa / (2.0 * PI * -(-2.0 * kappa).exp_m1()) * (kappa * (cos - 1.0)).exp()
+/// vMF in its own direction, in 1/sr.
+pub fn vmf_peak(kappa: f64) -> f64 {
+    kappa / (2.0 * PI * -(-2.0 * kappa).exp_m1())
 }
 
 /// The integral of the product of two kernels whose directions are `cos` apart, and its derivative by `cos`.
@@ -94,6 +94,10 @@ mod tests {
     use super::*;
     use crate::threads::slice::fibonacci_lattice;
     use std::f64::consts::TAU;
+
+    fn vmf(cos: f64, kappa: f64) -> f64 {
+        vmf_peak(kappa) * (kappa * (cos - 1.0)).exp()
+    }
 
     #[test]
     fn overlap_is_the_integral_of_the_product() {

@@ -4,7 +4,7 @@ use std::sync::OnceLock;
 
 use glam::{DVec3, dvec3};
 
-use super::kernel::{vmf, vmf_direction};
+use super::kernel::{vmf_direction, vmf_peak};
 use crate::brdf::luminance;
 use crate::threads::slice::{Slice, fibonacci_lattice};
 
@@ -112,18 +112,19 @@ impl SlicePoints {
     /// The integral of f cos over a light: both sets of points with the balance heuristic.
     fn response(&self, slice: &Slice, light: &Light) -> DVec3 {
         let kappa = light_kappa(light.scale);
+        let peak = vmf_peak(kappa);
         let mut sum = DVec3::ZERO;
         for &(w, f_cos, density) in &self.points {
             let exponent = kappa * (w.dot(light.direction) - 1.0);
             if exponent > -30.0 {
-                let radiance = vmf(w.dot(light.direction), kappa);
+                let radiance = peak * exponent.exp();
                 sum += f_cos * radiance / (density + LIGHT_POINTS as f64 * radiance);
             }
         }
         for uv in fibonacci_lattice(LIGHT_POINTS) {
             let w = vmf_direction(light.direction, kappa, uv.x, TAU * uv.y);
             if w.z > 0.0 {
-                let radiance = vmf(w.dot(light.direction), kappa);
+                let radiance = peak * (kappa * (w.dot(light.direction) - 1.0)).exp();
                 let f_cos = slice.f_cos(w);
                 let density = SLICE_POINTS as f64 * slice.pdf_of(f_cos, w);
                 sum += f_cos * radiance / (density + LIGHT_POINTS as f64 * radiance);

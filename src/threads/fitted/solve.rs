@@ -3,7 +3,7 @@ use glam::{DVec3, dvec3};
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::kernel::{Pair, SHARPEST_LEVEL, WIDEST_LEVEL, kappa_of_level, overlap, scale_rad};
-use super::lights::{SCALES, TestLights, light_kappa};
+use super::lights::{Light, SCALES, TestLights, light_kappa};
 use crate::error::{Error, Result};
 use crate::threads::Observer;
 
@@ -34,16 +34,23 @@ fn pairs() -> &'static [[Pair; SCALES]] {
     })
 }
 
-/// How a kernel answers a light, and the derivatives by the cosine between them and by the level.
-fn answer(direction: DVec3, level: f64, light: DVec3, scale: usize) -> (f64, f64, f64) {
-    let from_sharpest = level - SHARPEST_LEVEL;
+/// How a kernel of weight 1 answers a light, and the derivatives by the cosine between them and by the level.
+#[derive(Clone, Copy)]
+struct Answer {
+    value: f64,
+    by_cos: f64,
+    by_level: f64,
+}
+
+fn answer(kernel: &Kernel, light: &Light) -> Answer {
+    let from_sharpest = kernel.level - SHARPEST_LEVEL;
     let pairs = pairs();
     let finer = (from_sharpest as usize).min(pairs.len() - 2);
     let t = from_sharpest - finer as f64;
-    let cos = direction.dot(light);
-    let (a, a_cos) = overlap(cos, &pairs[finer][scale]);
-    let (b, b_cos) = overlap(cos, &pairs[finer + 1][scale]);
-    (a + t * (b - a), a_cos + t * (b_cos - a_cos), b - a)
+    let cos = kernel.direction.dot(light.direction);
+    let (a, a_cos) = overlap(cos, &pairs[finer][light.scale]);
+    let (b, b_cos) = overlap(cos, &pairs[finer + 1][light.scale]);
+    Answer { value: a + t * (b - a), by_cos: a_cos + t * (b_cos - a_cos), by_level: b - a }
 }
 
 /// Iterations and when to stop.
@@ -82,22 +89,25 @@ impl<'a> Fit<'a> {
 
     /// The square root of the sum over lights and channels of squared weighted residuals, over that of squared weighted responses.
     pub fn relative_error(&self, kernels: &[Kernel]) -> f64 {
-        let residuals = self.residuals(kernels);
+        let residuals = self.residuals(kernels, &self.answers(kernels));
         let total = self.squared_responses();
         (residuals.iter().map(|r| r.length_squared()).sum::<f64>() / total.max(f64::MIN_POSITIVE)).sqrt()
     }
 
-    fn residuals(&self, kernels: &[Kernel]) -> Vec<DVec3> {
+    /// Of each kernel to each light; all lights of the first kernel first.
+    fn answers(&self, kernels: &[Kernel]) -> Vec<Answer> {
+        kernels.iter().flat_map(|kernel| self.lights.lights.iter().map(|light| answer(kernel, light))).collect()
+    }
+
+    fn residuals(&self, kernels: &[Kernel], answers: &[Answer]) -> Vec<DVec3> {
         let cosine = cosine_part(kernels, self.albedo);
         let TestLights { lights, weight, cosine: cosine_answer, response } = self.lights;
-        let residual = |j: usize| {
-            let mut sum = cosine * cosine_answer[j] - response[j];
-            for kernel in kernels {
-                sum += kernel.weight * answer(kernel.direction, kernel.level, lights[j].direction, lights[j].scale).0;
-            }
-            weight[j] * sum
-        };
-        (0..lights.len()).map(residual).collect()
+        let mut sums: Vec<_> = response.iter().zip(cosine_answer).map(|(r, answer)| cosine * *answer - *r).collect();
+        for (kernel, answers) in kernels.iter().zip(answers.chunks(lights.len())) {
+            sums.iter_mut().zip(answers).for_each(|(sum, answer)| *sum += kernel.weight * answer.value);
+        }
+        sums.iter_mut().zip(weight).for_each(|(sum, weight)| *sum *= *weight);
+        sums
     }
 
     fn prior_cost(&self, kernels: &[Kernel]) -> f64 {
@@ -110,14 +120,13 @@ impl<'a> Fit<'a> {
     }
 
     /// The weighted design, a row a light: answers of each kernel less the cosine's, then their derivatives by two tangents and the level.
-    fn design(&self, kernels: &[Kernel]) -> DMatrix<f64> {
+    fn design(&self, kernels: &[Kernel], answers: &[Answer]) -> DMatrix<f64> {
         let m = kernels.len();
         let TestLights { lights, weight, cosine, .. } = self.lights;
         let mut columns = DMatrix::zeros(lights.len(), 4 * m);
-        for (k, kernel) in kernels.iter().enumerate() {
+        for (k, (kernel, answers)) in kernels.iter().zip(answers.chunks(lights.len())).enumerate() {
             let (x, y) = kernel.direction.any_orthonormal_pair();
-            for (j, light) in lights.iter().enumerate() {
-                let (value, by_cos, by_level) = answer(kernel.direction, kernel.level, light.direction, light.scale);
+            for (j, (light, &Answer { value, by_cos, by_level })) in lights.iter().zip(answers).enumerate() {
                 columns[(j, k)] = weight[j] * (value - cosine[j]);
                 columns[(j, m + 3 * k)] = weight[j] * by_cos * x.dot(light.direction);
                 columns[(j, m + 3 * k + 1)] = weight[j] * by_cos * y.dot(light.direction);
@@ -135,10 +144,11 @@ impl<'a> Fit<'a> {
         let mut damping = 1e-3;
         let mut tried = 0;
         let squares = |r: &[DVec3]| r.iter().map(|r| r.length_squared()).sum::<f64>();
-        let mut residuals = self.residuals(kernels);
+        let mut answers = self.answers(kernels);
+        let mut residuals = self.residuals(kernels, &answers);
         let mut cost = squares(&residuals) + self.prior_cost(kernels);
         while tried < effort.steps {
-            let design = self.design(kernels);
+            let design = self.design(kernels, &answers);
             if observer.cancelled() {
                 return Err(Error::Cancelled);
             }
@@ -155,10 +165,11 @@ impl<'a> Fit<'a> {
                 }
                 tried += 1;
                 let next = step(kernels, &hessian, &gradient, damping);
-                let next_residuals = self.residuals(&next);
+                let next_answers = self.answers(&next);
+                let next_residuals = self.residuals(&next, &next_answers);
                 let next_cost = squares(&next_residuals) + self.prior_cost(&next);
                 if next_cost < cost {
-                    (*kernels, residuals, cost) = (next, next_residuals, next_cost);
+                    (*kernels, answers, residuals, cost) = (next, next_answers, next_residuals, next_cost);
                     damping = (damping * 0.2).max(1e-9);
                     break;
                 }
