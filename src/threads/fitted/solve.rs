@@ -34,12 +34,13 @@ fn pairs() -> &'static [[Pair; SCALES]] {
     })
 }
 
-/// How a kernel of weight 1 answers a light, and the derivatives by the cosine between them and by the level.
+/// How a kernel of weight 1 answers a light, and the derivatives by the cosine between them and by the level: below it and above it,
+/// which differ at whole levels.
 #[derive(Clone, Copy)]
 struct Answer {
     value: f64,
     by_cos: f64,
-    by_level: f64,
+    by_level: [f64; 2],
 }
 
 fn answer(kernel: &Kernel, light: &Light) -> Answer {
@@ -50,7 +51,8 @@ fn answer(kernel: &Kernel, light: &Light) -> Answer {
     let cos = kernel.direction.dot(light.direction);
     let (a, a_cos) = overlap(cos, &pairs[finer][light.scale]);
     let (b, b_cos) = overlap(cos, &pairs[finer + 1][light.scale]);
-    Answer { value: a + t * (b - a), by_cos: a_cos + t * (b_cos - a_cos), by_level: b - a }
+    let below = if t > 0.0 || finer == 0 { b - a } else { a - overlap(cos, &pairs[finer - 1][light.scale]).0 };
+    Answer { value: a + t * (b - a), by_cos: a_cos + t * (b_cos - a_cos), by_level: [below, b - a] }
 }
 
 /// Iterations and when to stop.
@@ -119,18 +121,44 @@ impl<'a> Fit<'a> {
         strength * cost.sum::<f64>()
     }
 
-    /// The weighted design, a row a light: answers of each kernel less the cosine's, then their derivatives by two tangents and the level.
-    fn design(&self, kernels: &[Kernel], answers: &[Answer]) -> DMatrix<f64> {
+    /// The levels that each kernel may go to in one step, from and to. The cost has a kink at each whole level: a step ends there, and
+    /// stays there where the cost rises both ways. Otherwise derivatives would be those of the wrong side, and one kernel at
+    /// a kink would keep all from moving.
+    fn level_bounds(&self, kernels: &[Kernel], answers: &[Answer], residuals: &[DVec3]) -> Vec<[f64; 2]> {
+        let weight = &self.lights.weight;
+        let slope = |k: usize, side: usize| -> f64 {
+            let answers = answers[k * weight.len()..].iter();
+            let terms = residuals.iter().zip(weight).zip(answers);
+            terms.map(|((r, weight), answer)| r.dot(kernels[k].weight) * weight * answer.by_level[side]).sum::<f64>()
+                + self.prior.map_or(0.0, |(before, strength)| strength * (kernels[k].level - before[k].level))
+        };
+        let bounds = |k: usize| {
+            let whole = kernels[k].level.floor();
+            if whole < kernels[k].level || whole < WIDEST_LEVEL && slope(k, 1) < 0.0 {
+                [whole, whole + 1.0]
+            } else if whole > SHARPEST_LEVEL && slope(k, 0) > 0.0 {
+                [whole - 1.0, whole]
+            } else {
+                [whole, whole]
+            }
+        };
+        (0..kernels.len()).map(bounds).collect()
+    }
+
+    /// The weighted design, a row a light: answers of each kernel less the cosine's, then their derivatives by two tangents and the level,
+    /// towards `levels`.
+    fn design(&self, kernels: &[Kernel], answers: &[Answer], levels: &[[f64; 2]]) -> DMatrix<f64> {
         let m = kernels.len();
         let TestLights { lights, weight, cosine, .. } = self.lights;
         let mut columns = DMatrix::zeros(lights.len(), 4 * m);
         for (k, (kernel, answers)) in kernels.iter().zip(answers.chunks(lights.len())).enumerate() {
             let (x, y) = kernel.direction.any_orthonormal_pair();
+            let side = usize::from(levels[k][1] > kernel.level);
             for (j, (light, &Answer { value, by_cos, by_level })) in lights.iter().zip(answers).enumerate() {
                 columns[(j, k)] = weight[j] * (value - cosine[j]);
                 columns[(j, m + 3 * k)] = weight[j] * by_cos * x.dot(light.direction);
                 columns[(j, m + 3 * k + 1)] = weight[j] * by_cos * y.dot(light.direction);
-                columns[(j, m + 3 * k + 2)] = weight[j] * by_level;
+                columns[(j, m + 3 * k + 2)] = weight[j] * by_level[side];
             }
         }
         columns
@@ -148,7 +176,8 @@ impl<'a> Fit<'a> {
         let mut residuals = self.residuals(kernels, &answers);
         let mut cost = squares(&residuals) + self.prior_cost(kernels);
         while tried < effort.steps {
-            let design = self.design(kernels, &answers);
+            let levels = self.level_bounds(kernels, &answers, &residuals);
+            let design = self.design(kernels, &answers, &levels);
             if observer.cancelled() {
                 return Err(Error::Cancelled);
             }
@@ -164,7 +193,7 @@ impl<'a> Fit<'a> {
                     return Err(Error::Cancelled);
                 }
                 tried += 1;
-                let next = step(kernels, &hessian, &gradient, damping);
+                let next = step(kernels, &levels, &hessian, &gradient, damping);
                 let next_answers = self.answers(&next);
                 let next_residuals = self.residuals(&next, &next_answers);
                 let next_cost = squares(&next_residuals) + self.prior_cost(&next);
@@ -240,13 +269,26 @@ impl<'a> Fit<'a> {
     }
 }
 
-/// The step of damped normal equations, within bounds: a weight at zero that would fall stays there.
-fn step(kernels: &[Kernel], hessian: &DMatrix<f64>, gradient: &DVector<f64>, damping: f64) -> Vec<Kernel> {
+/// The step of damped normal equations, within bounds: a weight at zero that would fall stays there, and levels are bounded by `levels`.
+fn step(
+    kernels: &[Kernel],
+    levels: &[[f64; 2]],
+    hessian: &DMatrix<f64>,
+    gradient: &DVector<f64>,
+    damping: f64,
+) -> Vec<Kernel> {
     let m = kernels.len();
     let mut matrix = hessian.clone();
     let mut right = -gradient;
     let largest = (0..6 * m).map(|i| hessian[(i, i)]).fold(0.0, f64::max);
-    let frozen = |i: usize| i < 3 * m && kernels[i % m].weight[i / m] <= 0.0 && gradient[i] > 0.0;
+    let frozen = |i: usize| {
+        if i < 3 * m {
+            kernels[i % m].weight[i / m] <= 0.0 && gradient[i] > 0.0
+        } else {
+            let [from, to] = levels[i / 3 - m];
+            i % 3 == 2 && from == to
+        }
+    };
     let floor = |k: usize| {
         // Kernels without weight have no gradient in direction and level: they stay where they are.
         1e-10 * largest / scale_rad(kernels[k].level).powi(2)
@@ -277,7 +319,7 @@ fn step(kernels: &[Kernel], hessian: &DMatrix<f64>, gradient: &DVector<f64>, dam
             let weight = dvec3(change[k], change[m + k], change[2 * m + k]);
             Kernel {
                 direction: (kernel.direction + tangent).normalize(),
-                level: (kernel.level + limit(change[at + 2], 1.0)).clamp(SHARPEST_LEVEL, WIDEST_LEVEL),
+                level: (kernel.level + change[at + 2]).clamp(levels[k][0], levels[k][1]),
                 weight: (kernel.weight + weight).max(DVec3::ZERO),
             }
         })
