@@ -285,6 +285,24 @@ mod tests {
     }
 
     #[test]
+    fn lobes_are_the_slice_without_its_base() {
+        let parameters = "distribution = 'ggx'\nalpha = 0.05\nior = 1.5\ndiffuse = [0.3, 0.3, 0.6]";
+        let plastic = Brdf::from_parameters("plastic", parameters.parse().unwrap()).unwrap();
+        let slice = Slice::new(&plastic, 45f64.to_radians());
+        let mirror = dvec3(-1.0, 0.0, 1.0).normalize();
+        let near = |slice: &Slice| {
+            let count = 1000;
+            slice.points(count).filter(|w_i| w_i.angle_between(mirror) < 0.3).count() as f64 / count as f64
+        };
+        let [of_all, of_lobes] = [near(&slice), near(&slice.lobes())];
+        assert!(of_all < 0.3 && of_lobes > 2.0 * of_all, "{of_all} {of_lobes}");
+        // Nothing stands out of Lambert: anywhere will do.
+        let lambert = Brdf::from_parameters("lambert", toml::toml! { reflectance = 0.5 }).unwrap();
+        let lobes = Slice::new(&lambert, 0.5).lobes();
+        assert!(lobes.albedo() == DVec3::ZERO && lobes.direction(DVec2::splat(0.5)).z > 0.0);
+    }
+
+    #[test]
     fn peak_is_the_mirror_direction_of_a_narrow_lobe_and_the_normal_of_a_diffuse_one() {
         for theta_o_deg in [0.0f64, 20.0, 50.0, 70.0] {
             let theta_o = theta_o_deg.to_radians();

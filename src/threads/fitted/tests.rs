@@ -3,7 +3,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use glam::DVec3;
 
-use super::kernel::{SHARPEST_LEVEL, WIDEST_LEVEL};
+use super::kernel::{SHARPEST_LEVEL, WIDEST_LEVEL, scale_rad};
 use super::solve::Kernel;
 use super::{FittedTable, MAX_COUNT, PackedKernel, generate};
 use crate::brdf::Brdf;
@@ -98,6 +98,22 @@ fn weights_are_not_negative_and_sum_to_the_albedo() {
 }
 
 #[test]
+fn a_glossy_plastic_is_fitted_in_its_lobe_as_on_its_base() {
+    let parameters = "distribution = 'ggx'\nalpha = 0.05\nior = 1.5\ndiffuse = [0.3, 0.3, 0.6]";
+    let plastic = Brdf::from_parameters("plastic", parameters.parse().unwrap()).unwrap();
+    // Of two rows the second is at 45 degrees.
+    let table = generate(&plastic, &small(16, 2), &()).unwrap();
+    let mirror = glam::Vec3::new(-1.0, 0.0, 1.0).normalize();
+    let in_lobe = table.row(1).iter().map(|packed| packed.unpack()).filter(|kernel| {
+        let width_deg = scale_rad(kernel.level.into()).to_degrees();
+        kernel.direction.angle_between(mirror).to_degrees() < 8.0 && width_deg < 4.0
+    });
+    // Started on the base one is there, and the error is 0.0086; where kernels stick at whole levels it is 0.0101.
+    assert!(in_lobe.count() >= 3);
+    assert!(table.relative_error[1] < 0.0075, "{}", table.relative_error[1]);
+}
+
+#[test]
 fn more_threads_leave_less_error() {
     for (name, brdf) in test_materials::all() {
         let error = |count: usize| {
@@ -106,9 +122,10 @@ fn more_threads_leave_less_error() {
         };
         let [few, some, many] = [2, 8, 32].map(error);
         println!("{name}: relative error {few:.4} with 2 threads, {some:.4} with 8, {many:.4} with 32");
-        // A diffuse material needs none, and measured alumina-oxide has all it can get with 8; each number has other lights.
+        // A diffuse material needs none, and measured alumina-oxide has all it can get with 8; each number has other lights, whose
+        // answers are good to 1e-3: what Lambert has above.
         if name != "lambert" {
-            assert!(few > 1.5 * some && many < 1.2 * some, "{name}: {few} {some} {many}");
+            assert!(few > 1.5 * some && many < (1.2 * some).max(1e-3), "{name}: {few} {some} {many}");
         }
     }
 }
