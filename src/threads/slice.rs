@@ -286,8 +286,7 @@ mod tests {
 
     #[test]
     fn lobes_are_the_slice_without_its_base() {
-        let parameters = "distribution = 'ggx'\nalpha = 0.05\nior = 1.5\ndiffuse = [0.3, 0.3, 0.6]";
-        let plastic = Brdf::from_parameters("plastic", parameters.parse().unwrap()).unwrap();
+        let plastic = test_materials::glossy_plastic();
         let slice = Slice::new(&plastic, 45f64.to_radians());
         let mirror = dvec3(-1.0, 0.0, 1.0).normalize();
         let near = |slice: &Slice| {

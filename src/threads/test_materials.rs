@@ -41,6 +41,12 @@ pub fn narrow() -> &'static Brdf {
     &NARROW
 }
 
+/// A lobe on a base that has most of the mass.
+pub fn glossy_plastic() -> Brdf {
+    let parameters = "distribution = 'ggx'\nalpha = 0.05\nior = 1.5\ndiffuse = [0.3, 0.3, 0.6]";
+    Brdf::from_parameters("plastic", parameters.parse().unwrap()).unwrap()
+}
+
 /// The kinds of material that threads have to work for, by name.
 pub fn all() -> Vec<(&'static str, Brdf)> {
     let plastic = "distribution = 'ggx'\nalpha = 0.12\nior = 1.5\ndiffuse = [0.3, 0.08, 0.04]";

@@ -314,8 +314,8 @@ fn step(
             let at = 3 * m + 3 * k;
             let width = scale_rad(kernel.level);
             // The model of a kernel's answer is linear over about its own width.
-            let limit = |value: f64, most: f64| value.clamp(-most, most);
-            let tangent = limit(change[at], 2.0 * width) * x + limit(change[at + 1], 2.0 * width) * y;
+            let limit = |value: f64| value.clamp(-2.0 * width, 2.0 * width);
+            let tangent = limit(change[at]) * x + limit(change[at + 1]) * y;
             let weight = dvec3(change[k], change[m + k], change[2 * m + k]);
             Kernel {
                 direction: (kernel.direction + tangent).normalize(),

@@ -99,10 +99,8 @@ fn weights_are_not_negative_and_sum_to_the_albedo() {
 
 #[test]
 fn a_glossy_plastic_is_fitted_in_its_lobe_as_on_its_base() {
-    let parameters = "distribution = 'ggx'\nalpha = 0.05\nior = 1.5\ndiffuse = [0.3, 0.3, 0.6]";
-    let plastic = Brdf::from_parameters("plastic", parameters.parse().unwrap()).unwrap();
     // Of two rows the second is at 45 degrees.
-    let table = generate(&plastic, &small(16, 2), &()).unwrap();
+    let table = generate(&test_materials::glossy_plastic(), &small(16, 2), &()).unwrap();
     let mirror = glam::Vec3::new(-1.0, 0.0, 1.0).normalize();
     let in_lobe = table.row(1).iter().map(|packed| packed.unpack()).filter(|kernel| {
         let width_deg = scale_rad(kernel.level.into()).to_degrees();
