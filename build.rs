@@ -89,7 +89,7 @@ fn compile(table: &mut String, source: &Path, name: &str, stage: &str, includes:
     let spirv = spirv.display();
     let _ = writeln!(
         table,
-        "/// `{}`.\npub const {constant}: Shader = Shader {{ name: {name:?}, stage: Stage::{stage}, spirv: include_bytes!({:?}) }};",
+        "/// `{}`.\npub const {constant}: Shader = Shader {{ name: {name:?}, stage: ShaderStage::{stage}, spirv: include_bytes!({:?}) }};",
         source.display(),
         spirv.to_string(),
     );

@@ -51,7 +51,7 @@ pub mod scene;
 pub mod shading;
 pub mod threads;
 #[cfg(feature = "viewer")]
-pub mod view;
+pub mod viewer;
 #[allow(unsafe_code)]
 pub mod vulkan;
 

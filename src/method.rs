@@ -25,9 +25,9 @@ pub enum Method {
     /// Monte Carlo, in proportion to the environment's light (Agarwal et al. 2003).
     Environment,
     /// Resampled importance sampling of the whole product (Talbot et al. 2005).
-    Resampled,
+    Ris,
     /// Multiple importance sampling of lobe and light (Veach and Guibas 1995) at Sobol's points: the reference's form on the GPU.
-    Combined,
+    Mis,
     /// Quadrature on the CPU: the truth.
     Reference,
 }
@@ -42,8 +42,8 @@ impl Method {
         Self::Importance,
         Self::Filtered,
         Self::Environment,
-        Self::Resampled,
-        Self::Combined,
+        Self::Ris,
+        Self::Mis,
         Self::Reference,
     ];
 
@@ -57,8 +57,8 @@ impl Method {
             Self::Importance => "importance",
             Self::Filtered => "filtered",
             Self::Environment => "environment",
-            Self::Resampled => "resampled",
-            Self::Combined => "combined",
+            Self::Ris => "ris",
+            Self::Mis => "mis",
             Self::Reference => "reference",
         }
     }
@@ -68,6 +68,12 @@ impl Method {
     /// # Errors
     /// There is none.
     pub fn from_name(name: &str) -> Result<Self> {
+        // Names of older scene files and scripts.
+        let name = match name {
+            "resampled" => "ris",
+            "combined" => "mis",
+            name => name,
+        };
         Self::ALL.iter().copied().find(|method| method.name() == name).ok_or_else(|| {
             let known: Vec<_> = Self::ALL.iter().map(|method| method.name()).collect();
             Error::input(format!("method \"{name}\""), "is not known", format!("use one of: {}", known.join(", ")))
@@ -87,17 +93,17 @@ impl Method {
             Self::Importance => Ok(&compiled::SHADE_IMPORTANCE),
             Self::Filtered => Ok(&compiled::SHADE_FILTERED),
             Self::Environment => Ok(&compiled::SHADE_ENVIRONMENT),
-            Self::Resampled => Ok(&compiled::SHADE_RESAMPLED),
-            Self::Combined => Ok(&compiled::SHADE_COMBINED),
+            Self::Ris => Ok(&compiled::SHADE_RIS),
+            Self::Mis => Ok(&compiled::SHADE_MIS),
             Self::Reference => Err(Error::input("method \"reference\"", "does not run on the GPU", "use another here")),
         }
     }
 
     /// The threads that it shades by; the others draw that many samples instead.
-    pub fn threads(self) -> Option<threads::Kind> {
+    pub fn threads(self) -> Option<threads::ThreadKind> {
         match self {
-            Self::Fitted => Some(threads::Kind::Fitted),
-            Self::Paper => Some(threads::Kind::Paper),
+            Self::Fitted => Some(threads::ThreadKind::Fitted),
+            Self::Paper => Some(threads::ThreadKind::Paper),
             _ => None,
         }
     }

@@ -2,7 +2,7 @@
 use crate::brdf::Brdf;
 use crate::environment::Environment;
 use crate::method::Method;
-use crate::passes::{Object, Sampling, View};
+use crate::passes::{PlacedMesh, Sampling, View};
 use crate::scene::{Camera, MaterialSource, Mesh, Scene};
 use crate::threads::{self, CacheState, Observer, Threads};
 use crate::{Error, Result};
@@ -29,7 +29,7 @@ pub struct Prepared {
     /// Each mesh once, however many objects have it.
     pub meshes: Vec<(String, Arc<Mesh>)>,
     /// The objects.
-    pub objects: Vec<Object>,
+    pub objects: Vec<PlacedMesh>,
     /// Name, BRDF and threads of each material that an object has.
     pub materials: Vec<PreparedMaterial>,
     /// Time it took to make or load the threads.
@@ -83,7 +83,7 @@ pub fn load_threads(
     observer: &dyn Observer,
 ) -> Result<Option<(Threads, CacheState, Duration)>> {
     let Some(kind) = method.threads() else { return Ok(None) };
-    let settings = threads::Settings { kind, count: count as usize, seed, ..Default::default() };
+    let settings = threads::ThreadSettings { kind, count: count as usize, seed, ..Default::default() };
     threads::load_or_generate(brdf, &settings, cache, observer).map(Some)
 }
 
@@ -132,7 +132,7 @@ pub fn prepare_again(
             used_materials.push(&object.material);
             used_materials.len() - 1
         });
-        objects.push(Object {
+        objects.push(PlacedMesh {
             mesh,
             material: material as u32,
             to_world: DAffine3::from_mat4(object.transform().as_dmat4()),
@@ -262,7 +262,7 @@ pub(crate) fn check_count(method: Method, count: u32, subpixels: u32) -> Result<
 }
 
 /// Centre and radius of a sphere in world space that holds `object`.
-fn world_sphere(meshes: &[(String, Arc<Mesh>)], object: &Object) -> (DVec3, f64) {
+fn world_sphere(meshes: &[(String, Arc<Mesh>)], object: &PlacedMesh) -> (DVec3, f64) {
     let (center, radius) = meshes[object.mesh].1.bounding_sphere();
     let m = object.to_world.matrix3;
     let scale = m.x_axis.length().max(m.y_axis.length()).max(m.z_axis.length());
@@ -284,7 +284,7 @@ fn check_size(mesh: &str, (center, radius): (DVec3, f64)) -> Result<()> {
 }
 
 /// A sphere around the bounding spheres of all objects: centre of their box, and the radius that reaches the farthest.
-fn bounding_sphere(meshes: &[(String, Arc<Mesh>)], objects: &[Object]) -> (DVec3, f64) {
+fn bounding_sphere(meshes: &[(String, Arc<Mesh>)], objects: &[PlacedMesh]) -> (DVec3, f64) {
     let spheres: Vec<_> = objects.iter().map(|object| world_sphere(meshes, object)).collect();
     let low = spheres.iter().fold(DVec3::INFINITY, |low, (center, radius)| low.min(*center - *radius));
     let high = spheres.iter().fold(DVec3::NEG_INFINITY, |high, (center, radius)| high.max(*center + *radius));

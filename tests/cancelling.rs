@@ -13,7 +13,7 @@ use threadlight::passes::filter_environment;
 use threadlight::pipeline::render_geometry;
 use threadlight::prepare::Prepared;
 use threadlight::scene::{MaterialSource, Scene, Source};
-use threadlight::threads::{Kind, Observer, Settings, generate};
+use threadlight::threads::{Observer, ThreadKind, ThreadSettings, generate};
 use threadlight::vulkan::PipelineCache;
 use threadlight::{Error, Result};
 
@@ -52,8 +52,8 @@ fn time_to_stop<T: Send>(after: Duration, work: impl FnOnce(&Flag) -> Result<T> 
 fn threads_stop_being_made_at_once() {
     let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
     let narrow = Brdf::builtin("chrome").unwrap();
-    for (kind, count) in [(Kind::Fitted, 128), (Kind::Paper, 1024)] {
-        let settings = Settings { kind, count, ..Settings::default() };
+    for (kind, count) in [(ThreadKind::Fitted, 128), (ThreadKind::Paper, 1024)] {
+        let settings = ThreadSettings { kind, count, ..ThreadSettings::default() };
         for after in [10, 100, 300, 1000].map(Duration::from_millis) {
             let time = time_to_stop(after, |flag| generate(&narrow, &settings, flag));
             println!("{} {count}, cancelled after {after:?}: {time:?}", kind.name());

@@ -13,7 +13,7 @@ use threadlight::output::write_exr;
 use threadlight::pipeline::{Renderer, Rendering, Wanted};
 use threadlight::prepare::Prepared;
 use threadlight::scene::{Background, MaterialSettings, MaterialSource, ObjectSettings, Scene, Source};
-use threadlight::shading::{self, Surface, Twin};
+use threadlight::shading::{self, CpuShader, Surface};
 
 /// The methods that draw random numbers.
 const ESTIMATORS: [Method; 7] = [
@@ -22,8 +22,8 @@ const ESTIMATORS: [Method; 7] = [
     Method::Importance,
     Method::Filtered,
     Method::Environment,
-    Method::Resampled,
-    Method::Combined,
+    Method::Ris,
+    Method::Mis,
 ];
 
 /// Those among them that are right on average.
@@ -85,7 +85,7 @@ fn every_estimator_agrees_with_its_cpu_twin() {
         scene.shading.seed = 1 << 40 | 5;
         let prepared = ready(&scene);
         let rendering = render(&gpu, &prepared);
-        let twin = Twin::new(&prepared).unwrap();
+        let twin = CpuShader::new(&prepared).unwrap();
         let mut differences = Vec::new();
         for pixel in pixels(&prepared) {
             let expected = twin.shade(pixel, &texels_of(&prepared, &rendering, pixel));
@@ -226,7 +226,7 @@ fn errors_of_unbiased_estimators_fall_as_one_over_the_root_of_samples() {
         println!("{}: {errors:.5?} with 64 to 4096 samples, slope {slope:.3}", method.name());
         match method {
             // Evenly distributed points do better than random ones.
-            Method::Combined => assert!(slope < -0.5, "{errors:?}, slope {slope}"),
+            Method::Mis => assert!(slope < -0.5, "{errors:?}, slope {slope}"),
             _ => assert!((slope + 0.5).abs() < 0.05, "{}: {errors:?}, slope {slope}", method.name()),
         }
     }

@@ -35,7 +35,7 @@ struct Frame {
 
 struct Resource {
     name: String,
-    kind: Kind,
+    kind: ResourceKind,
     import: Option<(Option<Access>, Option<Access>)>,
     versions: u32,
 }
@@ -69,19 +69,19 @@ const BUFFER_READS: [Access; 7] = [
     Access::TransferRead,
 ];
 
-fn writes_of(kind: &Kind) -> &'static [Access] {
+fn writes_of(kind: &ResourceKind) -> &'static [Access] {
     match kind {
-        Kind::Buffer(_) => &BUFFER_WRITES,
-        Kind::Image(desc) if is_depth(desc.format) => &DEPTH_WRITES,
-        Kind::Image(_) => &COLOR_WRITES,
+        ResourceKind::Buffer(_) => &BUFFER_WRITES,
+        ResourceKind::Image(desc) if is_depth(desc.format) => &DEPTH_WRITES,
+        ResourceKind::Image(_) => &COLOR_WRITES,
     }
 }
 
-fn reads_of(kind: &Kind) -> &'static [Access] {
+fn reads_of(kind: &ResourceKind) -> &'static [Access] {
     match kind {
-        Kind::Buffer(_) => &BUFFER_READS,
-        Kind::Image(desc) if is_depth(desc.format) => &DEPTH_READS,
-        Kind::Image(_) => &COLOR_READS,
+        ResourceKind::Buffer(_) => &BUFFER_READS,
+        ResourceKind::Image(desc) if is_depth(desc.format) => &DEPTH_READS,
+        ResourceKind::Image(_) => &COLOR_READS,
     }
 }
 
@@ -91,8 +91,8 @@ impl Frame {
         let mut frame = Self::default();
         for index in 0..3 + random.below(7) {
             let kind = match random.below(3) {
-                0 => Kind::Buffer(BufferDesc { size_bytes: 1 + random.below(5000) as u64 }),
-                which => Kind::Image(ImageDesc {
+                0 => ResourceKind::Buffer(BufferDesc { size_bytes: 1 + random.below(5000) as u64 }),
+                which => ResourceKind::Image(ImageDesc {
                     format: [vk::Format::R8G8B8A8_UNORM, vk::Format::D32_SFLOAT][which - 1],
                     width: 1 + random.below(90) as u32,
                     height: 1 + random.below(90) as u32,
@@ -102,7 +102,7 @@ impl Frame {
                 let all: Vec<_> = writes_of(&kind).iter().chain(reads_of(&kind)).copied().chain(outside).collect();
                 random.chance(60).then(|| random.pick(&all))
             };
-            let is_buffer = matches!(kind, Kind::Buffer(_));
+            let is_buffer = matches!(kind, ResourceKind::Buffer(_));
             let import = random.chance(30).then(|| {
                 let before = accesses(&mut random, Some(if is_buffer { Access::HostWrite } else { Access::Present }));
                 let after = accesses(&mut random, Some(if is_buffer { Access::HostRead } else { Access::Present }));
@@ -110,7 +110,7 @@ impl Frame {
             });
             frame.resources.push(Resource { name: format!("r{index}"), kind, import, versions: 0 });
         }
-        let kind = Kind::Buffer(BufferDesc { size_bytes: 64 });
+        let kind = ResourceKind::Buffer(BufferDesc { size_bytes: 64 });
         let import = Some((Some(Access::HostRead), Some(Access::HostRead)));
         frame.resources.push(Resource { name: "result".into(), kind, import, versions: 0 });
 
@@ -159,7 +159,7 @@ impl Frame {
         let access = random.pick(reads_of(kind));
         uses.push(Use { resource, version, mode: Mode::Read, access });
         let also = random.pick(reads_of(kind));
-        let same_layout = matches!(kind, Kind::Buffer(_)) || also.info().layout == access.info().layout;
+        let same_layout = matches!(kind, ResourceKind::Buffer(_)) || also.info().layout == access.info().layout;
         if same_layout && random.chance(30) {
             uses.push(Use { resource, version, mode: Mode::Read, access: also });
         }
@@ -183,10 +183,14 @@ impl Frame {
         let mut handles: Vec<Vec<Handle>> = Vec::new();
         for Resource { name, kind, import, .. } in &self.resources {
             handles.push(vec![match (*kind, *import) {
-                (Kind::Image(desc), None) => graph.image(name, desc).into(),
-                (Kind::Buffer(desc), None) => graph.buffer(name, desc).into(),
-                (Kind::Image(desc), Some((before, after))) => graph.import_image(name, desc, before, after).into(),
-                (Kind::Buffer(desc), Some((before, after))) => graph.import_buffer(name, desc, before, after).into(),
+                (ResourceKind::Image(desc), None) => graph.image(name, desc).into(),
+                (ResourceKind::Buffer(desc), None) => graph.buffer(name, desc).into(),
+                (ResourceKind::Image(desc), Some((before, after))) => {
+                    graph.import_image(name, desc, before, after).into()
+                }
+                (ResourceKind::Buffer(desc), Some((before, after))) => {
+                    graph.import_buffer(name, desc, before, after).into()
+                }
             }]);
         }
         for (index, (name, uses)) in self.passes.iter().enumerate() {
@@ -246,11 +250,11 @@ impl Frame {
 
 fn memory(info: &ResourceInfo) -> MemoryRequirement {
     let (size_bytes, alignment) = match info.kind {
-        Kind::Buffer(desc) => (desc.size_bytes, 64),
-        Kind::Image(desc) => (u64::from(desc.width * desc.height * 4), 1024),
+        ResourceKind::Buffer(desc) => (desc.size_bytes, 64),
+        ResourceKind::Image(desc) => (u64::from(desc.width * desc.height * 4), 1024),
     };
     // Depth images live in other memory than colour images, as on some devices.
-    let is_depth = matches!(info.kind, Kind::Image(desc) if is_depth(desc.format));
+    let is_depth = matches!(info.kind, ResourceKind::Image(desc) if is_depth(desc.format));
     MemoryRequirement { size_bytes, alignment, memory_type_bits: if is_depth { 0b110 } else { 0b011 } }
 }
 

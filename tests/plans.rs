@@ -5,8 +5,8 @@ use threadlight::graph::*;
 /// Memory as a plain device would ask for it: images in multiples of 64 KiB, buffers of 256 bytes.
 fn memory(info: &ResourceInfo) -> MemoryRequirement {
     let (bytes, alignment) = match info.kind {
-        Kind::Buffer(desc) => (desc.size_bytes, 256),
-        Kind::Image(desc) => {
+        ResourceKind::Buffer(desc) => (desc.size_bytes, 256),
+        ResourceKind::Image(desc) => {
             let texel_bytes = match desc.format {
                 vk::Format::R32G32B32A32_SFLOAT => 16,
                 vk::Format::R32G32_UINT => 8,

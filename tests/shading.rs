@@ -52,7 +52,7 @@ fn the_shader_agrees_with_its_cpu_twin() {
             scene.environment.intensity = 1.7;
             let prepared = ready(&scene);
             let rendering = gpu.render(&prepared, EVERYTHING);
-            let twin = shading::Twin::new(&prepared).unwrap();
+            let twin = shading::CpuShader::new(&prepared).unwrap();
             let (mut interior, mut edge, mut covered) = (0, 0, 0);
             for pixel in pixels(&prepared) {
                 let texels = texels_of(&prepared, &rendering, pixel);

@@ -11,7 +11,7 @@ use threadlight::output::{ExrHeader, write_exr};
 use threadlight::pipeline::Wanted;
 use threadlight::prepare::Prepared;
 use threadlight::scene::{MaterialSource, Scene, Source};
-use threadlight::threads::{Kind, Observer, Settings, load_or_generate};
+use threadlight::threads::{Observer, ThreadKind, ThreadSettings, load_or_generate};
 use threadlight::{Error, Result};
 
 fn grey() -> MaterialSource {
@@ -43,7 +43,7 @@ fn sweep(folder: &TempDir) -> Sweep {
 /// The picture with 16 threads of `paper`, as if it were the truth.
 fn sixteen_threads(gpu: &Validated, prepared: &Prepared) -> Result<ReferencePicture> {
     // What is asked for has the material and the environment, but threads of any number.
-    let settings = Settings { kind: Kind::Paper, count: 16, ..Settings::default() };
+    let settings = ThreadSettings { kind: ThreadKind::Paper, count: 16, ..ThreadSettings::default() };
     let material = &prepared.materials[0];
     let (threads, ..) = load_or_generate(&material.brdf, &settings, None, &())?;
     let mut own = ready(&sphere(grey(), "white", 1, (1, 1)));

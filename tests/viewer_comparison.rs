@@ -3,7 +3,7 @@
 mod common;
 use common::{Validated, ready, sphere};
 use threadlight::scene::{MaterialSource, ShadingSettings};
-use threadlight::view::comparison::{Compared, Other, compare_with};
+use threadlight::viewer::comparison::{Compared, Other, compare_with};
 
 #[test]
 fn a_picture_is_compared_with_another_method_with_itself_and_with_the_reference() {

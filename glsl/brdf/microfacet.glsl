@@ -33,7 +33,7 @@ float g1_over_cos(float distribution, float cos_theta, float alpha) {
 }
 
 // D G / (4 cos_theta_i cos_theta_o) in 1/sr.
-float rough_mirror(float distribution, vec3 w_i, vec3 w_o, vec3 h, float alpha) {
+float torrance_sparrow(float distribution, vec3 w_i, vec3 w_o, vec3 h, float alpha) {
     return 0.25 * microfacet_density(distribution, h, alpha) * g1_over_cos(distribution, w_i.z, alpha)
         * g1_over_cos(distribution, w_o.z, alpha);
 }

@@ -21,7 +21,7 @@ pub struct Conductor {
 impl Model for Conductor {
     fn evaluate(&self, w_i: DVec3, w_o: DVec3) -> DVec3 {
         let h = (w_i + w_o).normalize();
-        fresnel_conductor(w_o.dot(h), self.eta, self.k) * self.distribution.rough_mirror(w_i, w_o, h, self.alpha)
+        fresnel_conductor(w_o.dot(h), self.eta, self.k) * self.distribution.torrance_sparrow(w_i, w_o, h, self.alpha)
     }
 
     fn from_parameters(parameters: &mut Parameters) -> Result<Self> {

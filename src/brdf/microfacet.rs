@@ -67,7 +67,7 @@ impl Distribution {
 
     /// D G / (4 cos_theta_i cos_theta_o) in 1/sr: the BRDF of a rough mirror of reflectance 1. `h` is the half vector.
     #[inline]
-    pub fn rough_mirror(self, w_i: DVec3, w_o: DVec3, h: DVec3, alpha: f64) -> f64 {
+    pub fn torrance_sparrow(self, w_i: DVec3, w_o: DVec3, h: DVec3, alpha: f64) -> f64 {
         0.25 * self.density(h, alpha) * self.g1_over_cos(w_i.z, alpha) * self.g1_over_cos(w_o.z, alpha)
     }
 

@@ -48,7 +48,8 @@ fn mean_fresnel(ior: f64) -> f64 {
 impl Model for Plastic {
     fn evaluate(&self, w_i: DVec3, w_o: DVec3) -> DVec3 {
         let h = (w_i + w_o).normalize();
-        let coat = fresnel_dielectric(w_o.dot(h), self.ior) * self.distribution.rough_mirror(w_i, w_o, h, self.alpha);
+        let coat =
+            fresnel_dielectric(w_o.dot(h), self.ior) * self.distribution.torrance_sparrow(w_i, w_o, h, self.alpha);
         let transmitted = (1.0 - fresnel_dielectric(w_i.z, self.ior)) * (1.0 - fresnel_dielectric(w_o.z, self.ior));
         DVec3::splat(coat) + self.base * (transmitted * FRAC_1_PI)
     }

@@ -43,7 +43,7 @@ pub struct Arguments {
 enum Command {
     Render(Box<render::Render>),
     #[cfg(feature = "viewer")]
-    View(Box<view::View>),
+    View(Box<view::ViewArguments>),
     Compare(compare::Compare),
     Bench(bench::Bench),
     Threads(threads::Threads),

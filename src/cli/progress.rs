@@ -5,12 +5,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use threadlight::threads::Observer;
 
 /// A bar on a terminal (nothing elsewhere); Ctrl-C cancels what it shows.
-pub struct Progress {
+pub struct TerminalProgress {
     bar: ProgressBar,
     cancelled: Arc<AtomicBool>,
 }
 
-impl Progress {
+impl TerminalProgress {
     /// A bar called `name` that counts rows, hidden until something happens.
     pub fn new(name: &'static str) -> anyhow::Result<Self> {
         Self::of(name, "rows")
@@ -45,7 +45,7 @@ impl Progress {
     }
 }
 
-impl Observer for Progress {
+impl Observer for TerminalProgress {
     fn progress(&self, done: usize, total: usize) {
         self.bar.set_length(total as u64);
         self.bar.set_position(done as u64);

@@ -1,6 +1,6 @@
 //! `threadlight render`: a picture of a scene.
 use super::number;
-use super::progress::Progress;
+use super::progress::TerminalProgress;
 use super::scene_flags::{MachineFlags, SceneFlags};
 use anyhow::Context;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
@@ -141,7 +141,7 @@ impl Render {
         drop(instance);
         let device_name = device.description().name.clone();
 
-        let progress = Progress::new("threads")?;
+        let progress = TerminalProgress::new("threads")?;
         let (prepared, expected_rms) = match self.error {
             Some(most) => {
                 let (prepared, rms) = prepare_within(&scene, most, &device, cache.as_deref(), &progress)?;

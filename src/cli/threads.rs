@@ -1,5 +1,5 @@
 //! `threadlight threads`: makes, writes and draws the sample threads of a material.
-use super::progress::Progress;
+use super::progress::TerminalProgress;
 use super::{cache_folder, stem};
 use std::path::PathBuf;
 use threadlight::Error;
@@ -7,7 +7,7 @@ use threadlight::method::Method;
 use threadlight::output;
 use threadlight::prepare::load_material;
 use threadlight::scene::MaterialSource;
-use threadlight::threads::{self, CacheState, Kind, Settings};
+use threadlight::threads::{self, CacheState, ThreadKind, ThreadSettings};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -24,7 +24,7 @@ pub struct Threads {
     #[arg(long, value_name = "N")]
     count: Option<u32>,
     /// Whose threads: fitted or paper.
-    #[arg(long, value_name = "METHOD", default_value = Kind::default().name())]
+    #[arg(long, value_name = "METHOD", default_value = ThreadKind::default().name())]
     method: String,
     /// Seed of everything random; the same seed gives the same bytes.
     #[arg(long, value_name = "N", default_value_t = 0)]
@@ -63,8 +63,8 @@ impl Threads {
             _ => self.material.clone(),
         };
         let brdf = load_material(&source)?;
-        let settings = Settings { kind, count, seed: self.seed, ..Default::default() };
-        let progress = Progress::new("threads")?;
+        let settings = ThreadSettings { kind, count, seed: self.seed, ..Default::default() };
+        let progress = TerminalProgress::new("threads")?;
         let cache = cache_folder(self.no_cache);
         let (threads, state, time) = threads::load_or_generate(&brdf, &settings, cache.as_deref(), &progress)?;
         progress.finish();

@@ -4,7 +4,7 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::value_parser;
 use std::path::PathBuf;
 use threadlight::output::{self, Format};
-use threadlight::view::{self, Settings, input};
+use threadlight::viewer::{self, ViewerSettings, input};
 use threadlight::vulkan::PresentMode;
 use threadlight::{Error, Result};
 
@@ -26,7 +26,7 @@ In the window:
 /// Opens a window to look at a scene, change it, and save picture and scene. Flags override the scene file.
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES, allow_negative_numbers = true)]
-pub struct View {
+pub struct ViewArguments {
     #[command(flatten)]
     scene: SceneFlags,
     #[command(flatten)]
@@ -48,7 +48,7 @@ pub struct View {
 /// Size of the picture where neither scene nor flag names one: with the panel, 1280 x 720.
 const SIZE: (u32, u32) = (980, 720);
 
-impl View {
+impl ViewArguments {
     pub fn run(self) -> anyhow::Result<()> {
         if let Some(path) = &self.screenshot {
             if Format::of(path)? != Format::Png {
@@ -61,7 +61,7 @@ impl View {
             (scene.image.width, scene.image.height) = SIZE;
         }
         let replay = self.replay.as_deref().map(input::read_replay).transpose()?.unwrap_or_default();
-        let messages = view::run(Settings {
+        let messages = viewer::run(ViewerSettings {
             scene,
             cache: self.machine.cache(),
             device: self.machine.device,

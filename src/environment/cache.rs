@@ -10,7 +10,7 @@
 use std::path::{Path, PathBuf};
 
 use super::pyramid::MAX_FACE_SIZE;
-use super::{Environment, Kernel, Pyramid, VmfPyramid};
+use super::{BlurKernel, Environment, Pyramid, VmfPyramid};
 use crate::error::{Error, Result};
 use crate::output::write_whole;
 
@@ -89,7 +89,7 @@ fn decode(bytes: &[u8]) -> Option<VmfPyramid> {
         return None;
     }
     let mut maps = Vec::new();
-    let steps = VmfPyramid::steps(face_size).into_iter().filter(|step| step.kernel != Kernel::Mean);
+    let steps = VmfPyramid::steps(face_size).into_iter().filter(|step| step.kernel != BlurKernel::Mean);
     for size in steps.map(|step| step.size) {
         let (map, after) = rest.split_at_checked(6 * size * size * size_of::<[f32; 3]>())?;
         let values = map.as_chunks().0.iter().map(|&value| f32::from_le_bytes(value));

@@ -23,8 +23,8 @@ pub use light_map::{Alias, LightMap};
 pub use load::RepairCounts;
 pub use procedural::builtin_names;
 pub use pyramid::Pyramid;
-pub use sources::{MAX_SOURCES, SmallSources, Source};
-pub use vmf_pyramid::{Kernel, Step, VmfPyramid};
+pub use sources::{LightSource, MAX_SOURCES, SmallSources};
+pub use vmf_pyramid::{BlurKernel, BlurStep, VmfPyramid};
 
 /// Radiance from every direction, as a lat-long picture: linear, Rec. 709.
 ///

@@ -35,7 +35,7 @@ pub fn clearance(away: f32, width: f32, lobe_width: f32) -> f32 {
 
 /// A source: light around a direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Source {
+pub struct LightSource {
     /// The centroid of its light, unit.
     pub direction: DVec3,
     /// Its light's principal axes across that direction, the longer one first: as long as its standard deviation along each, in radians.
@@ -48,12 +48,12 @@ pub struct Source {
 #[derive(Clone, Debug)]
 pub struct SmallSources {
     /// The most powerful first, at most [`MAX_SOURCES`].
-    pub list: Vec<Source>,
+    pub list: Vec<LightSource>,
     /// Whether each pixel is of one of them.
     pub pixels: Vec<bool>,
 }
 
-impl Source {
+impl LightSource {
     /// Standard deviation of its light along its longer axis, in radians.
     pub fn width_rad(&self) -> f64 {
         self.axes[0].length()
@@ -131,7 +131,7 @@ fn bright_regions(environment: &Environment, threshold: f64) -> Vec<Vec<usize>> 
 
 /// A source with its pixels.
 struct Part {
-    source: Source,
+    source: LightSource,
     pixels: Vec<usize>,
 }
 
@@ -154,12 +154,12 @@ impl Part {
             covariance += (luminance(of_pixel) / total) * DMat2::from_cols(away * away.x, away * away.y);
         }
         let axes = principal_axes(covariance).map(|axis| axis.x * x + axis.y * y);
-        Some(Self { source: Source { direction: centre, axes, power }, pixels })
+        Some(Self { source: LightSource { direction: centre, axes, power }, pixels })
     }
 
     /// Both sides of the middle of its longer axis.
     fn halves(&self, environment: &Environment) -> Vec<Self> {
-        let Source { direction: centre, axes: [longer, _], .. } = self.source;
+        let LightSource { direction: centre, axes: [longer, _], .. } = self.source;
         let beyond = |&pixel: &usize| (light(environment, pixel).0 - centre).dot(longer) > 0.0;
         let (one, other): (Vec<_>, Vec<_>) = self.pixels.iter().partition(|pixel| beyond(pixel));
         [one, other].into_iter().filter_map(|pixels| Self::new(environment, pixels)).collect()

@@ -29,7 +29,7 @@ pub struct VmfPyramid {
 /// What texels were convolved with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
-pub enum Kernel {
+pub enum BlurKernel {
     /// The texel itself.
     Box = 0,
     /// The kernel that, with the blur of a bilinear lookup, makes the level's vMF kernel.
@@ -40,17 +40,17 @@ pub enum Kernel {
 
 /// How to make one map.
 #[derive(Clone, Copy, Debug)]
-pub struct Step {
+pub struct BlurStep {
     /// The map it is made from: that of an earlier step, or none for the finest of the box-filtered pyramid.
     pub from: Option<usize>,
     /// What that was convolved with.
-    pub from_kernel: Kernel,
+    pub from_kernel: BlurKernel,
     /// Texels along the edges of that one's faces.
     pub from_size: usize,
     /// Texels along the edges of its own faces.
     pub size: usize,
     /// What it is convolved with.
-    pub kernel: Kernel,
+    pub kernel: BlurKernel,
 }
 
 impl VmfPyramid {
@@ -59,15 +59,21 @@ impl VmfPyramid {
     ///
     /// Level 0 is made from the box-filtered one, and each other from means of a finer level of its own: that is so smooth that nothing is
     /// lost by sampling it there, while box-filtered texels as large would no longer tell where in them a light was.
-    pub fn steps(finest: usize) -> Vec<Step> {
-        let vmf = |from, from_kernel, from_size, size| Step { from, from_kernel, from_size, size, kernel: Kernel::Vmf };
-        let mut steps = vec![vmf(None, Kernel::Box, finest, finest)];
+    pub fn steps(finest: usize) -> Vec<BlurStep> {
+        let vmf = |from, from_kernel, from_size, size| BlurStep {
+            from,
+            from_kernel,
+            from_size,
+            size,
+            kernel: BlurKernel::Vmf,
+        };
+        let mut steps = vec![vmf(None, BlurKernel::Box, finest, finest)];
         // Where the means of the levels so far are.
         let mut means = Vec::new();
         let mut size = finest / 2;
         while size >= WIDEST_FACE_SIZE {
             let (from, from_size) = (Some(steps.len() - 1), 2 * size);
-            steps.push(Step { from, from_kernel: Kernel::Vmf, from_size, size, kernel: Kernel::Mean });
+            steps.push(BlurStep { from, from_kernel: BlurKernel::Vmf, from_size, size, kernel: BlurKernel::Mean });
             means.push((steps.len() - 1, size));
             // vMF kernels convolved are nearly vMF kernels again, the more so the narrower one of them is.
             let finer_by = match size {
@@ -76,7 +82,7 @@ impl VmfPyramid {
                 _ => 3,
             };
             let (from, from_size) = means[means.len().saturating_sub(finer_by)];
-            steps.push(vmf(Some(from), Kernel::Mean, from_size, size));
+            steps.push(vmf(Some(from), BlurKernel::Mean, from_size, size));
             size /= 2;
         }
         steps
@@ -88,9 +94,13 @@ impl VmfPyramid {
         let steps = Self::steps(source.face_size);
         for step in &steps {
             let from = step.from.map_or(&source.levels[0], |from| &maps[from]);
-            maps.push(if step.kernel == Kernel::Mean { means_of_four(from, step.size) } else { blurred(from, step) });
+            maps.push(if step.kernel == BlurKernel::Mean {
+                means_of_four(from, step.size)
+            } else {
+                blurred(from, step)
+            });
         }
-        let levels = steps.iter().zip(maps).filter(|(step, _)| step.kernel == Kernel::Vmf).map(|(_, map)| map);
+        let levels = steps.iter().zip(maps).filter(|(step, _)| step.kernel == BlurKernel::Vmf).map(|(_, map)| map);
         Self { levels: Pyramid { face_size: source.face_size, levels: levels.collect() } }
     }
 
@@ -114,17 +124,17 @@ fn kappa_of_deficit(deficit: f64) -> f64 {
 
 /// 1 - the mean cosine of what a texel of faces of `size`, around `direction`, was convolved with. Together with the tent of the
 /// bilinear lookup, of variance h^2 / 6 along each axis where a box has h^2 / 12, it makes the level's vMF kernel.
-fn texel_deficit(kernel: Kernel, size: usize, direction: DVec3) -> f64 {
+fn texel_deficit(kernel: BlurKernel, size: usize, direction: DVec3) -> f64 {
     let solid_angle = texel_solid_angle(size, direction);
-    if kernel == Kernel::Box {
+    if kernel == BlurKernel::Box {
         return solid_angle / 12.0;
     }
     // Means of 2 x 2 are of texels of half the size, and moved by half of that along each axis.
-    let (texel, size) = if kernel == Kernel::Mean { (solid_angle / 4.0, 2 * size) } else { (solid_angle, size) };
+    let (texel, size) = if kernel == BlurKernel::Mean { (solid_angle / 4.0, 2 * size) } else { (solid_angle, size) };
     let width = 2.0 * TEXELS_A_WIDTH / size as f64;
     let tent = texel / 6.0;
     let deficit = (vmf_deficit(width.powi(-2)) - tent) / (1.0 - tent);
-    if kernel == Kernel::Mean { deficit + texel / 4.0 * (1.0 - deficit) } else { deficit }
+    if kernel == BlurKernel::Mean { deficit + texel / 4.0 * (1.0 - deficit) } else { deficit }
 }
 
 /// Means of 2 x 2 texels, faces of `size`.
@@ -138,8 +148,8 @@ fn means_of_four(source: &[[f32; 3]], size: usize) -> Vec<[f32; 3]> {
 }
 
 /// A map, convolved from the one that `step` names.
-fn blurred(source: &[[f32; 3]], step: &Step) -> Vec<[f32; 3]> {
-    let &Step { from_kernel, from_size, size, kernel, .. } = step;
+fn blurred(source: &[[f32; 3]], step: &BlurStep) -> Vec<[f32; 3]> {
+    let &BlurStep { from_kernel, from_size, size, kernel, .. } = step;
     let direction = |size: usize, texel: usize| {
         let middle = |index: usize| (index as f64 + 0.5) / size as f64;
         direction_of(texel / size / size, middle(texel % size), middle(texel / size % size))

@@ -116,7 +116,7 @@ pub fn prepare_within(
     let (count, rms) = reached;
     let problem =
         format!("{most:e} is not reached: {count} threads or samples of \"{}\" have {rms:.1e}", method.name());
-    Err(Error::input("--error", problem, "allow more, or use --method fitted, combined or reference"))
+    Err(Error::input("--error", problem, "allow more, or use --method fitted, mis or reference"))
 }
 
 /// Powers of two and half as much again.

@@ -9,7 +9,7 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::Row;
-use super::speed::{Frame, Growth, Timings};
+use super::speed::{Growth, TimedFrame, Timings};
 use super::tables::{by_count, in_order, mean};
 use crate::error::{Error, Result};
 use crate::output::write_whole;
@@ -166,7 +166,7 @@ pub fn speed_charts(timings: &Timings) -> Vec<Chart> {
     let mut curves = Vec::new();
     for (style, method) in in_order(timings.frames.iter().map(|frame| &frame.method)).into_iter().enumerate() {
         let frames: Vec<_> = timings.frames.iter().filter(|frame| frame.method == *method).collect();
-        let points = |value: fn(&Frame) -> f64| {
+        let points = |value: fn(&TimedFrame) -> f64| {
             let point = |count: f64| {
                 let here = frames.iter().filter(|frame| f64::from(frame.threads) == count);
                 (count, mean(&here.map(|frame| value(frame)).collect::<Vec<_>>()))
@@ -403,7 +403,7 @@ mod tests {
 
     #[test]
     fn speed_has_a_floor_for_each_method_and_a_chart_of_growth() {
-        let frame = |threads: u32| Frame {
+        let frame = |threads: u32| TimedFrame {
             method: "paper".into(),
             threads,
             material: "m".into(),

@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use super::cases::{Cases, Estimator, Place};
 use crate::error::{Error, Result};
-use crate::passes::{BareLookups, Object};
+use crate::passes::{BareLookups, PlacedMesh};
 use crate::pipeline::{Renderer, Rendering, Wanted, median, time_bare_lookups};
 use crate::threads::Observer;
 use crate::vulkan::{Device, PassTime, PipelineCache};
@@ -23,7 +23,7 @@ pub struct Speed {
 
 /// What one frame cost, and what it did.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Frame {
+pub struct TimedFrame {
     /// Name of the method.
     pub method: String,
     /// Number of threads, or of samples of the other estimators.
@@ -76,14 +76,14 @@ pub struct Growth {
     pub ratio: Option<f64>,
     /// What it cost.
     #[serde(flatten)]
-    pub frame: Frame,
+    pub frame: TimedFrame,
 }
 
 /// All measurements.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Timings {
     /// Each method at each count.
-    pub frames: Vec<Frame>,
+    pub frames: Vec<TimedFrame>,
     /// Series, each in rising order.
     pub growths: Vec<Growth>,
 }
@@ -190,7 +190,7 @@ impl Growing {
         if self == Self::Threads { threads.div_ceil(step) } else { threads }
     }
 
-    fn quantity(self, frame: &Frame) -> u64 {
+    fn quantity(self, frame: &TimedFrame) -> u64 {
         match self {
             Self::Pixels => u64::from(frame.width) * u64::from(frame.height),
             Self::Subpixels => u64::from(frame.subpixels).pow(2),
@@ -202,7 +202,7 @@ impl Growing {
 
 /// Something whose time is compared with that of others.
 struct Entrant {
-    frame: Frame,
+    frame: TimedFrame,
     renderer: Renderer,
     floor: BareLookups,
     renderings: Vec<Rendering>,
@@ -224,8 +224,8 @@ impl Entrant {
         let pixels = lookups.div_ceil(u64::from(threads)) as u32;
         let floor = BareLookups::new(device, cache, &prepared.environment, pixels, threads)?;
         time_bare_lookups(device, &floor)?;
-        let triangles = |object: &Object| prepared.meshes[object.mesh].1.indices.len() as u64 / 3;
-        let frame = Frame {
+        let triangles = |object: &PlacedMesh| prepared.meshes[object.mesh].1.indices.len() as u64 / 3;
+        let frame = TimedFrame {
             method: prepared.method.name().to_owned(),
             threads,
             material: place.material.to_owned(),
@@ -252,7 +252,7 @@ impl Entrant {
     }
 
     /// The medians of all turns.
-    fn finish(self) -> Frame {
+    fn finish(self) -> TimedFrame {
         let Self { mut frame, renderings, floor_ms, .. } = self;
         let median_of = |value: &dyn Fn(&Rendering) -> f64| median(renderings.iter().map(value).collect());
         let passes = renderings.first().map(|rendering| rendering.passes.as_slice()).unwrap_or_default();
@@ -269,7 +269,7 @@ impl Entrant {
     }
 }
 
-impl Frame {
+impl TimedFrame {
     /// Time of the pass of that name, in milliseconds; 0 if there is none.
     pub fn pass_ms(&self, name: &str) -> f64 {
         self.passes.iter().filter(|pass| pass.name == name).map(|pass| pass.gpu_ms).sum()
@@ -286,7 +286,7 @@ fn take_turns(
     device: &Arc<Device>,
     repeat: u32,
     advance: &mut dyn FnMut() -> Result<()>,
-) -> Result<Vec<Frame>> {
+) -> Result<Vec<TimedFrame>> {
     for _ in 0..repeat.max(1) {
         for entrant in &mut entrants {
             entrant.take_turn(device)?;

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
 use super::Row;
-use super::speed::{Frame, Timings};
+use super::speed::{TimedFrame, Timings};
 use crate::method::Method;
 
 /// Tables under one heading.
@@ -167,13 +167,13 @@ pub fn frame_tables(timings: &Timings) -> Vec<Section> {
     let places = in_order(timings.frames.iter().map(place));
     let section = |of: (&String, String)| {
         let frames: Vec<_> = timings.frames.iter().filter(|frame| place(frame) == of).collect();
-        let row = |frame: &&Frame| {
+        let row = |frame: &&TimedFrame| {
             let floor = [format!("{:.2}", frame.floor_ms), format!("{:.2}", frame.pass_ms("shade") / frame.floor_ms)];
             (frame.threads.to_string(), costs(frame).into_iter().chain(floor).collect())
         };
         let head = cost_heads(&frames).into_iter().chain(["floor", "shade/floor"].map(str::to_owned)).collect();
         let table = Table { title: "threads".to_owned(), head, rows: frames.iter().map(row).collect() };
-        let Frame { width, height, subpixels, triangles, .. } = frames[0];
+        let TimedFrame { width, height, subpixels, triangles, .. } = frames[0];
         let size = format!("{width} x {height} pixels, {subpixels} x {subpixels} sub-pixels, {triangles} triangles");
         Section { title: format!("{}, {}: {size}; times in ms", of.0, of.1), tables: vec![table] }
     };
@@ -204,22 +204,22 @@ pub fn growth_tables(timings: &Timings) -> Vec<Section> {
 }
 
 /// Method; material, environment and scene.
-fn place(frame: &Frame) -> (&String, String) {
+fn place(frame: &TimedFrame) -> (&String, String) {
     (&frame.method, format!("{}, {}, {}", frame.material, frame.environment, frame.scene))
 }
 
 /// Passes that are worth a column: not those that only set counters to zero.
-fn pass_names<'a>(frames: &[&'a Frame]) -> Vec<&'a str> {
+fn pass_names<'a>(frames: &[&'a TimedFrame]) -> Vec<&'a str> {
     let all = in_order(frames.iter().flat_map(|frame| frame.passes.iter().map(|pass| pass.name.as_str())));
     all.into_iter().filter(|name| !name.starts_with("clear_")).collect()
 }
 
-fn cost_heads(frames: &[&Frame]) -> Vec<String> {
+fn cost_heads(frames: &[&TimedFrame]) -> Vec<String> {
     ["ns/lookup"].into_iter().chain(pass_names(frames)).chain(["all passes"]).map(str::to_owned).collect()
 }
 
 /// A cell for each of `cost_heads`.
-fn costs(frame: &Frame) -> Vec<String> {
+fn costs(frame: &TimedFrame) -> Vec<String> {
     let mut cells = vec![format!("{:.2}", frame.ns_per_lookup)];
     cells.extend(pass_names(&[frame]).into_iter().map(|name| format!("{:.2}", frame.pass_ms(name))));
     cells.push(format!("{:.2}", frame.gpu_ms));

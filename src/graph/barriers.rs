@@ -29,7 +29,7 @@
 //! What the barriers do not promise: anything between queues, between two plans whose memory overlaps, or to the CPU
 //! beyond making writes available to it (it still has to wait for the frame's fence).
 use super::access::Access;
-use super::declare::{Graph, Handle, Kind};
+use super::declare::{Graph, Handle, ResourceKind};
 use super::keep::{Held, Kept};
 use super::plan::PlannedResource;
 use ash::vk::{AccessFlags2, ImageLayout, PipelineStageFlags2};
@@ -99,14 +99,14 @@ const UNKNOWN: Span = Span {
 };
 
 impl Span {
-    fn new(first: usize, access: Access, accesses: AccessFlags2, kind: &Kind, discards: bool) -> Self {
+    fn new(first: usize, access: Access, accesses: AccessFlags2, kind: &ResourceKind, discards: bool) -> Self {
         let info = access.info();
-        let layout = if matches!(kind, Kind::Image(_)) { info.layout } else { ImageLayout::UNDEFINED };
+        let layout = if matches!(kind, ResourceKind::Image(_)) { info.layout } else { ImageLayout::UNDEFINED };
         Self { first, stages: info.stages, accesses, layout, discards }
     }
 
     /// What the owner does with an imported resource before or after the frame.
-    fn by_owner(first: usize, access: Access, kind: &Kind) -> Self {
+    fn by_owner(first: usize, access: Access, kind: &ResourceKind) -> Self {
         Self::new(first, access, access.info().reads | access.info().writes, kind, false)
     }
 
@@ -207,7 +207,7 @@ fn spans<W>(graph: &Graph<W>, order: &[usize], resource: usize) -> Vec<Span> {
     spans
 }
 
-fn past_of_import(before: Option<Access>, kind: &Kind) -> Span {
+fn past_of_import(before: Option<Access>, kind: &ResourceKind) -> Span {
     before.map_or(UNKNOWN, |access| Span::by_owner(0, access, kind))
 }
 

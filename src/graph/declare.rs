@@ -24,7 +24,7 @@ pub struct BufferDesc {
 
 /// What a resource is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Kind {
+pub enum ResourceKind {
     /// An image.
     Image(ImageDesc),
     /// A buffer.
@@ -94,7 +94,7 @@ pub struct Graph<W> {
 /// A declared resource.
 pub(super) struct Resource {
     pub name: String,
-    pub kind: Kind,
+    pub kind: ResourceKind,
     /// `None` for a transient resource, and for one to be kept.
     pub import: Option<Import>,
     /// Whether it outlives the frame where somebody keeps such resources; otherwise it is transient.
@@ -150,18 +150,18 @@ impl<W> Graph<W> {
 
     /// A transient image: it exists inside the frame only, and its memory may be shared with others.
     pub fn image(&mut self, name: &str, desc: ImageDesc) -> Image {
-        self.resource(name, Kind::Image(desc), None).into()
+        self.resource(name, ResourceKind::Image(desc), None).into()
     }
 
     /// A transient buffer: it exists inside the frame only, and its memory may be shared with others.
     pub fn buffer(&mut self, name: &str, desc: BufferDesc) -> Buffer {
-        self.resource(name, Kind::Buffer(desc), None).into()
+        self.resource(name, ResourceKind::Buffer(desc), None).into()
     }
 
     /// An image that is worth keeping: where frames are compiled one after another with what was kept
     /// ([`Graph::compile_keeping`]), passes that would make the same contents again do not run. Elsewhere it is transient.
     pub fn kept_image(&mut self, name: &str, desc: ImageDesc) -> Image {
-        let handle = self.resource(name, Kind::Image(desc), None);
+        let handle = self.resource(name, ResourceKind::Image(desc), None);
         self.resources[handle.resource].keep = true;
         handle.into()
     }
@@ -179,7 +179,7 @@ impl<W> Graph<W> {
         before: Option<Access>,
         after: Option<Access>,
     ) -> Image {
-        self.resource(name, Kind::Image(desc), Some(Import { before, after })).into()
+        self.resource(name, ResourceKind::Image(desc), Some(Import { before, after })).into()
     }
 
     /// A buffer that someone else owns and keeps: see [`Graph::import_image`].
@@ -190,10 +190,10 @@ impl<W> Graph<W> {
         before: Option<Access>,
         after: Option<Access>,
     ) -> Buffer {
-        self.resource(name, Kind::Buffer(desc), Some(Import { before, after })).into()
+        self.resource(name, ResourceKind::Buffer(desc), Some(Import { before, after })).into()
     }
 
-    fn resource(&mut self, name: &str, kind: Kind, import: Option<Import>) -> Handle {
+    fn resource(&mut self, name: &str, kind: ResourceKind, import: Option<Import>) -> Handle {
         self.resources.push(Resource { name: name.to_owned(), kind, import, keep: false });
         Handle { resource: self.resources.len() - 1, version: 0 }
     }

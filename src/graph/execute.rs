@@ -1,5 +1,5 @@
 //! Execute: the plan's resources as Vulkan objects, its passes and barriers as commands.
-use super::{Barrier, Graph, Handle, Kept, Kind, MemoryRequirement, Plan, PlannedPass, ResourceInfo};
+use super::{Barrier, Graph, Handle, Kept, MemoryRequirement, Plan, PlannedPass, ResourceInfo, ResourceKind};
 use crate::Result;
 use crate::vulkan::{self, Commands, Device, Frames, ImageShape, Memory, PassTime, Semaphores, VulkanError};
 use ash::vk;
@@ -12,7 +12,7 @@ pub type Work<'a> = Box<dyn Fn(&mut Commands, &Resources<'_>) -> std::result::Re
 
 /// The Vulkan object behind a resource of the plan.
 #[derive(Clone)]
-pub enum Object {
+pub enum DeviceResource {
     /// Behind an image.
     Image(Arc<vulkan::Image>),
     /// Behind a buffer.
@@ -23,7 +23,7 @@ pub enum Object {
 #[derive(Default)]
 pub struct Store {
     kept: Kept,
-    objects: HashMap<String, (ResourceInfo, Object)>,
+    objects: HashMap<String, (ResourceInfo, DeviceResource)>,
 }
 
 impl Store {
@@ -33,7 +33,11 @@ impl Store {
     }
 
     /// The object that is kept as `info`, made if there is none.
-    fn object(&mut self, device: &Arc<Device>, info: &ResourceInfo) -> std::result::Result<Object, VulkanError> {
+    fn object(
+        &mut self,
+        device: &Arc<Device>,
+        info: &ResourceInfo,
+    ) -> std::result::Result<DeviceResource, VulkanError> {
         if let Some((_, object)) = self.objects.get(&info.name).filter(|(known, _)| known == info) {
             return Ok(object.clone());
         }
@@ -52,7 +56,7 @@ impl Store {
 
 /// The objects behind the handles of a graph.
 pub struct Resources<'r> {
-    objects: &'r [Object],
+    objects: &'r [DeviceResource],
     /// For each object, the index of its resource in the graph as it was declared.
     declared: &'r [usize],
 }
@@ -61,7 +65,7 @@ impl Resources<'_> {
     /// The image behind `handle`, which a pass that runs has declared.
     pub fn image(&self, handle: super::Image) -> &vulkan::Image {
         match self.object(handle.into()) {
-            Some(Object::Image(image)) => image.as_ref(),
+            Some(DeviceResource::Image(image)) => image.as_ref(),
             _ => unreachable!("a pass that runs asks for images that it declared"),
         }
     }
@@ -69,12 +73,12 @@ impl Resources<'_> {
     /// The buffer behind `handle`, which a pass that runs has declared.
     pub fn buffer(&self, handle: super::Buffer) -> &vulkan::Buffer {
         match self.object(handle.into()) {
-            Some(Object::Buffer(buffer)) => buffer,
+            Some(DeviceResource::Buffer(buffer)) => buffer,
             _ => unreachable!("a pass that runs asks for buffers that it declared"),
         }
     }
 
-    fn object(&self, handle: Handle) -> Option<&Object> {
+    fn object(&self, handle: Handle) -> Option<&DeviceResource> {
         self.objects.get(self.declared.iter().position(|declared| *declared == handle.resource)?)
     }
 }
@@ -83,7 +87,7 @@ impl Resources<'_> {
 pub struct Executable<'a> {
     /// What it does.
     pub plan: Plan<Work<'a>>,
-    objects: Vec<Object>,
+    objects: Vec<DeviceResource>,
     declared: Vec<usize>,
 }
 
@@ -92,7 +96,7 @@ impl<'a> Executable<'a> {
     ///
     /// # Errors
     /// A wrong graph, no device memory left.
-    pub fn new(device: &Arc<Device>, graph: Graph<Work<'a>>, imports: &[(Handle, Object)]) -> Result<Self> {
+    pub fn new(device: &Arc<Device>, graph: Graph<Work<'a>>, imports: &[(Handle, DeviceResource)]) -> Result<Self> {
         Self::compile(device, graph, imports, None)
     }
 
@@ -103,7 +107,7 @@ impl<'a> Executable<'a> {
     pub fn keeping(
         device: &Arc<Device>,
         graph: Graph<Work<'a>>,
-        imports: &[(Handle, Object)],
+        imports: &[(Handle, DeviceResource)],
         store: &mut Store,
     ) -> Result<Self> {
         Self::compile(device, graph, imports, Some(store))
@@ -112,7 +116,7 @@ impl<'a> Executable<'a> {
     fn compile(
         device: &Arc<Device>,
         graph: Graph<Work<'a>>,
-        imports: &[(Handle, Object)],
+        imports: &[(Handle, DeviceResource)],
         mut store: Option<&mut Store>,
     ) -> Result<Self> {
         // Vulkan tells what memory an object needs only once the object exists.
@@ -238,7 +242,7 @@ impl<'a> Executable<'a> {
                 false => (barrier.src_stage, barrier.src_access),
             };
             match &self.objects[barrier.resource] {
-                Object::Image(image) => images.push(
+                DeviceResource::Image(image) => images.push(
                     Commands::image_barrier(image)
                         .src_stage_mask(src_stage)
                         .src_access_mask(src_access)
@@ -248,8 +252,8 @@ impl<'a> Executable<'a> {
                         .new_layout(barrier.new_layout),
                 ),
                 // A buffer has no layout: the global barrier was all it needed.
-                Object::Buffer(_) if barrier.is_aliasing() => {}
-                Object::Buffer(buffer) => buffers.push(
+                DeviceResource::Buffer(_) if barrier.is_aliasing() => {}
+                DeviceResource::Buffer(buffer) => buffers.push(
                     Commands::buffer_barrier(buffer)
                         .src_stage_mask(src_stage)
                         .src_access_mask(src_access)
@@ -277,15 +281,15 @@ enum Made {
 }
 
 /// Gives `made` its memory.
-fn bind(made: Made, memory: &Arc<Memory>, offset: u64) -> std::result::Result<Object, VulkanError> {
+fn bind(made: Made, memory: &Arc<Memory>, offset: u64) -> std::result::Result<DeviceResource, VulkanError> {
     Ok(match made {
         Made::Image(mut image) => {
             image.bind(memory, offset)?;
-            Object::Image(Arc::new(image))
+            DeviceResource::Image(Arc::new(image))
         }
         Made::Buffer(mut buffer) => {
             buffer.bind(memory, offset)?;
-            Object::Buffer(Arc::new(buffer))
+            DeviceResource::Buffer(Arc::new(buffer))
         }
     })
 }
@@ -293,13 +297,13 @@ fn bind(made: Made, memory: &Arc<Memory>, offset: u64) -> std::result::Result<Ob
 /// A resource without memory, and what memory it needs.
 fn make(device: &Arc<Device>, info: &ResourceInfo) -> std::result::Result<(Made, MemoryRequirement), VulkanError> {
     let (object, needs) = match info.kind {
-        Kind::Image(desc) => {
+        ResourceKind::Image(desc) => {
             let shape = ImageShape::plane(desc.format, desc.width, desc.height);
             let image = vulkan::Image::unbound(device, &info.name, shape, info.image_usage)?;
             let needs = image.requirements();
             (Made::Image(image), needs)
         }
-        Kind::Buffer(desc) => {
+        ResourceKind::Buffer(desc) => {
             let buffer = vulkan::Buffer::unbound(device, &info.name, desc.size_bytes, info.buffer_usage)?;
             let needs = buffer.requirements();
             (Made::Buffer(buffer), needs)
@@ -313,7 +317,8 @@ fn make(device: &Arc<Device>, info: &ResourceInfo) -> std::result::Result<(Made,
 fn memory_of(device: &Arc<Device>, plan: &Plan<Work<'_>>) -> Result<Vec<Arc<Memory>>> {
     let memory = plan.blocks.iter().enumerate().map(|(index, block)| {
         let for_buffers = plan.resources.iter().any(|resource| {
-            resource.placement.is_some_and(|at| at.block == index) && matches!(resource.info.kind, Kind::Buffer(_))
+            resource.placement.is_some_and(|at| at.block == index)
+                && matches!(resource.info.kind, ResourceKind::Buffer(_))
         });
         let requirements = vk::MemoryRequirements {
             size: block.size_bytes,

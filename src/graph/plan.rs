@@ -2,7 +2,7 @@
 use super::access::{Access, Mode};
 use super::alias::{Block, Placement};
 use super::barriers::Barrier;
-use super::declare::{Graph, Handle, Kind, Pass, Use};
+use super::declare::{Graph, Handle, Pass, ResourceKind, Use};
 use super::keep::Kept;
 use super::lifetimes::Lifetime;
 use ash::vk;
@@ -59,7 +59,7 @@ pub struct ResourceInfo {
     /// Its name.
     pub name: String,
     /// Image or buffer, and its size.
-    pub kind: Kind,
+    pub kind: ResourceKind,
     /// All uses of an image together; empty for a buffer.
     pub image_usage: vk::ImageUsageFlags,
     /// All uses of a buffer together; empty for an image.
@@ -68,7 +68,7 @@ pub struct ResourceInfo {
 
 impl ResourceInfo {
     /// A resource for these accesses.
-    pub(super) fn used_as(name: &str, kind: Kind, accesses: impl Iterator<Item = Access>) -> Self {
+    pub(super) fn used_as(name: &str, kind: ResourceKind, accesses: impl Iterator<Item = Access>) -> Self {
         let mut info = Self {
             name: name.to_owned(),
             kind,
@@ -77,8 +77,8 @@ impl ResourceInfo {
         };
         for access in accesses.map(Access::info) {
             match kind {
-                Kind::Image(_) => info.image_usage |= access.image_usage.unwrap_or_default(),
-                Kind::Buffer(_) => info.buffer_usage |= access.buffer_usage.unwrap_or_default(),
+                ResourceKind::Image(_) => info.image_usage |= access.image_usage.unwrap_or_default(),
+                ResourceKind::Buffer(_) => info.buffer_usage |= access.buffer_usage.unwrap_or_default(),
             }
         }
         info
@@ -86,7 +86,7 @@ impl ResourceInfo {
 
     /// Whether it is an image rather than a buffer.
     pub fn is_image(&self) -> bool {
-        matches!(self.kind, Kind::Image(_))
+        matches!(self.kind, ResourceKind::Image(_))
     }
 }
 

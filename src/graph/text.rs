@@ -1,7 +1,7 @@
 //! The plan as text: what runs, what waits for what, what does not run, and where everything lies.
 use super::access::{Access, Mode};
 use super::barriers::Barrier;
-use super::declare::Kind;
+use super::declare::ResourceKind;
 use super::plan::{Plan, PlannedResource, PlannedUse};
 use ash::vk::{AccessFlags2, ImageLayout, PipelineStageFlags2};
 use std::fmt::{Display, Formatter, Result};
@@ -87,10 +87,10 @@ fn count(number: usize, one: &str, many: &str) -> String {
     format!("{number} {}", if number == 1 { one } else { many })
 }
 
-fn what(kind: &Kind) -> String {
+fn what(kind: &ResourceKind) -> String {
     match kind {
-        Kind::Image(desc) => format!("{}x{} {:?}", desc.width, desc.height, desc.format),
-        Kind::Buffer(desc) => format!("buffer of {}", bytes(desc.size_bytes)),
+        ResourceKind::Image(desc) => format!("{}x{} {:?}", desc.width, desc.height, desc.format),
+        ResourceKind::Buffer(desc) => format!("buffer of {}", bytes(desc.size_bytes)),
     }
 }
 

@@ -1,6 +1,6 @@
 //! Validate: everything that makes a graph meaningless is an error that names the pass and the resource.
 use super::access::{Access, Mode, is_depth};
-use super::declare::{Graph, Handle, Kind, Pass, Resource, Use};
+use super::declare::{Graph, Handle, Pass, Resource, ResourceKind, Use};
 use std::collections::{HashMap, HashSet};
 
 /// Why a graph has no plan.
@@ -74,8 +74,8 @@ fn distinct<'a>(what: &'static str, names: impl Iterator<Item = &'a String>) -> 
 
 fn check_resource(resource: &Resource) -> Result<(), GraphError> {
     let empty = match resource.kind {
-        Kind::Image(desc) => desc.width == 0 || desc.height == 0,
-        Kind::Buffer(desc) => desc.size_bytes == 0,
+        ResourceKind::Image(desc) => desc.width == 0 || desc.height == 0,
+        ResourceKind::Buffer(desc) => desc.size_bytes == 0,
     };
     if empty {
         return Err(GraphError::ZeroSize { resource: resource.name.clone() });
@@ -157,13 +157,13 @@ fn has_contents(handle: Handle, resource: &Resource) -> bool {
 }
 
 /// Two uses of one resource in one pass are not ordered against each other, and an image has one layout at a time.
-fn go_together(a: Use, b: Use, kind: &Kind) -> bool {
-    let same_layout = matches!(kind, Kind::Buffer(_)) || a.access.info().layout == b.access.info().layout;
+fn go_together(a: Use, b: Use, kind: &ResourceKind) -> bool {
+    let same_layout = matches!(kind, ResourceKind::Buffer(_)) || a.access.info().layout == b.access.info().layout;
     let reads = a.mode == Mode::Read && b.mode == Mode::Read;
     a.handle.resource != b.handle.resource || (reads && a.handle == b.handle && same_layout)
 }
 
-fn wrong_usage(use_: Use, kind: &Kind) -> Option<&'static str> {
+fn wrong_usage(use_: Use, kind: &ResourceKind) -> Option<&'static str> {
     let writes = !use_.access.info().writes.is_empty();
     if use_.access.is_outside_frame() {
         Some("only the owner of an imported resource does that; say so when importing it")
@@ -177,12 +177,16 @@ fn wrong_usage(use_: Use, kind: &Kind) -> Option<&'static str> {
 }
 
 /// Why `access` cannot be made to such a resource.
-fn misfit(access: Access, kind: &Kind) -> Option<&'static str> {
+fn misfit(access: Access, kind: &ResourceKind) -> Option<&'static str> {
     let info = access.info();
     match kind {
-        Kind::Buffer(_) => info.buffer_usage.is_none().then_some("that access is for images, and this is a buffer"),
-        Kind::Image(_) if info.image_usage.is_none() => Some("that access is for buffers, and this is an image"),
-        Kind::Image(desc) => match (access, is_depth(desc.format)) {
+        ResourceKind::Buffer(_) => {
+            info.buffer_usage.is_none().then_some("that access is for images, and this is a buffer")
+        }
+        ResourceKind::Image(_) if info.image_usage.is_none() => {
+            Some("that access is for buffers, and this is an image")
+        }
+        ResourceKind::Image(desc) => match (access, is_depth(desc.format)) {
             (Access::DepthAttachment, false) => Some("its format has no depth"),
             (Access::ColorAttachment, true) => Some("its format is a depth format"),
             (Access::StorageReadGraphics | Access::StorageReadCompute | Access::StorageWriteCompute, true) => {

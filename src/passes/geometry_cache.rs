@@ -49,7 +49,7 @@ impl DeviceMesh {
 
 /// A mesh in the scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Object {
+pub struct PlacedMesh {
     /// Which mesh.
     pub mesh: usize,
     /// Which material.
@@ -62,7 +62,7 @@ pub struct Object {
 pub struct GeometryCache {
     pipeline: GraphicsPipeline,
     meshes: Vec<DeviceMesh>,
-    objects: Vec<Object>,
+    objects: Vec<PlacedMesh>,
     identity: Identity,
 }
 
@@ -86,7 +86,7 @@ impl GeometryCache {
         device: &Arc<Device>,
         cache: &PipelineCache,
         meshes: Vec<DeviceMesh>,
-        objects: Vec<Object>,
+        objects: Vec<PlacedMesh>,
     ) -> Result<Self> {
         let state = GraphicsState {
             attributes: &[(vk::Format::R32G32B32_SFLOAT, 12), (vk::Format::R32G32B32_SFLOAT, 12)],
@@ -106,7 +106,7 @@ impl GeometryCache {
         let half_width = half_height * f64::from(view.width) / f64::from(view.height);
         let pack = |v: DVec3, w: f64| v.extend(w).as_vec4().to_array();
         let unit = self.extent(view);
-        let draw = |object: &Object| {
+        let draw = |object: &PlacedMesh| {
             let DAffine3 { matrix3, translation } = object.to_world;
             let column = |column: DVec3| pack(column / unit, 0.0);
             let push = Push {
@@ -130,7 +130,7 @@ impl GeometryCache {
     /// Distance from the eye to the far side of the scene: the unit of length in which it is drawn, so that neither tiny nor
     /// huge scenes leave the range of single precision.
     fn extent(&self, view: &View) -> f64 {
-        let far_side = |object: &Object| {
+        let far_side = |object: &PlacedMesh| {
             let (center, radius) = self.meshes[object.mesh].bounds;
             let m = object.to_world.matrix3;
             let scale = m.x_axis.length().max(m.y_axis.length()).max(m.z_axis.length());

@@ -4,7 +4,7 @@ use super::vmf_pyramid::blurred;
 use crate::Result;
 use crate::brdf::{MIN_COS_THETA_D, half_vector_width};
 use crate::environment::sources::{CLEAR, clearance};
-use crate::environment::{Environment, LightMap, Pyramid, Source};
+use crate::environment::{Environment, LightMap, LightSource, Pyramid};
 use crate::method::Method;
 use crate::prepare::PreparedMaterial;
 use crate::threads::Threads;
@@ -179,11 +179,11 @@ fn upload_map(device: &Arc<Device>, environment: &Environment, map: &LightMap, s
 }
 
 /// Uploads `sources`, their power over `scale`: `Sources` in glsl/methods/fitted.glsl.
-fn source_buffer(device: &Arc<Device>, sources: &[Source], scale: f32) -> Result<Buffer> {
+fn source_buffer(device: &Arc<Device>, sources: &[LightSource], scale: f32) -> Result<Buffer> {
     // The count, and what aligns the structures to 16 bytes.
     let mut words = vec![sources.len() as u32, 0, 0, 0];
     for source in sources {
-        let Source { direction, axes: [x, y], power } = *source;
+        let LightSource { direction, axes: [x, y], power } = *source;
         let vectors = [(direction, source.width_rad()), (x, 0.0), (y, 0.0), (power / f64::from(scale), 0.0)];
         let words_of = |(vector, w): (DVec3, f64)| vector.extend(w).as_vec4().to_array().map(f32::to_bits);
         words.extend(vectors.into_iter().flat_map(words_of));

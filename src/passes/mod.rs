@@ -23,7 +23,7 @@ pub use background::{Background, background};
 pub use bare_lookups::{BareLookups, bare_lookups};
 pub use classify::{Classify, Counters, SMOOTH_DEG, Tiles, classify};
 pub use clear::clear;
-pub use geometry_cache::{DeviceMesh, GeometryCache, Object, geometry_cache};
+pub use geometry_cache::{DeviceMesh, GeometryCache, PlacedMesh, geometry_cache};
 pub use identity::Identity;
 pub use light::DeviceLight;
 #[cfg(feature = "viewer")]

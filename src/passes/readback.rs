@@ -1,7 +1,7 @@
 //! Copies what the CPU wants to see into memory that it can read.
 use super::FrameGraph;
 use crate::Result;
-use crate::graph::{Access, Buffer, BufferDesc, Handle, Image, Object};
+use crate::graph::{Access, Buffer, BufferDesc, DeviceResource, Handle, Image};
 use crate::vulkan::{self, BufferUse, Device};
 use ash::vk;
 use std::sync::Arc;
@@ -36,7 +36,7 @@ pub struct Readbacks<'a, 'd> {
     pub graph: FrameGraph<'a>,
     device: &'d Arc<Device>,
     /// What its execution is given.
-    pub imports: Vec<(Handle, Object)>,
+    pub imports: Vec<(Handle, DeviceResource)>,
 }
 
 impl<'a, 'd> Readbacks<'a, 'd> {
@@ -50,7 +50,7 @@ impl<'a, 'd> Readbacks<'a, 'd> {
         let usage = vk::BufferUsageFlags::TRANSFER_DST;
         let target = Arc::new(vulkan::Buffer::new(self.device, name, size_bytes, usage, BufferUse::Readback)?);
         let handle = self.graph.import_buffer(name, BufferDesc { size_bytes }, None, Some(Access::HostRead));
-        self.imports.push((handle.into(), Object::Buffer(target.clone())));
+        self.imports.push((handle.into(), DeviceResource::Buffer(target.clone())));
         Ok((handle, target))
     }
 

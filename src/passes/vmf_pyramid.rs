@@ -3,8 +3,8 @@
 //! In many short submissions, since a device without a second queue (such as a processor) draws no frame until a submission has ended,
 //! and so that it can be cancelled.
 use super::{FrameGraph, Readbacks, texels};
-use crate::environment::{Environment, Kernel, Pyramid, Step, VmfPyramid};
-use crate::graph::{Access, BufferDesc, Executable, Object};
+use crate::environment::{BlurKernel, BlurStep, Environment, Pyramid, VmfPyramid};
+use crate::graph::{Access, BufferDesc, DeviceResource, Executable};
 use crate::method::Method;
 use crate::threads::Observer;
 use crate::vulkan::{Bindings, Buffer, BufferUse, ComputePipeline, Device, Frames, Groups, PipelineCache, compiled};
@@ -94,7 +94,7 @@ pub fn vmf_pyramid(
             if observer.cancelled() { Err(Error::Cancelled) } else { Ok(()) }
         })?;
         // The others have served.
-        if step.kernel == Kernel::Vmf {
+        if step.kernel == BlurKernel::Vmf {
             levels.push(read_back(device, &map)?);
         }
         maps.push(map);
@@ -112,20 +112,21 @@ fn parts(size: usize) -> impl Iterator<Item = [u32; 2]> {
 fn blur(
     device: &Arc<Device>,
     pipeline: &ComputePipeline,
-    step: &Step,
+    step: &BlurStep,
     from: &Arc<Buffer>,
     map: &Arc<Buffer>,
     go_on: &mut dyn FnMut() -> Result<()>,
 ) -> Result<()> {
     let part = Cell::new([0; 2]);
-    let Step { from_kernel, from_size, size, kernel, .. } = *step;
+    let BlurStep { from_kernel, from_size, size, kernel, .. } = *step;
     let mut graph = FrameGraph::new();
     let mut import = |name: &str, buffer: &Arc<Buffer>| {
         let desc = BufferDesc { size_bytes: buffer.size_bytes };
         graph.import_buffer(name, desc, Some(Access::StorageWriteCompute), None)
     };
     let (source, target) = (import("source", from), import("vmf_map", map));
-    let imports = [(source.into(), Object::Buffer(from.clone())), (target.into(), Object::Buffer(map.clone()))];
+    let imports =
+        [(source.into(), DeviceResource::Buffer(from.clone())), (target.into(), DeviceResource::Buffer(map.clone()))];
     let mut pass = graph.pass("blur");
     pass.read(source, Access::StorageReadCompute);
     let target = pass.modify(target, Access::StorageWriteCompute);
@@ -164,7 +165,7 @@ fn read_back(device: &Arc<Device>, map: &Arc<Buffer>) -> Result<Vec<[f32; 3]>> {
     let desc = BufferDesc { size_bytes: map.size_bytes };
     let handle = graph.import_buffer("vmf_map", desc, Some(Access::StorageWriteCompute), None);
     let mut readbacks = Readbacks::new(device, graph);
-    readbacks.imports.push((handle.into(), Object::Buffer(map.clone())));
+    readbacks.imports.push((handle.into(), DeviceResource::Buffer(map.clone())));
     let target = readbacks.buffer("read_map", handle, map.size_bytes)?;
     let Readbacks { graph, imports, .. } = readbacks;
     let executable = Executable::new(device, graph, &imports)?;
@@ -175,6 +176,6 @@ fn read_back(device: &Arc<Device>, map: &Arc<Buffer>) -> Result<Vec<[f32; 3]>> {
 }
 
 /// Size of the map that a step makes.
-fn size_bytes_of(step: &Step) -> u64 {
+fn size_bytes_of(step: &BlurStep) -> u64 {
     (6 * step.size * step.size * size_of::<[f32; 3]>()) as u64
 }

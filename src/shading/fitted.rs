@@ -6,7 +6,7 @@ use glam::{DVec3, IVec2, Vec3};
 use super::{BlurredLight, Point, Surface};
 use crate::brdf::MIN_COS_THETA_D;
 use crate::environment::sources::{CLEAR, clearance};
-use crate::environment::{LightMap, Source};
+use crate::environment::{LightMap, LightSource};
 use crate::threads::Threads;
 use crate::threads::fitted::kernel::FINEST_WIDTH_RAD;
 
@@ -69,8 +69,8 @@ fn smoothstep([from, to]: [f32; 2], x: f32) -> f32 {
 }
 
 /// Twin of `share_of_brdf`.
-fn share_of_brdf(lobe_width: f32, sources: &[Source], mirror: Vec3, least_width: f32) -> f32 {
-    let share = |source: &Source| {
+fn share_of_brdf(lobe_width: f32, sources: &[LightSource], mirror: Vec3, least_width: f32) -> f32 {
+    let share = |source: &LightSource| {
         let away = source.direction.as_vec3().distance(mirror);
         smoothstep(CLEAR, clearance(away, (source.width_rad() as f32).max(least_width), lobe_width))
     };
@@ -108,7 +108,7 @@ fn risen(z: f32, deviation: f32) -> [f32; 2] {
 }
 
 /// Twin of `at_sources`: powers of all sources times f cos, and times cos.
-fn at_sources(point: &Point, sources: &[Source], lobe_width: f32, w_o: Vec3, mirror: Vec3) -> (Vec3, Vec3) {
+fn at_sources(point: &Point, sources: &[LightSource], lobe_width: f32, w_o: Vec3, mirror: Vec3) -> (Vec3, Vec3) {
     let (mut f_cos, mut cosine) = (Vec3::ZERO, Vec3::ZERO);
     for source in sources {
         let away = source.direction.as_vec3().distance(mirror);

@@ -4,7 +4,7 @@
 //! in double precision; everything else follows the shader line by line.
 use crate::Result;
 use crate::brdf::half_vector_width;
-use crate::environment::{Alias, Environment, LightMap, Pyramid, Source, VmfPyramid};
+use crate::environment::{Alias, Environment, LightMap, LightSource, Pyramid, VmfPyramid};
 use crate::method::Method;
 use crate::packing::{octahedral_decode, unpack_snorm_2x16};
 use crate::passes::SMOOTH_DEG;
@@ -13,7 +13,6 @@ use crate::threads::SliceTable;
 use glam::{Mat3, UVec2, Vec2, Vec3, Vec4};
 use random::random_bits;
 
-mod combined;
 mod cosine;
 mod environment;
 mod filtered;
@@ -22,9 +21,10 @@ mod importance;
 mod importance_sampling;
 mod light_sampling;
 mod low_discrepancy;
+mod mis;
 mod paper;
 mod random;
-mod resampled;
+mod ris;
 mod uniform;
 
 /// A point to shade: its shading frame and view angle. Twin of `Surface` in glsl/surface.glsl.
@@ -96,7 +96,7 @@ fn normal_sum(texels: &[UVec2]) -> Vec3 {
 const SHARED_VARIANCE: f32 = 1e-4;
 
 /// The CPU twin of pass 2 for one scene.
-pub struct Twin<'a> {
+pub struct CpuShader<'a> {
     prepared: &'a Prepared,
     pyramid: Option<&'a Pyramid>,
     blurred: Option<BlurredLight<'a>>,
@@ -112,7 +112,7 @@ pub struct Twin<'a> {
 struct BlurredLight<'a> {
     rest: &'a VmfPyramid,
     sources: Option<&'a VmfPyramid>,
-    source_list: &'a [Source],
+    source_list: &'a [LightSource],
     irradiance: &'a Pyramid,
     map: LightMap,
 }
@@ -130,7 +130,7 @@ impl<'a> BlurredLight<'a> {
     }
 }
 
-impl<'a> Twin<'a> {
+impl<'a> CpuShader<'a> {
     /// Makes what the method of `prepared` looks up, as the device has it.
     ///
     /// # Errors
@@ -205,7 +205,7 @@ impl<'a> Twin<'a> {
 
 /// A sub-pixel to shade, and its part of the samples: what `estimate` gets in the shader.
 struct Point<'a> {
-    twin: &'a Twin<'a>,
+    twin: &'a CpuShader<'a>,
     surface: Surface,
     /// The camera's right, in the environment's coordinates.
     axis: Vec3,
@@ -226,8 +226,8 @@ impl Point<'_> {
             Method::Importance => importance::estimate(self),
             Method::Filtered => filtered::estimate(self),
             Method::Environment => environment::estimate(self),
-            Method::Resampled => resampled::estimate(self),
-            Method::Combined => combined::estimate(self),
+            Method::Ris => ris::estimate(self),
+            Method::Mis => mis::estimate(self),
             Method::Reference => unreachable!("a twin is made for methods that have a shader"),
         }
     }

@@ -2,7 +2,7 @@
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use super::{FORMAT_VERSION, Observer, Settings, Threads, file, generate};
+use super::{FORMAT_VERSION, Observer, ThreadSettings, Threads, file, generate};
 use crate::brdf::Brdf;
 use crate::error::Result;
 
@@ -29,7 +29,7 @@ pub fn default_directory() -> Option<PathBuf> {
 /// A damaged file is reported and replaced; a folder that cannot be written to is reported and otherwise no matter.
 pub fn load_or_generate(
     brdf: &Brdf,
-    settings: &Settings,
+    settings: &ThreadSettings,
     folder: Option<&Path>,
     observer: &dyn Observer,
 ) -> Result<(Threads, CacheState, Duration)> {
@@ -57,7 +57,7 @@ pub fn load_or_generate(
 }
 
 /// Names everything that the threads depend on.
-fn key(brdf: &Brdf, settings: &Settings) -> blake3::Hash {
+fn key(brdf: &Brdf, settings: &ThreadSettings) -> blake3::Hash {
     let mut hasher = blake3::Hasher::new();
     hasher.update(brdf.fingerprint().as_bytes());
     hasher.update(settings.kind.name().as_bytes());
@@ -69,16 +69,16 @@ fn key(brdf: &Brdf, settings: &Settings) -> blake3::Hash {
 
 #[cfg(test)]
 mod tests {
-    use super::super::Kind;
+    use super::super::ThreadKind;
     use super::*;
 
-    const SETTINGS: Settings = Settings { kind: Kind::Paper, count: 4, rows: 3, seed: 1 };
+    const SETTINGS: ThreadSettings = ThreadSettings { kind: ThreadKind::Paper, count: 4, rows: 3, seed: 1 };
 
     fn clay() -> Brdf {
         Brdf::builtin("clay").unwrap()
     }
 
-    fn fetch(brdf: &Brdf, settings: &Settings, folder: &Path) -> (Threads, CacheState) {
+    fn fetch(brdf: &Brdf, settings: &ThreadSettings, folder: &Path) -> (Threads, CacheState) {
         let (table, state, _) = load_or_generate(brdf, settings, Some(folder), &()).unwrap();
         (table, state)
     }
@@ -91,10 +91,10 @@ mod tests {
         assert_eq!(state, CacheState::Miss);
         assert_eq!(fetch(&clay(), &SETTINGS, &folder), (table, CacheState::Hit));
         for settings in [
-            Settings { kind: Kind::Fitted, ..SETTINGS },
-            Settings { count: 5, ..SETTINGS },
-            Settings { rows: 4, ..SETTINGS },
-            Settings { seed: 2, ..SETTINGS },
+            ThreadSettings { kind: ThreadKind::Fitted, ..SETTINGS },
+            ThreadSettings { count: 5, ..SETTINGS },
+            ThreadSettings { rows: 4, ..SETTINGS },
+            ThreadSettings { seed: 2, ..SETTINGS },
         ] {
             assert_eq!(fetch(&clay(), &settings, &folder).1, CacheState::Miss);
         }

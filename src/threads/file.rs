@@ -30,7 +30,7 @@ use serde::{Deserialize, Serialize};
 
 use super::fitted::kernel::{SHARPEST_LEVEL, WIDEST_LEVEL};
 use super::fitted::{FittedTable, PackedKernel, UnpackedKernel};
-use super::{Kind, Sample, ThreadTable, Threads};
+use super::{Sample, ThreadKind, ThreadTable, Threads};
 use crate::error::{Error, Result};
 use crate::output::write_whole;
 
@@ -106,11 +106,11 @@ fn decode(bytes: &[u8]) -> Result<Threads, String> {
     let (header, payload) = rest.split_at_checked(u32::from_le_bytes(length) as usize).ok_or("is cut short")?;
     let header: Header = serde_json::from_slice(header).map_err(|error| format!("has a bad header ({error})"))?;
     let Header { method, material, count, rows, seed } = header;
-    let kind = [Kind::Fitted, Kind::Paper].into_iter().find(|kind| kind.name() == method);
+    let kind = [ThreadKind::Fitted, ThreadKind::Paper].into_iter().find(|kind| kind.name() == method);
     let kind = kind.ok_or_else(|| format!("holds threads of the unknown method {method:?}"))?;
     let words_a_row = match kind {
-        Kind::Fitted => 4,
-        Kind::Paper => 3,
+        ThreadKind::Fitted => 4,
+        ThreadKind::Paper => 3,
     };
     let per_row = count.checked_mul(3).and_then(|words| words.checked_add(words_a_row));
     let expected = per_row.and_then(|words| words.checked_mul(rows)?.checked_mul(4));
@@ -120,8 +120,10 @@ fn decode(bytes: &[u8]) -> Result<Threads, String> {
     let words: Vec<u32> = payload.as_chunks().0.iter().map(|&word| u32::from_le_bytes(word)).collect();
     let (of_rows, of_threads) = words.split_at(words_a_row * rows);
     match kind {
-        Kind::Fitted => fitted_threads(of_rows, of_threads).map(|table| FittedTable { rows, count, material, ..table }),
-        Kind::Paper => {
+        ThreadKind::Fitted => {
+            fitted_threads(of_rows, of_threads).map(|table| FittedTable { rows, count, material, ..table })
+        }
+        ThreadKind::Paper => {
             return paper_threads(of_rows, of_threads)
                 .map(|table| Threads::Paper(ThreadTable { rows, count, material, seed, ..table }));
         }

@@ -5,7 +5,7 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::slice::{Slice, fibonacci_lattice};
-use super::{MIN_COS, Observer, Sample, Settings, ThreadTable, theta_o};
+use super::{MIN_COS, Observer, Sample, ThreadSettings, ThreadTable, theta_o};
 use super::{forces, peaks, smoothing};
 use crate::brdf::Brdf;
 use crate::error::{Error, Result};
@@ -16,8 +16,8 @@ const ITERATIONS: usize = 25;
 /// Makes `settings.count` threads for `brdf`, the same to the last bit on any number of cores.
 ///
 /// Errors: no or too many threads, no rows, or cancelled by `observer` (noticed within one step of one row).
-pub fn generate(brdf: &Brdf, settings: &Settings, observer: &dyn Observer) -> Result<ThreadTable> {
-    let &Settings { count, rows, seed, .. } = settings;
+pub fn generate(brdf: &Brdf, settings: &ThreadSettings, observer: &dyn Observer) -> Result<ThreadTable> {
+    let &ThreadSettings { count, rows, seed, .. } = settings;
     settings.check()?;
 
     // Each row is finished twice: its slice is tabulated (on all cores), then its samples settle.
@@ -128,10 +128,10 @@ mod tests {
     use std::sync::atomic::AtomicBool;
 
     use super::*;
-    use crate::threads::{Kind, MAX_COUNT, test_materials};
+    use crate::threads::{MAX_COUNT, ThreadKind, test_materials};
 
-    fn small(count: usize, rows: usize) -> Settings {
-        Settings { kind: Kind::Paper, count, rows, seed: 7 }
+    fn small(count: usize, rows: usize) -> ThreadSettings {
+        ThreadSettings { kind: ThreadKind::Paper, count, rows, seed: 7 }
     }
 
     #[test]
@@ -157,7 +157,7 @@ mod tests {
         };
         let table = on(1);
         assert_eq!(table, on(5));
-        assert_ne!(table.samples, generate(brdf, &Settings { seed: 8, ..settings }, &()).unwrap().samples);
+        assert_ne!(table.samples, generate(brdf, &ThreadSettings { seed: 8, ..settings }, &()).unwrap().samples);
     }
 
     #[test]
@@ -232,8 +232,12 @@ mod tests {
     fn equation_2_alone_is_near_the_albedo_in_a_white_furnace() {
         // Shading divides by what is left here; what is left tells how well samples follow the pdf.
         for (name, brdf) in test_materials::all() {
-            let table =
-                generate(&brdf, &Settings { kind: Kind::Paper, count: 100, ..Settings::default() }, &()).unwrap();
+            let table = generate(
+                &brdf,
+                &ThreadSettings { kind: ThreadKind::Paper, count: 100, ..ThreadSettings::default() },
+                &(),
+            )
+            .unwrap();
             for theta_o_deg in [0.0, 0.5, 10.5, 30.0, 45.5, 60.5, 75.5, 82.5, 87.5, 88.0f64] {
                 let theta_o = theta_o_deg.to_radians();
                 let albedo = brdf.albedo(theta_o);
@@ -272,8 +276,12 @@ mod tests {
         for (name, brdf) in test_materials::all() {
             for count in [4, 16, 100] {
                 let start = std::time::Instant::now();
-                let table =
-                    generate(&brdf, &Settings { kind: Kind::Paper, count, ..Settings::default() }, &()).unwrap();
+                let table = generate(
+                    &brdf,
+                    &ThreadSettings { kind: ThreadKind::Paper, count, ..ThreadSettings::default() },
+                    &(),
+                )
+                .unwrap();
                 let seconds = start.elapsed().as_secs_f64();
                 let worst = |offset: f64| {
                     let errors = (0..88).map(|row| (f64::from(row) + offset).to_radians()).map(|theta_o| {

@@ -46,7 +46,7 @@ pub const MAX_COUNT: usize = 1024;
 
 /// Which threads.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Kind {
+pub enum ThreadKind {
     /// Fitted to the BRDF: [`fitted`].
     #[default]
     Fitted,
@@ -54,7 +54,7 @@ pub enum Kind {
     Paper,
 }
 
-impl Kind {
+impl ThreadKind {
     /// What files call it, and the method that shades by it.
     pub fn name(self) -> &'static str {
         match self {
@@ -91,10 +91,10 @@ pub enum Threads {
 
 impl Threads {
     /// Which they are.
-    pub fn kind(&self) -> Kind {
+    pub fn kind(&self) -> ThreadKind {
         match self {
-            Self::Fitted(_) => Kind::Fitted,
-            Self::Paper(_) => Kind::Paper,
+            Self::Fitted(_) => ThreadKind::Fitted,
+            Self::Paper(_) => ThreadKind::Paper,
         }
     }
 
@@ -153,18 +153,18 @@ impl Threads {
 ///
 /// # Errors
 /// [`Error::Cancelled`]; settings that ask for no threads, no rows or too many.
-pub fn generate(brdf: &Brdf, settings: &Settings, observer: &dyn Observer) -> Result<Threads> {
+pub fn generate(brdf: &Brdf, settings: &ThreadSettings, observer: &dyn Observer) -> Result<Threads> {
     Ok(match settings.kind {
-        Kind::Fitted => Threads::Fitted(fitted::generate(brdf, settings, observer)?),
-        Kind::Paper => Threads::Paper(generate::generate(brdf, settings, observer)?),
+        ThreadKind::Fitted => Threads::Fitted(fitted::generate(brdf, settings, observer)?),
+        ThreadKind::Paper => Threads::Paper(generate::generate(brdf, settings, observer)?),
     })
 }
 
 /// What threads to make; together with the BRDF it determines the table to the last bit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Settings {
+pub struct ThreadSettings {
     /// Which they are.
-    pub kind: Kind,
+    pub kind: ThreadKind,
     /// Number of threads m, 1 to [`Kind::max_count`].
     pub count: usize,
     /// Number of view angles, evenly spaced from 0 to just below 90 degrees; at least 1, the paper's is 90.
@@ -173,13 +173,13 @@ pub struct Settings {
     pub seed: u64,
 }
 
-impl Default for Settings {
+impl Default for ThreadSettings {
     fn default() -> Self {
-        Self { kind: Kind::default(), count: Kind::default().default_count(), rows: 90, seed: 0 }
+        Self { kind: ThreadKind::default(), count: ThreadKind::default().default_count(), rows: 90, seed: 0 }
     }
 }
 
-impl Settings {
+impl ThreadSettings {
     /// Errors where there is nothing or too much to make.
     fn check(&self) -> Result<()> {
         let most = self.kind.max_count();

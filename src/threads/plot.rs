@@ -20,14 +20,14 @@ const OUTLINE: RGBColor = RGBColor(120, 122, 130);
 const VIEW_ARC: RGBColor = RGBColor(20, 20, 24);
 
 /// Parallel projection of the unit hemisphere into a square.
-struct View {
+struct PlotView {
     right: DVec3,
     up: DVec3,
     centre_px: DVec2,
     scale_px: f64,
 }
 
-impl View {
+impl PlotView {
     /// As seen from `elevation` above the horizon and `azimuth` (radians) around the normal, in the `place`-th square.
     fn from(elevation: f64, azimuth: f64, place: u32) -> Self {
         let side = f64::from(VIEW_PX * OVERSAMPLING);
@@ -58,7 +58,7 @@ pub fn plot(threads: &Threads, path: &Path) -> Result<()> {
         let area = BitMapBackend::with_buffer(&mut pixels, size).into_drawing_area();
         area.fill(&BACKGROUND).map_err(|error| unwritable(error.to_string()))?;
         // w_o moves along +x: seen from above it goes to the right, as seen from azimuth -90 degrees.
-        for view in [View::from(FRAC_PI_2, -FRAC_PI_2, 0), View::from(0.5, -1.0, 1)] {
+        for view in [PlotView::from(FRAC_PI_2, -FRAC_PI_2, 0), PlotView::from(0.5, -1.0, 1)] {
             draw(threads, &view, &area).map_err(|error| unwritable(error.to_string()))?;
         }
         area.present().map_err(|error| unwritable(error.to_string()))?;
@@ -74,7 +74,7 @@ pub fn plot(threads: &Threads, path: &Path) -> Result<()> {
 
 type Canvas<'a> = DrawingArea<BitMapBackend<'a>, plotters::coord::Shift>;
 
-fn draw<'a>(threads: &Threads, view: &View, canvas: &Canvas<'a>) -> Result<(), Box<dyn std::error::Error + 'a>> {
+fn draw<'a>(threads: &Threads, view: &PlotView, canvas: &Canvas<'a>) -> Result<(), Box<dyn std::error::Error + 'a>> {
     // Segment by segment: a thick path grows spikes where it turns back.
     let line = |points: &mut dyn Iterator<Item = DVec3>, style: ShapeStyle| {
         let points: Vec<_> = points.map(|point| view.project(point)).collect();
@@ -128,13 +128,13 @@ fn draw<'a>(threads: &Threads, view: &View, canvas: &Canvas<'a>) -> Result<(), B
 mod tests {
     use super::*;
     use crate::brdf::Brdf;
-    use crate::threads::{Kind, Settings, generate};
+    use crate::threads::{ThreadKind, ThreadSettings, generate};
 
     #[test]
     fn a_picture_of_both_views_is_written_whole_or_not_at_all() {
         let table = generate(
             &Brdf::builtin("gold").unwrap(),
-            &Settings { kind: Kind::Paper, count: 3, rows: 6, ..Settings::default() },
+            &ThreadSettings { kind: ThreadKind::Paper, count: 3, rows: 6, ..ThreadSettings::default() },
             &(),
         )
         .unwrap();

@@ -417,5 +417,5 @@ impl Commands {
 }
 
 fn refuse(pipeline: &Pipeline, problem: String) -> super::VulkanError {
-    Shader { name: pipeline.name, stage: super::Stage::Compute, spirv: &[] }.refuse(problem)
+    Shader { name: pipeline.name, stage: super::ShaderStage::Compute, spirv: &[] }.refuse(problem)
 }

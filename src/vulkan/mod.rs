@@ -36,11 +36,11 @@ pub use frames::{Frames, PassTime, Semaphores};
 pub use instance::{Instance, Messages};
 pub use memory::{Buffer, BufferUse, Image, ImageKind, ImageShape, Memory, Sampler, SamplerKind};
 pub use pipeline::{ComputePipeline, GraphicsPipeline, GraphicsState, PipelineCache};
-pub use shader::{Shader, Stage, compiled};
+pub use shader::{Shader, ShaderStage, compiled};
 #[cfg(feature = "viewer")]
 pub use surface::{Surface, Window};
 #[cfg(feature = "viewer")]
-pub use swapchain::{PresentMode, Presented, Swapchain, Turn};
+pub use swapchain::{AcquiredImage, PresentMode, Presented, Swapchain};
 #[cfg(feature = "viewer")]
 pub use ui::{UiFrame, UiPainter};
 

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 
 /// The stage that a shader is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Stage {
+pub enum ShaderStage {
     /// Vertex shader.
     Vertex,
     /// Fragment shader.
@@ -16,7 +16,7 @@ pub enum Stage {
     Compute,
 }
 
-impl Stage {
+impl ShaderStage {
     pub(super) fn flags(self) -> vk::ShaderStageFlags {
         match self {
             Self::Vertex => vk::ShaderStageFlags::VERTEX,
@@ -32,7 +32,7 @@ pub struct Shader {
     /// Name of the GLSL file, with its variant.
     pub name: &'static str,
     /// Its stage.
-    pub stage: Stage,
+    pub stage: ShaderStage,
     /// SPIR-V, little-endian words.
     pub spirv: &'static [u8],
 }
@@ -159,6 +159,6 @@ mod tests {
 
 /// Every shader of `glsl/`, compiled.
 pub mod compiled {
-    use super::{Shader, Stage};
+    use super::{Shader, ShaderStage};
     include!(concat!(env!("OUT_DIR"), "/shaders.rs"));
 }

@@ -51,7 +51,7 @@ impl PresentMode {
 }
 
 /// An image whose turn it is to be drawn.
-pub struct Turn {
+pub struct AcquiredImage {
     /// The image; its contents are undefined.
     pub image: Arc<Image>,
     /// What the submission that draws it waits for and signals.
@@ -127,7 +127,7 @@ impl Swapchain {
     ///
     /// # Errors
     /// A lost device, no memory left, a window that is gone.
-    pub fn turn(&mut self, frames: &Frames, size: [u32; 2]) -> Result<Option<Turn>> {
+    pub fn turn(&mut self, frames: &Frames, size: [u32; 2]) -> Result<Option<AcquiredImage>> {
         // A surface may change again while its images are made; one that always does is not to hang the program.
         const ATTEMPTS: usize = 8;
         // Window systems that give no images back for hidden windows must not make the program hang.
@@ -148,7 +148,7 @@ impl Swapchain {
                     self.next = (self.next + 1) % self.free.len();
                     let semaphores = Semaphores { wait: Some(free), signal: Some(current.drawn[index as usize]) };
                     let image = current.images[index as usize].clone();
-                    return Ok(Some(Turn { image, semaphores, index }));
+                    return Ok(Some(AcquiredImage { image, semaphores, index }));
                 }
                 Err(vk::Result::TIMEOUT | vk::Result::NOT_READY) => return Ok(None),
                 Err(vk::Result::ERROR_OUT_OF_DATE_KHR) => current.stale = true,
@@ -163,7 +163,7 @@ impl Swapchain {
     ///
     /// # Errors
     /// A lost device.
-    pub fn present(&mut self, turn: Turn) -> Result<Presented> {
+    pub fn present(&mut self, turn: AcquiredImage) -> Result<Presented> {
         let Some(current) = &mut self.current else { return Ok(Presented::Again) };
         let wait: Vec<_> = turn.semaphores.signal.into_iter().collect();
         let (swapchains, indices) = ([current.raw], [turn.index]);

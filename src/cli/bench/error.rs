@@ -1,6 +1,6 @@
 //! `threadlight bench error`: error and time of methods and thread counts over materials, environments and scenes.
 use super::arguments::{CasesArguments, Defaults, OutputArguments, TruthArguments};
-use crate::cli::progress::Progress;
+use crate::cli::progress::TerminalProgress;
 use clap::value_parser;
 use std::io::Write;
 use threadlight::Error;
@@ -73,7 +73,7 @@ impl BenchError {
             keep_pictures: false,
         };
         let device = self.cases.open_device()?;
-        let progress = Progress::of("bench error", "pictures")?;
+        let progress = TerminalProgress::of("bench error", "pictures")?;
         let mut measured = Measured::default();
         let result = self.truth.sweep(reference::TOLERANCE, &sweep, &device, &progress, &mut measured);
         progress.finish();

@@ -1,6 +1,6 @@
 //! `threadlight bench gallery`: pictures beside each other, of materials and of methods.
 use super::arguments::{CasesArguments, Defaults, OutputArguments, QUICK_TOLERANCE, TruthArguments, named};
-use crate::cli::progress::Progress;
+use crate::cli::progress::TerminalProgress;
 use clap::value_parser;
 use std::io::Write;
 use std::path::Path;
@@ -76,7 +76,7 @@ impl BenchGallery {
 
         sweep.cases.check_materials()?;
         let device = self.cases.open_device()?;
-        let progress = Progress::of("materials", "pictures")?;
+        let progress = TerminalProgress::of("materials", "pictures")?;
         let mut sheets = gallery::material_sheets(&materials, estimator, &device, &progress)?;
         progress.restart("methods");
         let mut measured = Measured::default();

@@ -1,6 +1,6 @@
 //! `threadlight bench report`: everything measured, on one HTML page.
 use super::arguments::{CasesArguments, Defaults, QUICK_TOLERANCE, TruthArguments, check_folder};
-use crate::cli::progress::Progress;
+use crate::cli::progress::TerminalProgress;
 use clap::value_parser;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -81,7 +81,7 @@ impl BenchReport {
         let estimator = Estimator { method, count: highest };
 
         let device = self.cases.open_device()?;
-        let progress = Progress::of("errors", "done")?;
+        let progress = TerminalProgress::of("errors", "done")?;
         let mut measured = Measured::default();
         self.truth.sweep(QUICK_TOLERANCE, &sweep, &device, &progress, &mut measured)?;
         let mut report = Report { facts: facts(&device), ..Report::default() };

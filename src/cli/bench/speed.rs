@@ -1,6 +1,6 @@
 //! `threadlight bench speed`: time of a frame by its number of threads, beside its floor, and as other things grow.
 use super::arguments::{CasesArguments, Defaults, OutputArguments};
-use crate::cli::progress::Progress;
+use crate::cli::progress::TerminalProgress;
 use clap::value_parser;
 use std::io::Write;
 use threadlight::Error;
@@ -65,7 +65,7 @@ impl BenchSpeed {
         })?;
         let speed = Speed { cases, threads: self.threads, repeat: self.repeat };
         let device = self.cases.open_device()?;
-        let progress = Progress::of("bench speed", "frames")?;
+        let progress = TerminalProgress::of("bench speed", "frames")?;
         let mut timings = Timings::default();
         let result = speed::run(&speed, &device, &progress, &mut timings);
         progress.finish();

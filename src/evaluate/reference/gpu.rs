@@ -1,4 +1,4 @@
-//! The reference on the GPU: means of frames that are shaded by method `combined`, each with other points.
+//! The reference on the GPU: means of frames that are shaded by method `mis`, each with other points.
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
@@ -32,7 +32,7 @@ pub fn reference_on_gpu(
 ) -> Result<ReferenceImage> {
     let start = Instant::now();
     let sampling = Sampling { count: FRAME_SAMPLES, seed: 0 };
-    let mut renderer = Renderer::of_objects(device, cache, prepared, Method::Combined, sampling)?;
+    let mut renderer = Renderer::of_objects(device, cache, prepared, Method::Mis, sampling)?;
     let display = Display::of(&prepared.view);
     let mut evaluations = 0;
     let mut sums: Vec<Sums> = Vec::new();

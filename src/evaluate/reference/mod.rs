@@ -37,7 +37,7 @@ mod tests;
 
 use integrator::rms;
 pub use integrator::{Integrator, MAX_THETA_O_DEG, PixelEstimate, Point};
-pub use progressive::{Estimate, STAGES, Stage, progressive};
+pub use progressive::{Estimate, Refinement, STAGES, progressive};
 
 /// Tolerance where none is given: a twentieth of a step of an 8-bit display value.
 pub const TOLERANCE: f64 = 2e-4;
@@ -49,7 +49,7 @@ pub enum Processor {
     /// By quadrature in double precision; the tolerance is that of the worst pixel.
     #[default]
     Cpu,
-    /// By thousands of samples of [`Method::Combined`](crate::method::Method::Combined) in single precision; the tolerance is that
+    /// By thousands of samples of [`Method::Mis`](crate::method::Method::Mis) in single precision; the tolerance is that
     /// of the RMS over the picture. Never from the cache: fast devices are faster than it is worth.
     Gpu,
 }

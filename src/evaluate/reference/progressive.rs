@@ -9,7 +9,7 @@ use crate::threads::Observer;
 
 /// A step on the way.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Stage {
+pub struct Refinement {
     /// Every so many pixels along each axis are estimated, a power of two.
     pub step: usize,
     /// Largest estimated error of those, in display values: RMS over channels.
@@ -18,19 +18,19 @@ pub struct Stage {
 
 /// The first is there after a hundredth of the time that the last one takes, each of the next ones after four times as long; the
 /// last has the tolerance of [`super::TOLERANCE`].
-pub const STAGES: &[Stage] = &[
-    Stage { step: 8, tolerance: 2e-3 },
-    Stage { step: 4, tolerance: 2e-3 },
-    Stage { step: 2, tolerance: 2e-3 },
-    Stage { step: 1, tolerance: 2e-3 },
-    Stage { step: 1, tolerance: super::TOLERANCE },
+pub const STAGES: &[Refinement] = &[
+    Refinement { step: 8, tolerance: 2e-3 },
+    Refinement { step: 4, tolerance: 2e-3 },
+    Refinement { step: 2, tolerance: 2e-3 },
+    Refinement { step: 1, tolerance: 2e-3 },
+    Refinement { step: 1, tolerance: super::TOLERANCE },
 ];
 
 /// What is known of the reference picture after a stage.
 #[derive(Clone, Debug)]
 pub struct Estimate {
     /// The stage.
-    pub stage: Stage,
+    pub stage: Refinement,
     /// Linear radiance times coverage, and coverage, row by row: pixels between estimated ones are like the one above and left of them.
     pub radiance: Vec<[f32; 4]>,
     /// RMS over channels and estimated pixels that see a surface of the estimated error of display values.
@@ -52,7 +52,7 @@ impl Estimate {
 pub fn progressive(
     prepared: &Prepared,
     geometry: &[[u32; 2]],
-    stages: &[Stage],
+    stages: &[Refinement],
     observer: &dyn Observer,
     publish: &mut dyn FnMut(Estimate),
 ) -> Result<()> {
@@ -64,7 +64,7 @@ pub fn progressive(
     let mut known: Vec<Option<Pixel>> = vec![None; width * height];
     let mut known_tolerance = f64::INFINITY;
     for &stage in stages {
-        let Stage { step, tolerance } = stage;
+        let Refinement { step, tolerance } = stage;
         if tolerance < known_tolerance {
             known.fill(None);
             known_tolerance = tolerance;

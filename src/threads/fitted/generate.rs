@@ -11,7 +11,7 @@ use super::table::FittedTable;
 use crate::brdf::Brdf;
 use crate::error::{Error, Result};
 use crate::threads::slice::Slice;
-use crate::threads::{Observer, Settings, theta_o};
+use crate::threads::{Observer, ThreadSettings, theta_o};
 
 /// Steps of the first row, which starts from cells, and of the others.
 const FIRST: Effort = Effort { steps: 300, least_gain: 1e-5 };
@@ -38,7 +38,7 @@ type Row = (Vec<Kernel>, DVec3, f64);
 ///
 /// # Errors
 /// No or too many threads, no rows, or cancelled by `observer` (noticed within a step of a row).
-pub fn generate(brdf: &Brdf, settings: &Settings, observer: &dyn Observer) -> Result<FittedTable> {
+pub fn generate(brdf: &Brdf, settings: &ThreadSettings, observer: &dyn Observer) -> Result<FittedTable> {
     settings.check()?;
     let rows = settings.rows;
     let done = AtomicUsize::new(0);

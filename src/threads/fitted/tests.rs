@@ -9,10 +9,10 @@ use super::{FittedTable, MAX_COUNT, PackedKernel, generate};
 use crate::brdf::Brdf;
 use crate::error::Error;
 use crate::threads::slice::{Slice, fibonacci_lattice};
-use crate::threads::{Kind, Observer, Settings, Threads, read, test_materials, theta_o, write};
+use crate::threads::{Observer, ThreadKind, ThreadSettings, Threads, read, test_materials, theta_o, write};
 
-fn small(count: usize, rows: usize) -> Settings {
-    Settings { kind: Kind::Fitted, count, rows, seed: 0 }
+fn small(count: usize, rows: usize) -> ThreadSettings {
+    ThreadSettings { kind: ThreadKind::Fitted, count, rows, seed: 0 }
 }
 
 fn black() -> Brdf {

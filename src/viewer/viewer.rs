@@ -1,12 +1,12 @@
 //! The viewer: what inputs do to the session, and the frames that follow from it. Knows nothing of the window system.
 use super::comparer::Comparer;
 use super::comparison::Wipe;
+use super::dynamic_resolution::DynamicResolution;
 use super::input::{DragAction, Dropped, Input, change_of_dropped};
-use super::jobs::{Newest, Progress};
+use super::latest_job::{LatestJob, Progress};
 use super::orbit::{Bounds, Orbit, environment_turn_deg};
-use super::pace::Pace;
+use super::presenter::{Drawn, Extras, Presenter, ShownPicture};
 use super::session::{Change, Session};
-use super::stage::{Drawn, Extras, Picture, Stage};
 use crate::output::{self, Format};
 use crate::passes::{Area, Counters, View, filter_environment};
 use crate::pipeline::{Renderer, Wanted};
@@ -92,10 +92,10 @@ pub struct Viewer {
     /// Where the cursor is in the window, in pixels; none while it is elsewhere.
     pub cursor: Option<[f64; 2]>,
     loaded: Option<Loaded>,
-    loading: Newest<Loaded>,
+    loading: LatestJob<Loaded>,
     /// The scene whose preparation was asked for last, as [`Self::needs`] has it.
     requested: Option<Scene>,
-    pace: Pace,
+    dynamic_resolution: DynamicResolution,
     last_motion: Option<Instant>,
     last_turn: Option<Instant>,
     #[cfg(feature = "hot-reload")]
@@ -126,9 +126,9 @@ impl Viewer {
             loaded: None,
             comparer: Comparer::new(move || wake_too()),
             cursor: None,
-            loading: Newest::new("loading", move || wake()),
+            loading: LatestJob::new("loading", move || wake()),
             requested: None,
-            pace: Pace::default(),
+            dynamic_resolution: DynamicResolution::default(),
             last_motion: None,
             last_turn: None,
             #[cfg(feature = "hot-reload")]
@@ -426,7 +426,7 @@ impl Viewer {
     /// Whatever Vulkan refuses.
     pub fn draw(
         &mut self,
-        stage: &mut Stage,
+        stage: &mut Presenter,
         size: [u32; 2],
         panel: &UiFrame,
         textures: &TexturesDelta,
@@ -441,7 +441,7 @@ impl Viewer {
             Some(loaded) => {
                 let mut view = self.view(loaded)?;
                 if is_moving {
-                    [view.width, view.height] = self.pace.moving([view.width, view.height]);
+                    [view.width, view.height] = self.dynamic_resolution.moving([view.width, view.height]);
                 }
                 Some(view)
             }
@@ -450,7 +450,7 @@ impl Viewer {
         if let Some(Loaded { prepared, .. }) = &loaded {
             self.comparer.update(self.session.shown(), prepared, &self.device, self.cache.as_deref(), is_moving)?;
         }
-        let picture = loaded.as_ref().zip(view.as_ref()).map(|(loaded, view)| Picture {
+        let picture = loaded.as_ref().zip(view.as_ref()).map(|(loaded, view)| ShownPicture {
             renderer: &loaded.renderer,
             view,
             area: self.area,
@@ -462,7 +462,7 @@ impl Viewer {
             let size = [view.width, view.height];
             if drawn.ran.iter().any(|pass| pass == "shade") {
                 let full = &self.session.shown().image;
-                self.pace.drawn(size, [full.width, full.height], drawn.picture_time().unwrap_or(frame));
+                self.dynamic_resolution.drawn(size, [full.width, full.height], drawn.picture_time().unwrap_or(frame));
             }
             tracing::debug!("{} x {} in {:.1} ms", size[0], size[1], frame.as_secs_f64() * 1e3);
             self.measured.frames += 1;

@@ -1,6 +1,6 @@
 //! The stage: draws frames into the window.
 use crate::Result;
-use crate::graph::{Access, Executable, ImageDesc, Object, Store};
+use crate::graph::{Access, DeviceResource, Executable, ImageDesc, Store};
 use crate::passes::{Area, Counters, FrameGraph, Readbacks, View, present, texels, ui};
 use crate::pipeline::{Renderer, declare};
 use crate::vulkan::{Device, Frames, PassTime, PresentMode, Presented, Surface, Swapchain, UiFrame, UiPainter};
@@ -12,7 +12,7 @@ use std::time::Duration;
 const FRAMES: usize = 2;
 
 /// What a frame shows.
-pub struct Picture<'a> {
+pub struct ShownPicture<'a> {
     /// Of what.
     pub renderer: &'a Renderer,
     /// From where, and in which resolution: scaled to `area` where that is not its size.
@@ -53,7 +53,7 @@ pub struct Extras {
 }
 
 /// The window, as frames see it.
-pub struct Stage {
+pub struct Presenter {
     // In the order in which they are dropped: whoever uses a thing goes before it.
     store: Store,
     painter: UiPainter,
@@ -62,7 +62,7 @@ pub struct Stage {
     device: Arc<Device>,
 }
 
-impl Stage {
+impl Presenter {
     /// The stage of the window of `surface`.
     ///
     /// # Errors
@@ -95,7 +95,7 @@ impl Stage {
     pub fn draw(
         &mut self,
         size: [u32; 2],
-        picture: Option<Picture>,
+        picture: Option<ShownPicture>,
         panel: &UiFrame,
         textures: &TexturesDelta,
         extras: Extras,
@@ -109,7 +109,7 @@ impl Stage {
         let desc = ImageDesc { format: Swapchain::FORMAT, width, height };
         let window = graph.import_image("window", desc, None, Some(Access::Present));
         let nowhere = Area { left: 0, top: 0, width, height };
-        let frame = picture.as_ref().map(|Picture { renderer, view, .. }| declare(&mut graph, renderer, view));
+        let frame = picture.as_ref().map(|ShownPicture { renderer, view, .. }| declare(&mut graph, renderer, view));
         let area = picture.as_ref().map_or(nowhere, |picture| picture.area);
         let shown = present(&mut graph, frame.as_ref().map(|frame| frame.display), window, area);
         let shown = ui(&mut graph, &self.painter, panel, shown);
@@ -128,7 +128,7 @@ impl Stage {
         };
         let screenshot = readbacks.image("read_window", shown, [width, height], 4, extras.screenshot)?;
         let Readbacks { graph, mut imports, .. } = readbacks;
-        imports.push((window.into(), Object::Image(turn.image.clone())));
+        imports.push((window.into(), DeviceResource::Image(turn.image.clone())));
         let executable = Executable::keeping(&self.device, graph, &imports, &mut self.store)?;
         let passes = match self.device.times_passes() {
             true => {

@@ -17,15 +17,15 @@
 
 pub mod comparer;
 pub mod comparison;
+pub mod dynamic_resolution;
 pub mod input;
-pub mod jobs;
+pub mod latest_job;
 pub mod orbit;
-pub mod pace;
 mod panel;
+pub mod presenter;
 pub mod session;
 #[cfg(feature = "hot-reload")]
 mod shader_watch;
-pub mod stage;
 pub mod threads_seen;
 pub mod viewer;
 mod window;
@@ -39,7 +39,7 @@ use winit::event_loop::EventLoop;
 
 /// What the viewer is started with.
 #[derive(Clone, Debug, Default)]
-pub struct Settings {
+pub struct ViewerSettings {
     /// What is looked at first; its image is as large as the picture in the window.
     pub scene: Scene,
     /// Vulkan device: index or part of its name.
@@ -62,7 +62,7 @@ pub struct Settings {
 ///
 /// # Errors
 /// No window system, no device that presents to it, a scene that cannot be loaded.
-pub fn run(settings: Settings) -> Result<Vec<String>> {
+pub fn run(settings: ViewerSettings) -> Result<Vec<String>> {
     let event_loop = EventLoop::<window::Wake>::with_user_event().build()?;
     let mut app = window::App::new(settings, event_loop.create_proxy());
     event_loop.run_app(&mut app)?;

@@ -1,9 +1,9 @@
 //! How radiance becomes display values, and what is seen behind the objects.
 use super::{group, on_change};
 use crate::scene::Background;
-use crate::view::input::Input;
-use crate::view::session::Change;
-use crate::view::viewer::Viewer;
+use crate::viewer::input::Input;
+use crate::viewer::session::Change;
+use crate::viewer::viewer::Viewer;
 use egui::Ui;
 
 pub fn show(ui: &mut Ui, viewer: &Viewer, inputs: &mut Vec<Input>) {

@@ -1,6 +1,6 @@
 //! Saves the picture and the scene.
 use super::group;
-use crate::view::input::Input;
+use crate::viewer::input::Input;
 use egui::Ui;
 
 pub struct State {

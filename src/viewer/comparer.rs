@@ -3,7 +3,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::comparison::{Compared, Other, Wipe, compare_with};
-use super::jobs::{Newest, Progress};
+use super::latest_job::{LatestJob, Progress};
 use crate::prepare::{Prepared, view_of};
 use crate::scene::Scene;
 use crate::vulkan::Device;
@@ -17,7 +17,7 @@ pub struct Comparer {
     pub wipe: Wipe,
     /// Whether the heat map is right of it, in the place of the other picture.
     pub shows_heat_map: bool,
-    jobs: Newest<Compared>,
+    jobs: LatestJob<Compared>,
     /// What was compared last, or is.
     begun: Option<(Scene, Other)>,
     compared: Option<Arc<Compared>>,
@@ -30,7 +30,7 @@ impl Comparer {
             other: None,
             wipe: Wipe::default(),
             shows_heat_map: false,
-            jobs: Newest::new("comparison", wake),
+            jobs: LatestJob::new("comparison", wake),
             begun: None,
             compared: None,
         }

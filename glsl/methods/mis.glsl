@@ -1,6 +1,6 @@
 // Multiple importance sampling (Veach and Guibas 1995, balance heuristic): each sample is a direction drawn by the BRDF and one by
 // the light, so that neither a narrow lobe nor a small sun makes a large weight, at evenly distributed points. With
-// thousands of samples it is the reference's form on the GPU. Twin: src/shading/combined.rs.
+// thousands of samples it is the reference's form on the GPU. Twin: src/shading/mis.rs.
 #include "low_discrepancy.glsl"
 #include "light_sampling.glsl"
 #include "importance_sampling.glsl"

@@ -1,4 +1,4 @@
-//! Multiple importance sampling of lobe and light at evenly distributed points. Twin of glsl/methods/combined.glsl.
+//! Multiple importance sampling of lobe and light at evenly distributed points. Twin of glsl/methods/mis.glsl.
 use glam::Vec3;
 
 use super::{Point, importance_sampling::SliceRows, light_sampling::light_pdf, low_discrepancy::Stream};

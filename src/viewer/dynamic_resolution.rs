@@ -20,7 +20,7 @@ struct Cost {
 
 /// What frames cost, and hence how large moving ones can be.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Pace {
+pub struct DynamicResolution {
     /// Of the last picture in full size.
     full: Option<Cost>,
     /// Of the last coarser one. The two tell apart what a picture costs anyway, and what for each pixel.
@@ -29,7 +29,7 @@ pub struct Pace {
     scale: usize,
 }
 
-impl Pace {
+impl DynamicResolution {
     /// Takes note that a picture of `size`, which is `full` or a part of that, was drawn anew in this time.
     pub fn drawn(&mut self, size: [u32; 2], full: [u32; 2], time: Duration) {
         let cost = Cost { pixels: pixels(size), seconds: time.as_secs_f64() };
@@ -88,11 +88,11 @@ mod tests {
 
     /// The sizes of ten pictures in a row, after one in full size.
     fn sizes(costs: [f64; 2]) -> Vec<[u32; 2]> {
-        let mut pace = Pace::default();
-        pace.drawn(FULL, FULL, cost(FULL, costs));
+        let mut dynamic_resolution = DynamicResolution::default();
+        dynamic_resolution.drawn(FULL, FULL, cost(FULL, costs));
         let next = |_| {
-            let size = pace.moving(FULL);
-            pace.drawn(size, FULL, cost(size, costs));
+            let size = dynamic_resolution.moving(FULL);
+            dynamic_resolution.drawn(size, FULL, cost(size, costs));
             size
         };
         (0..10).map(next).collect()
@@ -100,7 +100,7 @@ mod tests {
 
     #[test]
     fn what_is_quick_moves_as_it_is_and_what_is_slow_gets_coarser() {
-        assert_eq!(Pace::default().moving(FULL), FULL);
+        assert_eq!(DynamicResolution::default().moving(FULL), FULL);
         for (costs, expected) in [
             ([0.0, 10.0], FULL),
             ([0.0, 100.0], [480, 360]),
@@ -122,14 +122,14 @@ mod tests {
 
     #[test]
     fn a_scale_is_kept_though_times_vary() {
-        let mut pace = Pace::default();
-        pace.drawn(FULL, FULL, cost(FULL, [0.0, 200.0]));
+        let mut dynamic_resolution = DynamicResolution::default();
+        dynamic_resolution.drawn(FULL, FULL, cost(FULL, [0.0, 200.0]));
         for step in 0..20 {
-            let size = pace.moving(FULL);
+            let size = dynamic_resolution.moving(FULL);
             assert_eq!(size, [320, 240]);
-            pace.drawn(size, FULL, cost(size, [0.0, if step % 2 == 0 { 170.0 } else { 240.0 }]));
+            dynamic_resolution.drawn(size, FULL, cost(size, [0.0, if step % 2 == 0 { 170.0 } else { 240.0 }]));
         }
-        pace.drawn([0, 0], FULL, Duration::from_millis(10));
-        assert_eq!(pace.moving(FULL), [320, 240]);
+        dynamic_resolution.drawn([0, 0], FULL, Duration::from_millis(10));
+        assert_eq!(dynamic_resolution.moving(FULL), [320, 240]);
     }
 }

@@ -2,9 +2,9 @@
 use super::{group, on_change, source};
 use crate::environment;
 use crate::scene::Source;
-use crate::view::input::Input;
-use crate::view::session::Change;
-use crate::view::viewer::Viewer;
+use crate::viewer::input::Input;
+use crate::viewer::session::Change;
+use crate::viewer::viewer::Viewer;
 use egui::Ui;
 
 #[derive(Default)]

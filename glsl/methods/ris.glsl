@@ -1,7 +1,7 @@
 // Resampled importance sampling (Talbot et al. 2005): for each sample CANDIDATES directions, half drawn by the BRDF and half by the
 // light, of which one is kept in proportion to q / p with q the luminance of f L cos, the whole integrand. Without
 // occlusion q is the answer but for its colour, so this is multiple importance sampling (balance heuristic) of
-// CANDIDATES lookups a sample, and those are counted. Twin: src/shading/resampled.rs.
+// CANDIDATES lookups a sample, and those are counted. Twin: src/shading/ris.rs.
 #include "random.glsl"
 #include "light_sampling.glsl"
 #include "importance_sampling.glsl"

@@ -1,9 +1,9 @@
 //! The window: what winit tells becomes inputs, and frames are drawn when there is something new.
 use super::input::{Button, Drag, Input, Scroll};
 use super::panel::{self, Panel};
-use super::stage::Stage;
+use super::presenter::Presenter;
 use super::viewer::Viewer;
-use super::{Settings, failed};
+use super::{ViewerSettings, failed};
 use crate::output;
 use crate::passes::Area;
 use crate::vulkan::{Device, Instance, Messages, Surface, UiFrame};
@@ -32,7 +32,7 @@ const RESIZE_PATIENCE: Duration = Duration::from_secs(2);
 
 /// The program as winit sees it.
 pub struct App {
-    settings: Settings,
+    settings: ViewerSettings,
     proxy: EventLoopProxy<Wake>,
     open: Option<Open>,
     /// What ended it.
@@ -45,7 +45,7 @@ pub struct App {
 struct Open {
     // In the order in which they are dropped: the window goes last.
     viewer: Viewer,
-    stage: Stage,
+    stage: Presenter,
     panel: Panel,
     egui: egui_winit::State,
     context: egui::Context,
@@ -73,12 +73,13 @@ struct Script {
 
 impl App {
     /// An app that will open its window when winit says so.
-    pub fn new(settings: Settings, proxy: EventLoopProxy<Wake>) -> Self {
+    pub fn new(settings: ViewerSettings, proxy: EventLoopProxy<Wake>) -> Self {
         Self { settings, proxy, open: None, result: Ok(()), messages: None }
     }
 
     fn open(&mut self, event_loop: &ActiveEventLoop) -> Result<Open> {
-        let Settings { scene, device, validate, cache, present_mode, frames, screenshot, replay } = &self.settings;
+        let ViewerSettings { scene, device, validate, cache, present_mode, frames, screenshot, replay } =
+            &self.settings;
         let image = &scene.image;
         let attributes = Window::default_attributes()
             .with_title("Threadlight")
@@ -96,7 +97,7 @@ impl App {
         self.messages = Some(instance.messages());
         let surface = Surface::new(&instance, window.clone())?;
         let device = Device::for_surface(&instance, device.as_deref(), &surface)?;
-        let stage = Stage::new(&device, surface, *present_mode)?;
+        let stage = Presenter::new(&device, surface, *present_mode)?;
         let context = egui::Context::default();
         let egui = egui_winit::State::new(
             context.clone(),
@@ -164,7 +165,7 @@ impl Open {
     }
 
     /// Draws a frame; gives whether the program is to end.
-    fn draw(&mut self, settings: &Settings) -> Result<bool> {
+    fn draw(&mut self, settings: &ViewerSettings) -> Result<bool> {
         self.due = None;
         self.last_drawn = Instant::now();
         let raw = self.egui.take_egui_input(&self.window);

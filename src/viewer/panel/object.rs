@@ -1,9 +1,9 @@
 //! Which mesh.
 use super::{group, source};
 use crate::scene::{Source, mesh};
-use crate::view::input::Input;
-use crate::view::session::Change;
-use crate::view::viewer::Viewer;
+use crate::viewer::input::Input;
+use crate::viewer::session::Change;
+use crate::viewer::viewer::Viewer;
 use egui::Ui;
 
 #[derive(Default)]

@@ -2,9 +2,9 @@
 use super::{group, on_change};
 use crate::method::Method;
 use crate::scene::{MAX_SAMPLES, MAX_SUBPIXELS};
-use crate::view::input::Input;
-use crate::view::session::Change;
-use crate::view::viewer::Viewer;
+use crate::viewer::input::Input;
+use crate::viewer::session::Change;
+use crate::viewer::viewer::Viewer;
 use egui::Ui;
 
 pub fn show(ui: &mut Ui, viewer: &Viewer, inputs: &mut Vec<Input>) {
@@ -55,8 +55,8 @@ fn described(method: Method) -> &'static str {
         Method::Importance => "Monte Carlo by a 2D CDF of the BRDF (Matusik et al. 2003).",
         Method::Filtered => "The same with filtered lookups (Colbert and Krivanek 2007); biased.",
         Method::Environment => "Monte Carlo by the light (Agarwal et al. 2003).",
-        Method::Resampled => "Resampled importance sampling of the product (Talbot et al. 2005).",
-        Method::Combined => "Multiple importance sampling of lobe and light (Veach and Guibas 1995).",
+        Method::Ris => "Resampled importance sampling of the product (Talbot et al. 2005).",
+        Method::Mis => "Multiple importance sampling of lobe and light (Veach and Guibas 1995).",
         Method::Reference => "The integral itself, by quadrature on the CPU.",
     }
 }

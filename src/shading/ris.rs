@@ -1,4 +1,4 @@
-//! Resampled importance sampling. Twin of glsl/methods/resampled.glsl.
+//! Resampled importance sampling. Twin of glsl/methods/ris.glsl.
 use glam::Vec3;
 
 use super::{Point, importance_sampling::SliceRows, light_sampling::light_pdf, random::to_unit};

@@ -3,9 +3,9 @@ use super::group;
 use crate::method::Method;
 use crate::passes::Area;
 use crate::scene::{MAX_SAMPLES, ShadingSettings};
-use crate::view::comparison::{Compared, Other, Wipe};
-use crate::view::input::Input;
-use crate::view::viewer::Viewer;
+use crate::viewer::comparison::{Compared, Other, Wipe};
+use crate::viewer::input::Input;
+use crate::viewer::viewer::Viewer;
 use egui::{
     Align2, Color32, ColorImage, ComboBox, Context, CursorIcon, DragValue, FontId, Id, LayerId, Order, ProgressBar,
     Rect, Sense, Stroke, TextureHandle, TextureOptions, Ui, pos2, vec2,

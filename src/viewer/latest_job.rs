@@ -27,7 +27,7 @@ pub struct Progress {
 /// Work of one kind whose newest request is the only one that counts. Results are of type `T`.
 ///
 /// Dropping it cancels the work and waits for it to end, 800 ms at most.
-pub struct Newest<T> {
+pub struct LatestJob<T> {
     shared: Arc<Shared<T>>,
     thread: Option<JoinHandle<()>>,
 }
@@ -60,7 +60,7 @@ pub struct Task<T> {
     shared: Arc<Shared<T>>,
 }
 
-impl<T: Send + 'static> Newest<T> {
+impl<T: Send + 'static> LatestJob<T> {
     /// Starts a thread called `name`. `wake` is called from it when there is a result or progress: it should make the event loop look.
     ///
     /// # Panics
@@ -115,7 +115,7 @@ impl<T: Send + 'static> Newest<T> {
     }
 }
 
-impl<T> Drop for Newest<T> {
+impl<T> Drop for LatestJob<T> {
     fn drop(&mut self) {
         let start = Instant::now();
         self.shared.forget().closing = true;
@@ -235,7 +235,7 @@ mod tests {
     use std::sync::mpsc;
 
     /// The next result; fails the test if it takes more than ten seconds.
-    fn wait<T: Send + 'static>(jobs: &Newest<T>) -> Result<T> {
+    fn wait<T: Send + 'static>(jobs: &LatestJob<T>) -> Result<T> {
         let start = Instant::now();
         loop {
             if let Some(result) = jobs.take() {
@@ -258,7 +258,7 @@ mod tests {
     fn a_request_gives_its_results_in_order_and_wakes_the_loop() {
         let wakes = Arc::new(AtomicUsize::new(0));
         let count = wakes.clone();
-        let jobs = Newest::new("test", move || {
+        let jobs = LatestJob::new("test", move || {
             count.fetch_add(1, Ordering::Relaxed);
         });
         assert!(!jobs.is_busy() && jobs.take().is_none());
@@ -278,7 +278,7 @@ mod tests {
 
     #[test]
     fn the_newest_request_wins_and_the_others_leave_nothing() {
-        let jobs = Newest::new("test", || ());
+        let jobs = LatestJob::new("test", || ());
         let (began, begins) = mpsc::channel();
         jobs.request(move |task| {
             task.publish(0);
@@ -296,7 +296,7 @@ mod tests {
 
     #[test]
     fn what_is_cancelled_leaves_nothing_and_the_next_request_is_served() {
-        let jobs = Newest::new("test", || ());
+        let jobs = LatestJob::new("test", || ());
         jobs.request(endless);
         std::thread::sleep(Duration::from_millis(20));
         jobs.cancel();
@@ -307,7 +307,7 @@ mod tests {
 
     #[test]
     fn progress_is_told_while_it_lasts() {
-        let jobs = Newest::new("test", || ());
+        let jobs = LatestJob::new("test", || ());
         let (began, begins) = mpsc::channel();
         jobs.request(move |task: &Task<()>| {
             task.begin("threads");
@@ -323,7 +323,7 @@ mod tests {
 
     #[test]
     fn errors_are_results_and_a_panic_is_an_error() {
-        let jobs = Newest::<()>::new("test", || ());
+        let jobs = LatestJob::<()>::new("test", || ());
         jobs.request(|_| Err(Error::input("x.obj", "is broken", "repair it")));
         assert_eq!(wait(&jobs).unwrap_err().to_string(), "x.obj: is broken; repair it");
         jobs.request(|_| panic!("on purpose"));
@@ -334,7 +334,7 @@ mod tests {
 
     #[test]
     fn closing_ends_the_work_and_does_not_wait_for_what_will_not_end() {
-        let jobs = Newest::<()>::new("test", || ());
+        let jobs = LatestJob::<()>::new("test", || ());
         jobs.request(endless);
         std::thread::sleep(Duration::from_millis(20));
         let start = Instant::now();
@@ -342,7 +342,7 @@ mod tests {
         assert!(start.elapsed() < Duration::from_millis(200));
 
         let (end, ends) = mpsc::channel::<()>();
-        let jobs = Newest::<()>::new("test", || ());
+        let jobs = LatestJob::<()>::new("test", || ());
         jobs.request(move |_| {
             let _ = ends.recv();
             Ok(())
