@@ -32,6 +32,21 @@ pub enum Method {
     Reference,
 }
 
+/// What a method's shader looks up besides BRDFs and threads.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Lookups {
+    /// The box-filtered pyramid of the environment.
+    pub box_filtered: bool,
+    /// The environment blurred by the kernels of fitted threads, with what belongs to that.
+    pub blurred: bool,
+    /// The environment as it is, with the density of its light.
+    pub map: bool,
+    /// The alias table of that density.
+    pub aliases: bool,
+    /// CDFs of BRDFs.
+    pub slices: bool,
+}
+
 impl Method {
     /// All of them.
     pub const ALL: &[Self] = &[
@@ -99,6 +114,21 @@ impl Method {
         }
     }
 
+    /// What its shader looks up.
+    pub fn lookups(self) -> Lookups {
+        let none = Lookups::default();
+        match self {
+            Self::Fitted => Lookups { blurred: true, ..none },
+            Self::Paper => Lookups { box_filtered: true, ..none },
+            Self::Uniform | Self::Cosine => Lookups { map: true, ..none },
+            Self::Importance => Lookups { map: true, slices: true, ..none },
+            Self::Filtered => Lookups { box_filtered: true, slices: true, ..none },
+            Self::Environment => Lookups { map: true, aliases: true, ..none },
+            Self::Ris | Self::Mis => Lookups { map: true, aliases: true, slices: true, ..none },
+            Self::Reference => none,
+        }
+    }
+
     /// The threads that it shades by; the others draw that many samples instead.
     pub fn threads(self) -> Option<threads::ThreadKind> {
         match self {
@@ -132,5 +162,26 @@ impl Method {
     /// Whether the mean over seeds is equation (1), whatever the number of samples.
     pub fn is_unbiased(self) -> bool {
         !matches!(self, Self::Fitted | Self::Paper | Self::Filtered | Self::Reference)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_methods_look_up_is_what_their_shaders_declare() {
+        for method in Method::ALL.iter().filter(|method| method.runs_on_gpu()) {
+            let declares = |name| method.shader().unwrap().declares(name).unwrap();
+            let blurred = declares("irradiance_map");
+            let declared = Lookups {
+                box_filtered: declares("environment_pyramid") && !blurred,
+                blurred,
+                map: declares("environment_map") && !blurred,
+                aliases: declares("LightAliases"),
+                slices: declares("Slices"),
+            };
+            assert_eq!(method.lookups(), declared, "{}", method.name());
+        }
     }
 }

@@ -1,12 +1,15 @@
 //! The method on one screen: the frame as a graph of passes, and the renderer that runs it.
 use crate::graph::{Buffer, Executable, Image};
-use crate::method::Method;
+use crate::memo::{Held, Keyed, Round};
 use crate::output::ExrHeader;
 use crate::passes::*;
-use crate::prepare::{Prepared, PreparedMaterial};
-use crate::vulkan::{Device, Frames, PassTime, PipelineCache};
+use crate::prepare::Prepared;
+use crate::scene::Mesh;
+use crate::steps::{
+    CompileCompute, CompileGeometryCache, UploadBackground, UploadLight, UploadMaterials, UploadMesh, light,
+};
+use crate::vulkan::{Device, Frames, PassTime, Shader, compiled};
 use crate::{Error, Result};
-use std::path::Path;
 use std::sync::Arc;
 
 /// Which results of a frame are wanted; what none of them needs is not computed.
@@ -26,7 +29,7 @@ pub(crate) fn declare<'a>(graph: &mut FrameGraph<'a>, renderer: &'a Renderer, vi
     let tiles = classify(graph, &renderer.classify, geometry, view);
     let Shaded { radiance, lookups } = shade(graph, &renderer.shade, geometry, &tiles, view); // pass 2 of the paper
     let radiance = match &renderer.background {
-        Some(environment) => background(graph, environment, radiance, view),
+        Some(of) => background(graph, of, radiance, view),
         None => radiance,
     };
     let display = tone_map(graph, &renderer.tone_map, radiance, view);
@@ -42,17 +45,19 @@ pub(crate) struct Frame {
     pub display: Image,
 }
 
-/// A scene on a device, ready to render.
+/// A scene on a device, ready to render. Cheap to clone.
 #[derive(Clone)]
 pub struct Renderer {
     /// Where from and how it is looked at. Its number of sub-pixels is that which the shaders were compiled for.
     pub view: View,
-    geometry_cache: Arc<GeometryCache>,
-    classify: Arc<Classify>,
+    geometry_cache: GeometryCache,
+    classify: Classify,
     shade: Shade,
-    background: Option<Arc<Background>>,
-    tone_map: Arc<ToneMap>,
+    background: Option<Background>,
+    tone_map: ToneMap,
     device: Arc<Device>,
+    /// All that its round was asked for: what the next renderer has in common with this one is not made again.
+    _held: Held,
 }
 
 /// Results of a rendering, as far as they were wanted.
@@ -79,95 +84,41 @@ pub struct Rendering {
 }
 
 impl Renderer {
-    /// Uploads `prepared` and compiles the shaders that it needs.
+    /// Asks `round` for all that a frame of `prepared` needs on `device`: filtered, compiled and uploaded.
     ///
     /// # Errors
-    /// No device memory left, or a limit of the device exceeded.
-    pub fn new(device: &Arc<Device>, cache_folder: Option<&Path>, prepared: &Prepared) -> Result<Self> {
-        let mut renderer = Self::of_objects(device, cache_folder, prepared, prepared.method, prepared.sampling)?;
-        if prepared.show_environment {
-            let cache = PipelineCache::new(device, cache_folder)?;
-            renderer.background = Some(Arc::new(Background::new(device, &cache, &prepared.environment)?));
-        }
-        Ok(renderer)
-    }
-
-    /// The same for only the objects of `prepared`, by `method`, for which it may not have been prepared if that needs no threads.
-    ///
-    /// # Errors
-    /// No device memory left, or a limit of the device exceeded.
-    pub fn of_objects(
-        device: &Arc<Device>,
-        cache_folder: Option<&Path>,
-        prepared: &Prepared,
-        method: Method,
-        sampling: Sampling,
-    ) -> Result<Self> {
-        let Prepared { view, .. } = prepared;
-        let cache = PipelineCache::new(device, cache_folder)?;
-        let geometry_cache = Arc::new(upload_geometry(device, &cache, prepared)?);
-        let materials = upload_materials(device, method, prepared)?;
-        let light = upload_light(device, &cache, cache_folder, method, prepared)?;
+    /// No device memory left, a limit of the device exceeded, a method that does not run there; cancelled.
+    pub fn new(device: &Arc<Device>, prepared: &Prepared, round: &Round) -> Result<Self> {
+        let &Prepared { method, sampling, ref view, ref environment, .. } = prepared;
+        let compile = |shader: &'static Shader, constants: &[(&'static str, u32)]| {
+            round.ask(&CompileCompute { device, shader, constants })
+        };
+        let shader = method.shader()?;
+        let geometry_cache = ask_geometry_cache(device, prepared, round)?;
+        let materials: Vec<_> = prepared.materials.iter().map(|m| (&m.brdf, m.threads.as_ref())).collect();
+        let evaluates_brdf = method.evaluates_brdf(environment);
+        let materials = round.ask(&UploadMaterials { device, method, materials: &materials, evaluates_brdf })?;
+        let light = light(round, Some(device), method, environment, &prepared.shaded())?;
+        let light = round.ask(&UploadLight { device, method, environment, light: &light })?;
+        let subpixels = ("SUBPIXELS", view.subpixels);
+        let pipeline = compile(shader, &[subpixels, ("MODELS_USED", materials.models_used)])?;
+        let background = match prepared.show_environment {
+            true => Some(Background {
+                pipeline: compile(&compiled::BACKGROUND, &[])?,
+                map: round.ask(&UploadBackground { device, environment })?,
+            }),
+            false => None,
+        };
         Ok(Self {
             view: view.clone(),
             geometry_cache,
-            classify: Arc::new(Classify::new(device, &cache, view.subpixels)?),
-            shade: Shade::new(device, &cache, method, sampling, view.subpixels, materials, light)?,
-            background: None,
-            tone_map: Arc::new(ToneMap::new(device, &cache)?),
+            classify: Classify { pipeline: compile(&compiled::CLASSIFY, &[subpixels])? },
+            shade: Shade { pipeline, materials, light, sampling },
+            background,
+            tone_map: ToneMap { pipeline: compile(&compiled::TONE_MAP, &[])? },
             device: device.clone(),
+            _held: round.held(),
         })
-    }
-
-    /// The same as this one, which was made for `before`, for `prepared`: what both have in common (see
-    /// [`crate::prepare::prepare_again`]) is neither uploaded nor compiled again, and passes of the same parts make the same.
-    ///
-    /// # Errors
-    /// No device memory left, or a limit of the device exceeded.
-    pub fn again(&self, cache_folder: Option<&Path>, before: &Prepared, prepared: &Prepared) -> Result<Self> {
-        let Prepared { method, sampling, environment, .. } = prepared;
-        let (device, cache) = (&self.device, PipelineCache::new(&self.device, cache_folder)?);
-        let mut renderer = self.clone();
-        renderer.view = prepared.view.clone();
-        let subpixels = renderer.view.subpixels;
-        check_size(device, &renderer.view)?;
-        let meshes =
-            |prepared: &Prepared| prepared.meshes.iter().map(|(_, mesh)| Arc::as_ptr(mesh)).collect::<Vec<_>>();
-        if meshes(before) != meshes(prepared) || before.objects != prepared.objects {
-            renderer.geometry_cache = Arc::new(upload_geometry(device, &cache, prepared)?);
-        }
-        let same_method = before.method == *method;
-        let same_environment = Arc::ptr_eq(&before.environment, environment);
-        let same_subpixels = self.view.subpixels == subpixels;
-        if !same_subpixels {
-            renderer.classify = Arc::new(Classify::new(device, &cache, subpixels)?);
-        }
-        let brdfs = |prepared: &Prepared| {
-            let of =
-                |material: &PreparedMaterial| (material.source.clone(), material.threads.as_ref().map(Arc::as_ptr));
-            prepared.materials.iter().map(of).collect::<Vec<_>>()
-        };
-        let same_use = method.evaluates_brdf(&before.environment) == method.evaluates_brdf(environment);
-        let same_materials = same_method && same_use && brdfs(before) == brdfs(prepared);
-        if !same_materials || !same_method || !same_environment || !same_subpixels {
-            let materials = match same_materials {
-                true => self.shade.materials.clone(),
-                false => upload_materials(device, *method, prepared)?,
-            };
-            let same_light = same_method && same_environment;
-            let light = match same_light && self.shade.light.serves(environment, &prepared.materials) {
-                true => self.shade.light.clone(),
-                false => upload_light(device, &cache, cache_folder, *method, prepared)?,
-            };
-            renderer.shade = Shade::new(device, &cache, *method, *sampling, subpixels, materials, light)?;
-        }
-        renderer.shade.sampling = *sampling;
-        if !prepared.show_environment {
-            renderer.background = None;
-        } else if renderer.background.is_none() || !same_environment {
-            renderer.background = Some(Arc::new(Background::new(device, &cache, environment)?));
-        }
-        Ok(renderer)
     }
 
     /// Starts the random numbers of later frames from `seed`: other noise, for methods that have any.
@@ -246,11 +197,15 @@ impl PassTime {
     }
 }
 
-/// Uploads the meshes of `prepared`, where the geometry cache of its view is within what `device` can do.
-fn upload_geometry(device: &Arc<Device>, cache: &PipelineCache, prepared: &Prepared) -> Result<GeometryCache> {
+/// The pass that draws the objects of `prepared`, where the geometry cache of its view is within what `device` can do.
+fn ask_geometry_cache(device: &Arc<Device>, prepared: &Prepared, round: &Round) -> Result<GeometryCache> {
     check_size(device, &prepared.view)?;
-    let meshes = prepared.meshes.iter().map(|(name, mesh)| DeviceMesh::new(device, name, mesh));
-    GeometryCache::new(device, cache, meshes.collect::<Result<_>>()?, prepared.objects.clone())
+    let upload = |(name, mesh): &(String, Keyed<Mesh>)| round.ask(&UploadMesh { device, name, mesh });
+    Ok(GeometryCache {
+        pipeline: round.ask(&CompileGeometryCache(device))?,
+        meshes: prepared.meshes.iter().map(upload).collect::<Result<_>>()?,
+        objects: prepared.objects.clone(),
+    })
 }
 
 /// An error for a view whose geometry cache is larger than images of `device` can be.
@@ -264,36 +219,12 @@ fn check_size(device: &Device, view: &View) -> Result<()> {
     Err(Error::input("image size", problem, "use a smaller --size or fewer --subpixels"))
 }
 
-/// Uploads what `method` looks up of the materials of `prepared`.
-fn upload_materials(device: &Arc<Device>, method: Method, prepared: &Prepared) -> Result<Arc<DeviceMaterials>> {
-    let brdfs = prepared.materials.iter().map(|material| (&material.brdf, material.threads.as_deref()));
-    let evaluates_brdf = method.evaluates_brdf(&prepared.environment);
-    Ok(Arc::new(DeviceMaterials::new(device, method, brdfs, evaluates_brdf)?))
-}
-
-/// Uploads what `method` looks up of the environment of `prepared`.
-fn upload_light(
-    device: &Arc<Device>,
-    cache: &PipelineCache,
-    cache_folder: Option<&Path>,
-    method: Method,
-    prepared: &Prepared,
-) -> Result<Arc<DeviceLight>> {
-    let Prepared { environment, materials, .. } = prepared;
-    Ok(Arc::new(DeviceLight::new(device, cache, cache_folder, method, environment, materials)?))
-}
-
 /// Only pass 1 of the paper: the texels of the geometry cache, as [`Rendering::geometry`] has them. Needs no threads.
 ///
 /// # Errors
 /// No device memory left, or a limit of the device exceeded.
-pub fn render_geometry(
-    device: &Arc<Device>,
-    cache_folder: Option<&Path>,
-    prepared: &Prepared,
-) -> Result<Vec<[u32; 2]>> {
-    let cache = PipelineCache::new(device, cache_folder)?;
-    let pass = upload_geometry(device, &cache, prepared)?;
+pub fn render_geometry(device: &Arc<Device>, prepared: &Prepared, round: &Round) -> Result<Vec<[u32; 2]>> {
+    let pass = ask_geometry_cache(device, prepared, round)?;
     let mut graph = FrameGraph::new();
     let geometry = geometry_cache(&mut graph, &pass, &prepared.view);
     let mut readbacks = Readbacks::new(device, graph);

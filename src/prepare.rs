@@ -1,15 +1,14 @@
 //! Loads everything that a scene names, and makes the threads of its materials: all that the GPU will need.
 use crate::brdf::Brdf;
 use crate::environment::Environment;
+use crate::memo::{Key, Keyed, Memo, Round, Step};
 use crate::method::Method;
 use crate::passes::{PlacedMesh, Sampling, View};
 use crate::scene::{Camera, MaterialSource, Mesh, Scene};
-use crate::threads::{self, CacheState, Observer, Threads};
+use crate::steps::{FitThreads, LoadEnvironment, LoadMaterial, LoadMesh};
+use crate::threads::{ThreadSettings, Threads};
 use crate::{Error, Result};
 use glam::{DAffine3, DVec3};
-use std::path::Path;
-use std::sync::Arc;
-use std::time::Duration;
 
 /// A scene with all its files read and its threads made. Cheap to clone.
 #[derive(Clone)]
@@ -25,18 +24,17 @@ pub struct Prepared {
     /// Whether the environment is seen behind the objects.
     pub show_environment: bool,
     /// The light.
-    pub environment: Arc<Environment>,
+    pub environment: Keyed<Environment>,
     /// Each mesh once, however many objects have it.
-    pub meshes: Vec<(String, Arc<Mesh>)>,
+    pub meshes: Vec<NamedMesh>,
     /// The objects.
     pub objects: Vec<PlacedMesh>,
     /// Name, BRDF and threads of each material that an object has.
     pub materials: Vec<PreparedMaterial>,
-    /// Time it took to make or load the threads.
-    pub thread_time: Duration,
-    /// Whether all threads came from the cache.
-    pub thread_cache: CacheState,
 }
+
+/// A mesh and its name in the scene.
+pub type NamedMesh = (String, Keyed<Mesh>);
 
 /// A material that some object has.
 #[derive(Clone)]
@@ -44,156 +42,110 @@ pub struct PreparedMaterial {
     /// Name in the scene.
     pub name: String,
     /// Its BRDF.
-    pub brdf: Brdf,
-    /// Where that comes from.
-    pub source: MaterialSource,
+    pub brdf: Keyed<Brdf>,
     /// Its threads, for methods that use them.
-    pub threads: Option<Arc<Threads>>,
+    pub threads: Option<Keyed<Threads>>,
 }
 
-/// Reads a material: a built-in's name, or a file.
+/// The threads that `method` shades `brdf` by; none for a method that draws samples instead.
 ///
 /// # Errors
-/// Neither, or a file that cannot be used.
-pub fn load_material(source: &MaterialSource) -> Result<Brdf> {
-    match source {
-        MaterialSource::File(path) => Brdf::load(path),
-        MaterialSource::Builtin(name) => Brdf::builtin(name).ok_or_else(|| {
-            let known: Vec<_> = Brdf::builtin_names().collect();
-            Error::input(
-                format!("material \"{name}\""),
-                "is neither built in nor a file",
-                format!("name a .binary or .toml file or one of: {}", known.join(", ")),
-            )
-        }),
-        MaterialSource::Model { model, parameters } => Brdf::from_parameters(model, parameters.clone()),
-    }
-}
-
-/// The threads that `method` shades `brdf` by, so many and from this seed, as [`threads::load_or_generate`] has them; none for a
-/// method that draws samples instead.
-///
-/// # Errors
-/// A number of threads that is out of range, or a cancelled generation.
-pub fn load_threads(
+/// A number of threads that is out of range; cancelled.
+pub fn ask_threads(
+    round: &Round,
     method: Method,
-    brdf: &Brdf,
-    [count, seed]: [u64; 2],
-    cache: Option<&Path>,
-    observer: &dyn Observer,
-) -> Result<Option<(Threads, CacheState, Duration)>> {
+    brdf: &Keyed<Brdf>,
+    sampling: Sampling,
+) -> Result<Option<Keyed<Threads>>> {
     let Some(kind) = method.threads() else { return Ok(None) };
-    let settings = threads::ThreadSettings { kind, count: count as usize, seed, ..Default::default() };
-    threads::load_or_generate(brdf, &settings, cache, observer).map(Some)
+    let Sampling { count, seed } = sampling;
+    let settings = ThreadSettings { kind, count: count as usize, seed, ..Default::default() };
+    round.ask(&FitThreads { brdf, settings }).map(Some)
 }
 
-/// Loads and makes everything; thread generation reports to `observer` and is cached in `cache` if that is a folder.
+/// Asks `round` for all that `scene` names, and for the threads of its materials.
 ///
 /// # Errors
-/// The first file or setting that cannot be used, or a cancelled generation.
-pub fn prepare(scene: &Scene, cache: Option<&Path>, observer: &dyn Observer) -> Result<Prepared> {
-    prepare_again(scene, None, cache, observer)
-}
-
-/// The same, taking from `before` what has not changed since: meshes, environment (with what was made of it) and materials of the
-/// same source, and threads of the same settings.
-///
-/// # Errors
-/// As for [`prepare`].
-pub fn prepare_again(
-    scene: &Scene,
-    before: Option<&Prepared>,
-    cache: Option<&Path>,
-    observer: &dyn Observer,
-) -> Result<Prepared> {
+/// The first file or setting that cannot be used; cancelled.
+pub fn prepare(scene: &Scene, round: &Round) -> Result<Prepared> {
     let method = Method::from_name(&scene.shading.method)?;
     let count = scene.shading.threads.unwrap_or(method.default_count());
     check_count(method, count, scene.image.subpixels)?;
     let sampling = Sampling { count, seed: scene.shading.seed };
-    let mut meshes: Vec<(String, Arc<Mesh>)> = Vec::new();
-    let mut objects = Vec::new();
-    let mut used_materials: Vec<&str> = Vec::new();
-    for object in &scene.objects {
-        let name = object.mesh.to_string();
-        let mesh = match meshes.iter().position(|(known, _)| *known == name) {
-            Some(known) => known,
-            None => {
-                let known = before.and_then(|before| before.meshes.iter().find(|(known, _)| *known == name));
-                let mesh = match known {
-                    Some((_, mesh)) => mesh.clone(),
-                    None => Arc::new(object.load_mesh()?),
-                };
-                cancelled(observer)?;
-                meshes.push((name, mesh));
-                meshes.len() - 1
-            }
-        };
-        let material = used_materials.iter().position(|known| *known == object.material).unwrap_or_else(|| {
-            used_materials.push(&object.material);
-            used_materials.len() - 1
-        });
-        objects.push(PlacedMesh {
-            mesh,
-            material: material as u32,
-            to_world: DAffine3::from_mat4(object.transform().as_dmat4()),
-        });
-    }
-    let environment = match before.filter(|before| before.scene.environment.source == scene.environment.source) {
-        Some(before) => before.environment.clone(),
-        None => Arc::new(scene.environment.load()?),
-    };
-    cancelled(observer)?;
-    let image = &scene.image;
+    let (meshes, objects) = place_meshes(scene, round)?;
+    let environment = round.ask(&LoadEnvironment(&scene.environment.source))?;
     for object in &objects {
         check_size(&meshes[object.mesh].0, world_sphere(&meshes, object))?;
     }
     let view = view_of(scene, bounding_sphere(&meshes, &objects))?;
-
     let mut materials = Vec::new();
-    let mut thread_time = Duration::ZERO;
-    let mut thread_cache = CacheState::Hit;
-    for name in used_materials {
+    for name in scene.used_materials() {
         // The scene has checked that every material an object names is there.
         let Some(settings) = scene.materials.iter().find(|material| material.name == name) else { continue };
-        let known = before.and_then(|before| before.material(&settings.source));
-        let brdf = match known {
-            Some(known) => known.brdf.clone(),
-            None => load_material(&settings.source).map_err(|error| match settings.source {
-                MaterialSource::Model { .. } => error.within(format!("material \"{name}\"")),
-                _ => error,
-            })?,
-        };
-        cancelled(observer)?;
-        let source = settings.source.clone();
-        let mut material = PreparedMaterial { name: name.to_owned(), brdf, source, threads: None };
-        let same_threads =
-            |before: &&Prepared| (before.method.threads(), before.sampling) == (method.threads(), sampling);
-        if let Some(known) = before.filter(same_threads).and(known) {
-            material.threads.clone_from(&known.threads);
-        } else if let Some((threads, state, time)) =
-            load_threads(method, &material.brdf, [count.into(), sampling.seed], cache, observer)?
-        {
-            thread_time += time;
-            if state == CacheState::Miss {
-                thread_cache = CacheState::Miss;
-            }
-            material.threads = Some(Arc::new(threads.of_material(name)));
-        }
-        materials.push(material);
+        let brdf = round.ask(&LoadMaterial(&settings.source)).map_err(|error| match settings.source {
+            MaterialSource::Model { .. } => error.within(format!("material \"{name}\"")),
+            _ => error,
+        })?;
+        let threads = ask_threads(round, method, &brdf, sampling)?;
+        materials.push(PreparedMaterial { name: name.to_owned(), brdf, threads });
     }
     Ok(Prepared {
         scene: scene.clone(),
         method,
         sampling,
         view,
-        show_environment: image.background == crate::scene::Background::Environment,
+        show_environment: scene.image.background == crate::scene::Background::Environment,
         environment,
         meshes,
         objects,
         materials,
-        thread_time,
-        thread_cache,
     })
+}
+
+/// The key of all that a renderer of `scene` is made of: of all but what a frame is given anew each time, such as the camera.
+///
+/// # Errors
+/// A file that cannot be read, a model or method that there is not.
+pub fn key_of(scene: &Scene, memo: &Memo) -> Result<Key> {
+    let method = Method::from_name(&scene.shading.method)?;
+    let count = scene.shading.threads.unwrap_or(method.default_count());
+    let image = &scene.image;
+    let shows_environment = image.background == crate::scene::Background::Environment;
+    let mut key = Key::builder(method.name()).number(count).number(scene.shading.seed);
+    key = key.number(image.subpixels).number(u64::from(shows_environment));
+    key = key.key(LoadEnvironment(&scene.environment.source).key(memo)?);
+    let used_materials = scene.used_materials();
+    for object in &scene.objects {
+        let material = used_materials.iter().position(|known| *known == object.material).unwrap_or_default();
+        key = key.key(LoadMesh(&object.mesh).key(memo)?).number(material as u64);
+        key = key.bytes(bytemuck::bytes_of(&object.transform()));
+    }
+    for name in used_materials {
+        let Some(material) = scene.materials.iter().find(|material| material.name == name) else { continue };
+        key = key.key(LoadMaterial(&material.source).key(memo)?);
+    }
+    Ok(key.build())
+}
+
+/// The meshes of `scene`, each once, with their names; and its objects.
+fn place_meshes(scene: &Scene, round: &Round) -> Result<(Vec<NamedMesh>, Vec<PlacedMesh>)> {
+    let mut meshes: Vec<NamedMesh> = Vec::new();
+    let used_materials = scene.used_materials();
+    let mut objects = Vec::new();
+    for object in &scene.objects {
+        let mesh = round.ask(&LoadMesh(&object.mesh))?;
+        let index = meshes.iter().position(|(_, known)| known.key == mesh.key).unwrap_or_else(|| {
+            meshes.push((object.mesh.to_string(), mesh));
+            meshes.len() - 1
+        });
+        let material = used_materials.iter().position(|known| *known == object.material);
+        objects.push(PlacedMesh {
+            mesh: index,
+            material: material.expect("used materials are those of objects") as u32,
+            to_world: DAffine3::from_mat4(object.transform().as_dmat4()),
+        });
+    }
+    Ok((meshes, objects))
 }
 
 /// The view of `scene`, whose objects are within a sphere of this centre and radius.
@@ -231,15 +183,10 @@ impl Prepared {
         bounding_sphere(&self.meshes, &self.objects)
     }
 
-    /// The material that comes from `source`, if there is one.
-    fn material(&self, source: &MaterialSource) -> Option<&PreparedMaterial> {
-        self.materials.iter().find(|material| material.source == *source)
+    /// BRDF and threads of each material.
+    pub fn shaded(&self) -> Vec<(&Brdf, Option<&Threads>)> {
+        self.materials.iter().map(|material| (&*material.brdf, material.threads.as_deref())).collect()
     }
-}
-
-/// [`Error::Cancelled`] if `observer` has had enough.
-fn cancelled(observer: &dyn Observer) -> Result<()> {
-    if observer.cancelled() { Err(Error::Cancelled) } else { Ok(()) }
 }
 
 /// An error for more threads than a table holds, or more samples than shaders may loop over.
@@ -262,7 +209,7 @@ pub(crate) fn check_count(method: Method, count: u32, subpixels: u32) -> Result<
 }
 
 /// Centre and radius of a sphere in world space that holds `object`.
-fn world_sphere(meshes: &[(String, Arc<Mesh>)], object: &PlacedMesh) -> (DVec3, f64) {
+fn world_sphere(meshes: &[NamedMesh], object: &PlacedMesh) -> (DVec3, f64) {
     let (center, radius) = meshes[object.mesh].1.bounding_sphere();
     let m = object.to_world.matrix3;
     let scale = m.x_axis.length().max(m.y_axis.length()).max(m.z_axis.length());
@@ -284,7 +231,7 @@ fn check_size(mesh: &str, (center, radius): (DVec3, f64)) -> Result<()> {
 }
 
 /// A sphere around the bounding spheres of all objects: centre of their box, and the radius that reaches the farthest.
-fn bounding_sphere(meshes: &[(String, Arc<Mesh>)], objects: &[PlacedMesh]) -> (DVec3, f64) {
+fn bounding_sphere(meshes: &[NamedMesh], objects: &[PlacedMesh]) -> (DVec3, f64) {
     let spheres: Vec<_> = objects.iter().map(|object| world_sphere(meshes, object)).collect();
     let low = spheres.iter().fold(DVec3::INFINITY, |low, (center, radius)| low.min(*center - *radius));
     let high = spheres.iter().fold(DVec3::NEG_INFINITY, |high, (center, radius)| high.max(*center + *radius));

@@ -6,15 +6,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 use threadlight::brdf::Brdf;
-use threadlight::environment::Environment;
 use threadlight::evaluate::reference::{ReferenceSettings, STAGES, progressive, reference};
-use threadlight::method::Method;
-use threadlight::passes::filter_environment;
 use threadlight::pipeline::render_geometry;
 use threadlight::prepare::Prepared;
+use threadlight::progress::Observer;
 use threadlight::scene::{MaterialSource, Scene, Source};
-use threadlight::threads::{Observer, ThreadKind, ThreadSettings, generate};
-use threadlight::vulkan::PipelineCache;
+use threadlight::steps::{LoadEnvironment, blurred_light};
+use threadlight::threads::{ThreadKind, ThreadSettings, generate};
 use threadlight::{Error, Result};
 
 /// Longest time from the word to the end. It is a tenth of a second where the processor has nothing else to do, as the times printed say;
@@ -82,7 +80,7 @@ fn the_reference_stops_at_once_and_comes_in_stages() {
     let prepared = hard_scene();
     for after in [100, 1000, 3000].map(Duration::from_millis) {
         let settings = ReferenceSettings { tolerance: 1e-6, ..ReferenceSettings::default() };
-        let time = time_to_stop(after, |flag| reference(&prepared, &gpu.device, &settings, flag));
+        let time = time_to_stop(after, |flag| reference(&prepared, &gpu.device, &settings, &gpu.memo.round(flag)));
         println!("reference, cancelled after {after:?}: {time:?}");
         assert!(time < SOON, "cancelled after {after:?}: {time:?}");
     }
@@ -90,8 +88,8 @@ fn the_reference_stops_at_once_and_comes_in_stages() {
     let mut small = sphere(MaterialSource::Builtin("gold".into()), "studio", 1, (48, 36));
     small.shading.method = "reference".into();
     let prepared = ready(&small);
-    let geometry = render_geometry(&gpu.device, None, &prepared).unwrap();
-    let truth = reference(&prepared, &gpu.device, &ReferenceSettings::default(), &()).unwrap();
+    let geometry = render_geometry(&gpu.device, &prepared, &gpu.round()).unwrap();
+    let truth = reference(&prepared, &gpu.device, &ReferenceSettings::default(), &gpu.round()).unwrap();
     let mut estimates = Vec::new();
     progressive(&prepared, &geometry, STAGES, &(), &mut |estimate| estimates.push(estimate)).unwrap();
     assert_eq!(estimates.len(), STAGES.len());
@@ -119,26 +117,16 @@ fn an_environment_stops_being_blurred_at_once() {
     let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
     let gpu = Validated::new();
     let map = data().map(|data| data.join("env/studio_small_03_1k.hdr")).filter(|map| map.exists());
-    let load = || match &map {
-        Some(map) => Environment::load(map).unwrap(),
-        None => Environment::builtin("studio").unwrap(),
-    };
-    let cache = PipelineCache::new(&gpu.device, None).unwrap();
+    let source = map.map_or(Source::Builtin("studio".into()), Source::File);
     let start = Instant::now();
-    let environment = load();
+    let environment = gpu.round().ask(&LoadEnvironment(&source)).unwrap();
     println!("loaded in {:?}", start.elapsed());
-    environment.box_filtered();
-    println!("box-filtered after {:?}", start.elapsed());
-    environment.irradiance();
-    println!("irradiance after {:?}", start.elapsed());
     for after in [20, 200, 1000].map(Duration::from_millis) {
-        let environment = load();
-        let blur = |flag: &Flag| filter_environment(&gpu.device, &cache, None, Method::Fitted, &environment, flag);
+        let blur = |flag: &Flag| blurred_light(&gpu.memo.round(flag), Some(&gpu.device), &environment, &[]);
         let time = time_to_stop(after, blur);
         println!("blur, cancelled after {after:?}: {time:?}");
         assert!(time < SOON, "cancelled after {after:?}: {time:?}");
     }
-    drop(cache);
     gpu.finish();
 }
 
@@ -149,7 +137,7 @@ fn the_first_stages_of_a_large_reference_come_soon() {
     let mut scene = sphere(MaterialSource::Builtin("gold".into()), "studio", 1, (640, 480));
     scene.shading.method = "reference".into();
     let prepared = ready(&scene);
-    let geometry = render_geometry(&gpu.device, None, &prepared).unwrap();
+    let geometry = render_geometry(&gpu.device, &prepared, &gpu.round()).unwrap();
     let start = Instant::now();
     progressive(&prepared, &geometry, &STAGES[..2], &(), &mut |estimate| {
         println!("{:?} after {:?}: within {:.1e}", estimate.stage, start.elapsed(), estimate.error_estimate);

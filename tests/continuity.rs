@@ -4,7 +4,7 @@ mod common;
 use common::{Validated, analytic_materials, ready, sphere};
 use threadlight::evaluate::reference::{ReferenceSettings, reference};
 use threadlight::method::Method;
-use threadlight::pipeline::{Renderer, Wanted};
+use threadlight::pipeline::Wanted;
 use threadlight::shading::display_value;
 
 /// What the camera turns by from frame to frame, and the places around the sphere at which it does.
@@ -25,7 +25,6 @@ fn largest_change(before: &[f32], after: &[f32]) -> f32 {
 fn frames_half_a_degree_apart_change_as_the_reference_does() {
     let gpu = Validated::new();
     // Blurred environments are kept here.
-    let cache = tempfile::tempdir().unwrap();
     for (name, material) in analytic_materials().into_iter().filter(|(name, _)| *name != "conductor 0.5") {
         for environment in ["studio", "sun"] {
             let mut scene = sphere(material.clone(), environment, 8, (40, 30));
@@ -38,11 +37,10 @@ fn frames_half_a_degree_apart_change_as_the_reference_does() {
                     // What a sphere shows to a camera that is turned around it.
                     prepared.view.rotation_deg = degrees;
                     let wanted = Wanted { radiance: true, ..Wanted::default() };
-                    let found =
-                        Renderer::new(&gpu.device, Some(cache.path()), &prepared).unwrap().render(wanted, 1).unwrap();
+                    let found = gpu.renderer(&prepared).render(wanted, 1).unwrap();
                     let settings = ReferenceSettings { tolerance: 5e-4, ..ReferenceSettings::default() };
                     prepared.method = Method::Reference;
-                    let truth = reference(&prepared, &gpu.device, &settings, &()).unwrap();
+                    let truth = reference(&prepared, &gpu.device, &settings, &gpu.round()).unwrap();
                     prepared.method = Method::Fitted;
                     (shown(&found.radiance), shown(&truth.radiance))
                 });

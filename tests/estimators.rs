@@ -8,6 +8,7 @@ use threadlight::brdf::luminance;
 use threadlight::environment::Environment;
 use threadlight::evaluate::Display;
 use threadlight::evaluate::reference::Integrator;
+use threadlight::memo::Memo;
 use threadlight::method::Method;
 use threadlight::output::write_exr;
 use threadlight::pipeline::{Renderer, Rendering, Wanted};
@@ -33,7 +34,7 @@ fn unbiased() -> impl Iterator<Item = Method> {
 
 /// A renderer whose compiled shaders are kept between tests and runs.
 fn renderer(gpu: &Validated, prepared: &Prepared) -> Renderer {
-    Renderer::new(&gpu.device, Some(Path::new(env!("CARGO_TARGET_TMPDIR"))), prepared).unwrap()
+    gpu.renderer(prepared)
 }
 
 fn render(gpu: &Validated, prepared: &Prepared) -> Rendering {
@@ -85,7 +86,7 @@ fn every_estimator_agrees_with_its_cpu_twin() {
         scene.shading.seed = 1 << 40 | 5;
         let prepared = ready(&scene);
         let rendering = render(&gpu, &prepared);
-        let twin = CpuShader::new(&prepared).unwrap();
+        let twin = CpuShader::new(&prepared, &Memo::default().round(&())).unwrap();
         let mut differences = Vec::new();
         for pixel in pixels(&prepared) {
             let expected = twin.shade(pixel, &texels_of(&prepared, &rendering, pixel));
@@ -107,7 +108,7 @@ fn every_estimator_agrees_with_its_cpu_twin() {
 
 /// Equation (1) in the pixels that see a surface, with their indices.
 fn reference(prepared: &Prepared, geometry: &[[u32; 2]]) -> Vec<(usize, DVec3)> {
-    let brdfs = prepared.materials.iter().map(|material| &material.brdf);
+    let brdfs = prepared.materials.iter().map(|material| &*material.brdf);
     let integrator = Integrator::new(&prepared.environment, prepared.view.intensity, brdfs, prepared.view.subpixels);
     let width = prepared.view.width as usize;
     let pixel = |index: usize| {

@@ -31,8 +31,8 @@ const RADIANCE: Wanted = Wanted { radiance: true, display: false, geometry: fals
 fn what_is_expected_is_within_a_factor_of_two_of_what_is_measured() {
     let (gpu, folder) = (Validated::new(), TempDir::new().unwrap());
     let mut scene = glossy(&folder);
-    let truth = reference(&ready(&scene), &gpu.device, &ReferenceSettings::default(), &()).unwrap();
-    let sample = TrueSample::new(&ready(&scene), &gpu.device, None, &()).unwrap();
+    let truth = reference(&ready(&scene), &gpu.device, &ReferenceSettings::default(), &gpu.round()).unwrap();
+    let sample = TrueSample::new(&ready(&scene), &gpu.device, &gpu.round()).unwrap();
     for (method, threads) in [("fitted", 1), ("fitted", 6), ("paper", 8), ("importance", 16)] {
         (scene.shading.method, scene.shading.threads) = (method.to_owned(), Some(threads));
         let rendering = gpu.render(&ready(&scene), RADIANCE);
@@ -54,12 +54,12 @@ fn the_fewest_threads_that_are_within_an_error_are_chosen() {
         scene.shading.threads = Some(threads);
         let prepared = ready(&scene);
         let rendering = gpu.render(&prepared, RADIANCE);
-        TrueSample::new(&prepared, &gpu.device, None, &()).unwrap().expected_rms(&rendering.radiance)
+        TrueSample::new(&prepared, &gpu.device, &gpu.round()).unwrap().expected_rms(&rendering.radiance)
     };
     let errors = [1, 2, 3].map(expected_of);
     let most = 1.01 * errors[2];
     let (count, error) = [1, 2, 3].into_iter().zip(errors).find(|(_, error)| *error <= most).unwrap();
-    let (prepared, expected) = prepare_within(&scene, most, &gpu.device, None, &()).unwrap();
+    let (prepared, expected) = prepare_within(&scene, most, &gpu.device, &gpu.round()).unwrap();
     let threads = prepared.materials[0].threads.as_ref().unwrap();
     assert_eq!((prepared.sampling.count, threads.size()[1]), (count, count as usize), "{errors:?}");
     assert!((expected - error).abs() < 1e-9, "{expected}, not {error}");
@@ -71,7 +71,7 @@ fn an_error_that_no_number_of_threads_reaches_is_refused_with_the_one_that_is() 
     let (gpu, folder) = (Validated::new(), TempDir::new().unwrap());
     let mut scene = glossy(&folder);
     scene.shading.method = "cosine".to_owned();
-    let error = prepare_within(&scene, 1e-6, &gpu.device, None, &()).err().unwrap().to_string();
+    let error = prepare_within(&scene, 1e-6, &gpu.device, &gpu.round()).err().unwrap().to_string();
     assert!(error.contains("--error") && error.contains("1024") && error.contains("cosine"), "{error}");
     gpu.finish();
 }

@@ -78,7 +78,7 @@ fn the_reference_agrees_with_mitsuba() {
         scene.shading.method = "reference".to_owned();
         let prepared = ready(&scene);
         let Prepared { view, environment, materials, .. } = &prepared;
-        let geometry = render_geometry(&gpu.device, None, &prepared).expect("a geometry cache");
+        let geometry = render_geometry(&gpu.device, &prepared, &gpu.round()).expect("a geometry cache");
         let covered = |x: usize, y: usize| geometry[y * 640 + x][1] != 0;
         let inside = |x: usize, y: usize| (y - 2..=y + 2).all(|v| (x - 2..=x + 2).all(|u| covered(u, v)));
         // One pixel of 41 x 41, all over the sphere.
@@ -136,7 +136,7 @@ fn the_reference_on_the_gpu_converges_on_that_of_the_cpu() {
         let prepared = ready(&scene);
         let picture = |processor, tolerance| {
             let settings = ReferenceSettings { tolerance, processor, cache: None };
-            reference(&prepared, &gpu.device, &settings, &()).expect("a reference")
+            reference(&prepared, &gpu.device, &settings, &gpu.round()).expect("a reference")
         };
         let truth = picture(Processor::Cpu, 5e-5);
         for tolerance in [1e-2, 1e-3] {

@@ -3,6 +3,7 @@ mod common;
 
 use common::{EVERYTHING, Validated, analytic_materials, model, pixels, ready, sphere, texels_of};
 use glam::{UVec2, Vec3, Vec4};
+use threadlight::memo::Memo;
 use threadlight::scene::{Scene, Source};
 use threadlight::shading;
 
@@ -52,7 +53,7 @@ fn the_shader_agrees_with_its_cpu_twin() {
             scene.environment.intensity = 1.7;
             let prepared = ready(&scene);
             let rendering = gpu.render(&prepared, EVERYTHING);
-            let twin = shading::CpuShader::new(&prepared).unwrap();
+            let twin = shading::CpuShader::new(&prepared, &Memo::default().round(&())).unwrap();
             let (mut interior, mut edge, mut covered) = (0, 0, 0);
             for pixel in pixels(&prepared) {
                 let texels = texels_of(&prepared, &rendering, pixel);

@@ -3,6 +3,7 @@ mod common;
 
 use common::{Validated, analytic_materials, ready, sphere};
 use threadlight::Error;
+use threadlight::environment::Pyramid;
 use threadlight::evaluate::Cases;
 use threadlight::evaluate::speed::{self, Growth, Speed, Timings};
 use threadlight::method::Method;
@@ -23,7 +24,6 @@ fn speed() -> Speed {
         environments: vec![("white".into(), Source::Builtin("white".into()))],
         scenes: vec![("sphere".into(), scene)],
         seed: 0,
-        cache: None,
     };
     Speed { cases, threads: 4, repeat: 1 }
 }
@@ -33,9 +33,10 @@ fn bare_lookups_see_the_environment_as_often_as_asked_for() {
     let gpu = Validated::new();
     let (_, material) = analytic_materials().remove(0);
     let environment = ready(&sphere(material, "white", 1, (8, 8))).environment;
+    let pyramid = Pyramid::box_filtered(&environment);
     let cache = PipelineCache::new(&gpu.device, None).unwrap();
     for (pixels, lookups) in [(1, 1), (1000, 16), (70_000, 3)] {
-        let bare = BareLookups::new(&gpu.device, &cache, &environment, pixels, lookups).unwrap();
+        let bare = BareLookups::new(&gpu.device, &cache, &pyramid, pixels, lookups).unwrap();
         let (gpu_ms, sums) = time_bare_lookups(&gpu.device, &bare).unwrap();
         assert!(gpu_ms > 0.0);
         assert_eq!(sums.len(), pixels as usize);
@@ -53,7 +54,7 @@ fn bare_lookups_see_the_environment_as_often_as_asked_for() {
 fn every_method_is_timed_at_every_count_and_in_every_series() {
     let gpu = Validated::new();
     let mut timings = Timings::default();
-    speed::run(&speed(), &gpu.device, &(), &mut timings).unwrap();
+    speed::run(&speed(), &gpu.device, &gpu.memo, &(), &mut timings).unwrap();
 
     let frames: Vec<_> = timings.frames.iter().map(|frame| (&*frame.method, frame.threads)).collect();
     assert_eq!(frames, [("paper", 2), ("paper", 4), ("uniform", 2), ("uniform", 4)]);
@@ -96,7 +97,7 @@ fn a_scene_without_a_surface_is_refused() {
     let mut speed = speed();
     let camera = Camera::framing(glam::DVec3::new(0.0, 100.0, 0.0), 1.0, 4.0 / 3.0);
     speed.cases.scenes[0].1.camera = Some(camera);
-    let error = speed::run(&speed, &gpu.device, &(), &mut Timings::default()).unwrap_err();
+    let error = speed::run(&speed, &gpu.device, &gpu.memo, &(), &mut Timings::default()).unwrap_err();
     assert!(matches!(error, Error::Input { .. }) && error.to_string().contains("sphere: shows no surface"), "{error}");
     gpu.finish();
 }

@@ -6,12 +6,15 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use tempfile::TempDir;
 use threadlight::evaluate::sweep::{self, Measured};
 use threadlight::evaluate::{Cases, ReferencePicture, Sweep, gallery};
+use threadlight::memo::Round;
 use threadlight::method::Method;
 use threadlight::output::{ExrHeader, write_exr};
 use threadlight::pipeline::Wanted;
 use threadlight::prepare::Prepared;
+use threadlight::progress::Observer;
 use threadlight::scene::{MaterialSource, Scene, Source};
-use threadlight::threads::{Observer, ThreadKind, ThreadSettings, load_or_generate};
+use threadlight::steps::FitThreads;
+use threadlight::threads::{ThreadKind, ThreadSettings};
 use threadlight::{Error, Result};
 
 fn grey() -> MaterialSource {
@@ -35,7 +38,6 @@ fn sweep(folder: &TempDir) -> Sweep {
         environments: vec![("white".into(), Source::Builtin("white".into())), ("map".into(), Source::File(map))],
         scenes: vec![("sphere".into(), scene)],
         seed: 0,
-        cache: None,
     };
     Sweep { cases, repeat: 1, whole_picture: false, expected: false, keep_pictures: false }
 }
@@ -45,11 +47,11 @@ fn sixteen_threads(gpu: &Validated, prepared: &Prepared) -> Result<ReferencePict
     // What is asked for has the material and the environment, but threads of any number.
     let settings = ThreadSettings { kind: ThreadKind::Paper, count: 16, ..ThreadSettings::default() };
     let material = &prepared.materials[0];
-    let (threads, ..) = load_or_generate(&material.brdf, &settings, None, &())?;
+    let threads = gpu.round().ask(&FitThreads { brdf: &material.brdf, settings })?;
     let mut own = ready(&sphere(grey(), "white", 1, (1, 1)));
     (own.view, own.environment, own.show_environment) = (prepared.view.clone(), prepared.environment.clone(), false);
     own.materials[0].brdf = material.brdf.clone();
-    own.materials[0].threads = Some(threads.into());
+    own.materials[0].threads = Some(threads);
     own.sampling.count = 16;
     own.method = Method::Paper;
     let rendering = gpu.render(&own, Wanted { radiance: true, ..Wanted::default() });
@@ -61,12 +63,12 @@ fn every_combination_is_measured_once_against_the_reference_of_its_place() {
     let gpu = Validated::new();
     let folder = tempfile::tempdir().unwrap();
     let asked = AtomicUsize::new(0);
-    let reference = |prepared: &Prepared| {
+    let reference = |prepared: &Prepared, _: &Round| {
         asked.fetch_add(1, Ordering::Relaxed);
         sixteen_threads(&gpu, prepared)
     };
     let mut measured = Measured::default();
-    sweep::run(&sweep(&folder), &gpu.device, &reference, &(), &mut measured).unwrap();
+    sweep::run(&sweep(&folder), &gpu.device, &gpu.memo, &reference, &(), &mut measured).unwrap();
     assert_eq!(asked.into_inner(), 4);
     assert_eq!(measured.reference_error, 1e-4);
 
@@ -101,8 +103,8 @@ fn background_pixels_thin_the_error_out() {
         sweep.cases.counts = vec![4];
         sweep.cases.environments.remove(0);
         let mut measured = Measured::default();
-        let reference = |prepared: &Prepared| sixteen_threads(&gpu, prepared);
-        sweep::run(&sweep, &gpu.device, &reference, &(), &mut measured).unwrap();
+        let reference = |prepared: &Prepared, _: &Round| sixteen_threads(&gpu, prepared);
+        sweep::run(&sweep, &gpu.device, &gpu.memo, &reference, &(), &mut measured).unwrap();
         measured.rows[0].rms
     };
     let (surface, whole) = (rms(false), rms(true));
@@ -118,7 +120,8 @@ fn methods_with_and_without_threads_are_measured_side_by_side_and_shown() {
     sweep.cases.methods = vec![Method::Paper, Method::Importance, Method::Paper];
     sweep.cases.materials.truncate(1);
     let mut measured = Measured::default();
-    sweep::run(&sweep, &gpu.device, &|prepared| sixteen_threads(&gpu, prepared), &(), &mut measured).unwrap();
+    sweep::run(&sweep, &gpu.device, &gpu.memo, &|prepared, _| sixteen_threads(&gpu, prepared), &(), &mut measured)
+        .unwrap();
     let [paper, importance, again] = [0, 1, 2].map(|method| measured.rows[2 * method + 1].clone());
     assert_eq!((&*paper.method, &*importance.method), ("paper", "importance"));
     assert!(paper.rms == 0.0 && again.rms == 0.0 && importance.rms > 0.0, "{paper:?} {importance:?} {again:?}");
@@ -145,9 +148,10 @@ fn measurements_made_before_an_error_or_an_interruption_are_kept() {
     let gpu = Validated::new();
     let folder = tempfile::tempdir().unwrap();
     let mut measured = Measured::default();
-    let reference = |prepared: &Prepared| sixteen_threads(&gpu, prepared);
+    let reference = |prepared: &Prepared, _: &Round| sixteen_threads(&gpu, prepared);
     let error =
-        sweep::run(&sweep(&folder), &gpu.device, &reference, &After(AtomicUsize::new(0)), &mut measured).unwrap_err();
+        sweep::run(&sweep(&folder), &gpu.device, &gpu.memo, &reference, &After(AtomicUsize::new(0)), &mut measured)
+            .unwrap_err();
     assert!(matches!(error, Error::Cancelled), "{error}");
     assert_eq!(measured.rows.len(), 3);
     gpu.finish();

@@ -13,7 +13,7 @@ fn a_picture_is_compared_with_another_method_with_itself_and_with_the_reference(
     let prepared = ready(&scene);
     let compared = |other: Other| {
         let mut all: Vec<Compared> = Vec::new();
-        compare_with(&prepared, &other, &gpu.device, None, &(), &mut |compared| all.push(compared)).unwrap();
+        compare_with(&prepared, &other, &gpu.device, &gpu.memo, &(), &mut |compared| all.push(compared)).unwrap();
         all
     };
 

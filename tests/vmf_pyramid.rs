@@ -4,7 +4,7 @@ mod common;
 use common::Validated;
 use glam::{DVec3, Vec3};
 use std::f64::consts::TAU;
-use threadlight::environment::{Environment, VmfPyramid};
+use threadlight::environment::{Environment, Pyramid, VmfPyramid};
 use threadlight::passes::vmf_pyramid;
 use threadlight::vulkan::PipelineCache;
 
@@ -29,8 +29,8 @@ fn the_device_makes_the_same_maps_as_the_cpu() {
     let gpu = Validated::new();
     let environment = environment();
     let cache = PipelineCache::new(&gpu.device, None).unwrap();
-    let found = vmf_pyramid(&gpu.device, &cache, environment.box_filtered(), &()).unwrap();
-    let expected = VmfPyramid::new(environment.box_filtered());
+    let found = vmf_pyramid(&gpu.device, &cache, &Pyramid::box_filtered(&environment), &()).unwrap();
+    let expected = VmfPyramid::new(&Pyramid::box_filtered(&environment));
     assert_eq!(found.levels.levels.len(), expected.levels.levels.len());
     for (map, (found, expected)) in found.levels.levels.iter().zip(&expected.levels.levels).enumerate() {
         assert_eq!(found.len(), expected.len());
@@ -49,7 +49,7 @@ fn the_device_makes_the_same_maps_as_the_cpu() {
 #[test]
 fn the_mean_over_the_sphere_stays_that_of_the_environment() {
     let environment = environment();
-    let pyramid = VmfPyramid::new(environment.box_filtered());
+    let pyramid = VmfPyramid::new(&Pyramid::box_filtered(&environment));
     let mean = |lookup: &dyn Fn(Vec3) -> Vec3| {
         let count = 100_000;
         let direction = |i: i32| {

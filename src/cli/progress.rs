@@ -2,7 +2,7 @@
 use indicatif::{ProgressBar, ProgressStyle};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use threadlight::threads::Observer;
+use threadlight::progress::Observer;
 
 /// A bar on a terminal (nothing elsewhere); Ctrl-C cancels what it shows.
 pub struct TerminalProgress {
@@ -11,9 +11,9 @@ pub struct TerminalProgress {
 }
 
 impl TerminalProgress {
-    /// A bar called `name` that counts rows, hidden until something happens.
+    /// A bar called `name` that counts parts, hidden until something happens.
     pub fn new(name: &'static str) -> anyhow::Result<Self> {
-        Self::of(name, "rows")
+        Self::of(name, "parts")
     }
 
     /// A bar called `name` that counts `units`, hidden until something happens. Only one bar can be made.
@@ -32,13 +32,6 @@ impl TerminalProgress {
         Ok(Self { bar, cancelled })
     }
 
-    /// The same bar for something else, from its start.
-    pub fn restart(&self, name: &'static str) {
-        self.bar.reset();
-        self.bar.unset_length();
-        self.bar.set_prefix(name);
-    }
-
     /// Takes the bar off the terminal.
     pub fn finish(&self) {
         self.bar.finish_and_clear();
@@ -46,6 +39,12 @@ impl TerminalProgress {
 }
 
 impl Observer for TerminalProgress {
+    fn begin(&self, what: &str) {
+        self.bar.reset();
+        self.bar.unset_length();
+        self.bar.set_prefix(what.to_owned());
+    }
+
     fn progress(&self, done: usize, total: usize) {
         self.bar.set_length(total as u64);
         self.bar.set_position(done as u64);

@@ -10,12 +10,13 @@ use std::path::PathBuf;
 use threadlight::Error;
 use threadlight::evaluate::expected::prepare_within;
 use threadlight::evaluate::reference::{self, Processor, ReferenceImage, ReferenceSettings};
+use threadlight::memo::{Asked, Memo, Origin, Step};
 use threadlight::method::Method;
 use threadlight::output::{self, Format};
 use threadlight::pipeline::{Renderer, Rendering, Wanted};
 use threadlight::prepare::{Prepared, prepare};
 use threadlight::scene::Background;
-use threadlight::threads::CacheState;
+use threadlight::steps::FitThreads;
 use threadlight::vulkan::{Device, Instance};
 
 const EXAMPLES: &str = "\
@@ -123,7 +124,7 @@ impl Render {
             output::check_writable(path)?;
         }
         let scene = self.scene.scene()?;
-        let cache = self.machine.cache();
+        let memo = Memo::new(self.machine.cache().as_deref());
         let is_reference = scene.shading.method == Method::Reference.name();
         let useless = [
             ("--tolerance", self.tolerance.is_some() && !is_reference),
@@ -142,23 +143,22 @@ impl Render {
         let device_name = device.description().name.clone();
 
         let progress = TerminalProgress::new("threads")?;
+        let round = memo.round(&progress);
         let (prepared, expected_rms) = match self.error {
             Some(most) => {
-                let (prepared, rms) = prepare_within(&scene, most, &device, cache.as_deref(), &progress)?;
+                let (prepared, rms) = prepare_within(&scene, most, &device, &round)?;
                 (prepared, Some(rms))
             }
-            None => (prepare(&scene, cache.as_deref(), &progress)?, None),
+            None => (prepare(&scene, &round)?, None),
         };
-        progress.finish();
         if let Some(rms) = expected_rms {
             eprintln!("{} threads or samples: expected RMS {rms:.1e}", prepared.sampling.count);
         }
         let (rendering, reference) = if prepared.method == Method::Reference {
-            progress.restart("reference");
             let processor = self.reference_on.unwrap_or_default();
             let tolerance = self.tolerance.unwrap_or(processor.default_tolerance());
-            let settings = ReferenceSettings { tolerance, processor, cache: cache.clone() };
-            let image = reference::reference(&prepared, &device, &settings, &progress)?;
+            let settings = ReferenceSettings { tolerance, processor };
+            let image = reference::reference(&prepared, &device, &settings, &round)?;
             progress.finish();
             let reference = ReferenceStats {
                 tolerance,
@@ -168,13 +168,17 @@ impl Render {
             };
             (rendering_of(&image, &prepared, device.allocated_bytes()), Some(reference))
         } else {
-            let renderer = Renderer::new(&device, cache.as_deref(), &prepared)?;
+            let renderer = Renderer::new(&device, &prepared, &round)?;
+            progress.finish();
             let radiance = format == Some(Format::Exr);
             let wanted = Wanted { radiance, display: !radiance, ..Wanted::default() };
             // Closing the renderer and the device is part of what validation checks.
             (renderer.render(wanted, self.repeat)?, None)
         };
-        drop(device);
+        // Those of the last attempt, where there were several.
+        let threads = round.asked(FitThreads::NAME);
+        let threads = threads[threads.len().saturating_sub(prepared.materials.len())..].to_vec();
+        drop((round, device));
 
         if self.print_plan {
             write!(std::io::stdout(), "{}", rendering.plan)?;
@@ -198,7 +202,11 @@ impl Render {
         }
         let messages = messages.all();
         if let Some(path) = &self.stats {
-            let stats = Stats { reference, expected_rms, ..stats(&prepared, &rendering, &device_name, messages.len()) };
+            let stats = Stats {
+                reference,
+                expected_rms,
+                ..stats(&prepared, &rendering, &threads, &device_name, messages.len())
+            };
             let text = serde_json::to_string_pretty(&stats).context("--stats")? + "\n";
             output::write_whole(path, text.as_bytes())?;
         }
@@ -212,6 +220,7 @@ impl Render {
 fn stats<'a>(
     prepared: &'a Prepared,
     rendering: &'a Rendering,
+    threads: &[Asked],
     device: &'a str,
     validation_messages: usize,
 ) -> Stats<'a> {
@@ -230,8 +239,8 @@ fn stats<'a>(
         lookups: rendering.lookups,
         passes: rendering.passes.iter().map(|pass| Pass { name: &pass.name, gpu_ms: pass.gpu_ms }).collect(),
         frame_ms: rendering.frame_ms,
-        thread_generation_ms: prepared.thread_time.as_secs_f64() * 1e3,
-        thread_cache: if prepared.thread_cache == CacheState::Hit { "hit" } else { "miss" },
+        thread_generation_ms: 1e3 * threads.iter().map(|asked| asked.time.as_secs_f64()).sum::<f64>(),
+        thread_cache: if threads.iter().all(|asked| asked.origin != Origin::Made) { "hit" } else { "miss" },
         device_memory_bytes: rendering.device_memory_bytes,
         validation_messages,
         expected_rms: None,

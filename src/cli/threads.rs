@@ -3,11 +3,12 @@ use super::progress::TerminalProgress;
 use super::{cache_folder, stem};
 use std::path::PathBuf;
 use threadlight::Error;
+use threadlight::memo::{Asked, Memo, Origin, Step};
 use threadlight::method::Method;
 use threadlight::output;
-use threadlight::prepare::load_material;
 use threadlight::scene::MaterialSource;
-use threadlight::threads::{self, CacheState, ThreadKind, ThreadSettings};
+use threadlight::steps::{FitThreads, LoadMaterial};
+use threadlight::threads::{self, ThreadKind, ThreadSettings};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -62,15 +63,17 @@ impl Threads {
             MaterialSource::File(path) => stem(path),
             _ => self.material.clone(),
         };
-        let brdf = load_material(&source)?;
         let settings = ThreadSettings { kind, count, seed: self.seed, ..Default::default() };
         let progress = TerminalProgress::new("threads")?;
-        let cache = cache_folder(self.no_cache);
-        let (threads, state, time) = threads::load_or_generate(&brdf, &settings, cache.as_deref(), &progress)?;
+        let memo = Memo::new(cache_folder(self.no_cache).as_deref());
+        let round = memo.round(&progress);
+        let brdf = round.ask(&LoadMaterial(&source))?;
+        let threads = round.ask(&FitThreads { brdf: &brdf, settings })?;
         progress.finish();
-        let threads = threads.of_material(&name);
+        let Asked { origin, time, .. } = round.asked(FitThreads::NAME)[0];
+        let threads = (*threads).clone().of_material(&name);
         let [rows, count] = threads.size();
-        let how = if state == CacheState::Hit { "read from the cache" } else { "made" };
+        let how = if origin == Origin::Disk { "read from the cache" } else { "made" };
         eprintln!("{count} threads x {rows} rows {how} in {:.2} s", time.as_secs_f64());
         if let threads::Threads::Fitted(table) = &threads {
             let percent = |error: f32| 100.0 * error;

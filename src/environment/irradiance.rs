@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::cube::{direction_of, face_of};
 use super::{Environment, Pyramid};
 use crate::error::{Error, Result};
-use crate::threads::Observer;
+use crate::progress::Observer;
 
 /// Texels along the edge of a face: bilinear between them is good to h^2 / 4, 2.4e-4 of the largest value, without small sources.
 const FACE_SIZE: usize = 64;
@@ -110,7 +110,7 @@ mod tests {
         });
         let sources = map.small_sources();
         assert_eq!(sources.list.len(), 1);
-        let irradiance = map.rest().irradiance();
+        let irradiance = irradiance_map(&map.part(false), &()).unwrap();
         for i in 0..200 {
             let z: f64 = 1.0 - (f64::from(i) + 0.5) / 100.0;
             let angle = f64::from(i) * 2.4;

@@ -1,14 +1,9 @@
 //! Distant light from all directions: the lat-long environment, and the function of direction that is its ground truth.
 use std::f64::consts::{PI, TAU};
-use std::path::Path;
 use std::sync::OnceLock;
 
 use glam::DVec3;
 
-use crate::error::Result;
-use crate::threads::Observer;
-
-mod cache;
 pub mod cube;
 mod irradiance;
 mod light_map;
@@ -16,6 +11,7 @@ mod load;
 mod procedural;
 pub mod pyramid;
 pub mod sources;
+pub mod vmf_file;
 mod vmf_pyramid;
 
 pub use irradiance::irradiance_map;
@@ -44,15 +40,7 @@ pub struct Environment {
     /// What had to be repaired when the file was read.
     pub repaired: RepairCounts,
     /// Made when first asked for.
-    box_filtered: OnceLock<Pyramid>,
-    /// Made when first asked for.
-    vmf_filtered: OnceLock<VmfPyramid>,
-    /// Made when first asked for.
     small_sources: OnceLock<SmallSources>,
-    /// This without its small sources, and these alone, if there are any. Made when first asked for.
-    parts: OnceLock<Option<Box<[Environment; 2]>>>,
-    /// Made when first asked for.
-    irradiance: OnceLock<Pyramid>,
 }
 
 impl Environment {
@@ -64,32 +52,7 @@ impl Environment {
         texels: Vec<[f32; 3]>,
         repaired: RepairCounts,
     ) -> Self {
-        Self {
-            name,
-            width,
-            height,
-            texels,
-            repaired,
-            box_filtered: OnceLock::new(),
-            vmf_filtered: OnceLock::new(),
-            small_sources: OnceLock::new(),
-            parts: OnceLock::new(),
-            irradiance: OnceLock::new(),
-        }
-    }
-
-    /// The box-filtered pyramid of this environment, made once for all renderers.
-    pub fn box_filtered(&self) -> &Pyramid {
-        self.watched_box_filtered(&()).expect("nobody cancels")
-    }
-
-    /// The same; the only error is that `observer` cancels it.
-    pub fn watched_box_filtered(&self, observer: &dyn Observer) -> Result<&Pyramid> {
-        if let Some(pyramid) = self.box_filtered.get() {
-            return Ok(pyramid);
-        }
-        let pyramid = Pyramid::box_filtered_to(self, Pyramid::face_size_for(self), observer)?;
-        Ok(self.box_filtered.get_or_init(|| pyramid))
+        Self { name, width, height, texels, repaired, small_sources: OnceLock::new() }
     }
 
     /// Its small bright sources.
@@ -97,67 +60,12 @@ impl Environment {
         self.small_sources.get_or_init(|| SmallSources::of(self))
     }
 
-    /// This environment with its small sources cut out.
-    pub fn rest(&self) -> &Self {
-        self.parts().map_or(self, |[rest, _]| rest)
-    }
-
-    /// Its small sources alone, if it has any.
-    pub fn sources_alone(&self) -> Option<&Self> {
-        self.parts().map(|[_, sources]| sources)
-    }
-
-    fn parts(&self) -> Option<&[Self; 2]> {
-        let parts = self.parts.get_or_init(|| {
-            let SmallSources { list, pixels } = self.small_sources();
-            let part = |of_sources: bool| {
-                let kept =
-                    |(texel, is_source): (&[f32; 3], &bool)| if *is_source == of_sources { *texel } else { [0.0; 3] };
-                let texels = self.texels.iter().zip(pixels).map(kept).collect();
-                Self::new(self.name.clone(), self.width, self.height, texels, self.repaired)
-            };
-            (!list.is_empty()).then(|| Box::new([part(false), part(true)]))
-        });
-        parts.as_deref()
-    }
-
-    /// Irradiance over pi.
-    pub fn irradiance(&self) -> &Pyramid {
-        self.watched_irradiance(&()).expect("nobody cancels")
-    }
-
-    /// The same; the only error is that `observer` cancels it.
-    pub fn watched_irradiance(&self, observer: &dyn Observer) -> Result<&Pyramid> {
-        if let Some(map) = self.irradiance.get() {
-            return Ok(map);
-        }
-        let map = irradiance_map(self, observer)?;
-        Ok(self.irradiance.get_or_init(|| map))
-    }
-
-    /// The pyramid of vMF kernels of this environment: from the cache in `folder` or by `make` from the box-filtered one, once for all
-    /// renderers.
-    ///
-    /// # Errors
-    /// Those of `make`; cancelled by `observer` before that.
-    pub fn vmf_filtered(
-        &self,
-        folder: Option<&Path>,
-        observer: &dyn Observer,
-        make: impl FnOnce(&Pyramid) -> Result<VmfPyramid>,
-    ) -> Result<&VmfPyramid> {
-        if let Some(pyramid) = self.vmf_filtered.get() {
-            return Ok(pyramid);
-        }
-        // Blur of the finest kernel would show on maps of few pixels: their texels are a quarter as large.
-        const FEWEST: usize = 512;
-        let face_size = Pyramid::face_size_for(self);
-        let finer = (4 * face_size).min(FEWEST);
-        let pyramid = cache::load_or_make(self, folder, || match finer > face_size {
-            true => make(&Pyramid::box_filtered_to(self, finer, observer)?),
-            false => make(self.watched_box_filtered(observer)?),
-        })?;
-        Ok(self.vmf_filtered.get_or_init(|| pyramid))
+    /// Its small sources alone, or this environment with them cut out.
+    pub fn part(&self, of_sources: bool) -> Self {
+        let pixels = &self.small_sources().pixels;
+        let kept = |(texel, is_source): (&[f32; 3], &bool)| if *is_source == of_sources { *texel } else { [0.0; 3] };
+        let texels = self.texels.iter().zip(pixels).map(kept).collect();
+        Self::new(self.name.clone(), self.width, self.height, texels, self.repaired)
     }
 
     /// The radiance that arrives from `direction` (any length but 0): bilinear between pixel centres, wrapped in u,

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::cube::{self, direction_of, exact_texel_solid_angle, face_of, point_of};
 use super::{Environment, to_dvec3};
 use crate::error::{Error, Result};
-use crate::threads::Observer;
+use crate::progress::Observer;
 
 /// Level 0 is no finer than this: 6 x 1024^2 texels of 16 bytes are 96 MiB.
 pub(super) const MAX_FACE_SIZE: usize = 1024;
@@ -35,17 +35,13 @@ impl Pyramid {
 
     /// Texels along the edge of a face, such that one at its middle, 2 / face_size rad, is no larger than a pixel at the equator,
     /// 2 pi / width.
-    pub(super) fn face_size_for(environment: &Environment) -> usize {
+    pub fn face_size_for(environment: &Environment) -> usize {
         let pixels = (environment.width as f64 / PI).ceil() as usize;
         pixels.next_power_of_two().clamp(1, MAX_FACE_SIZE)
     }
 
     /// The same with faces of this size, a power of two; the only error is that `observer` cancels it.
-    pub(super) fn box_filtered_to(
-        environment: &Environment,
-        face_size: usize,
-        observer: &dyn Observer,
-    ) -> Result<Self> {
+    pub fn box_filtered_to(environment: &Environment, face_size: usize, observer: &dyn Observer) -> Result<Self> {
         let mut levels = vec![finest_level(environment, face_size, observer)?];
         for size in (0..face_size.ilog2()).rev().map(|log2| 1 << log2) {
             levels.push(coarser_level(levels.last().expect("there is level 0"), size));

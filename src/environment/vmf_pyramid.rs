@@ -224,7 +224,7 @@ mod tests {
                 (w, w.x.hypot(w.z), map.radiance(w))
             })
             .collect();
-        let pyramid = VmfPyramid::new(map.box_filtered());
+        let pyramid = VmfPyramid::new(&Pyramid::box_filtered(&map));
         let spot = map.direction(70.0, 40.0);
         for level in 0..pyramid.levels.levels.len() {
             let width = pyramid.finest_width_rad() * (level as f64).exp2();

@@ -1,13 +1,18 @@
 //! What evaluations go through: every material in every environment in every scene, by every method at every count.
-use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::metrics::Display;
-use crate::error::{Error, Result};
+use crate::error::Result;
+use crate::memo::{Keyed, Memo, Round};
 use crate::method::Method;
-use crate::prepare::{Prepared, PreparedMaterial, load_material, load_threads, prepare};
-use crate::scene::{Background, EnvironmentSettings, MaterialSettings, MaterialSource, Scene, Source};
-use crate::threads::{Observer, Threads};
+use crate::passes::Sampling;
+use crate::pipeline::Renderer;
+use crate::prepare::{Prepared, PreparedMaterial, ask_threads, prepare};
+use crate::progress::{Observer, OnlyCancels};
+use crate::scene::{Background, MaterialSettings, MaterialSource, Scene, Source};
+use crate::steps::{LoadEnvironment, LoadMaterial};
+use crate::threads::Threads;
+use crate::vulkan::Device;
 
 /// A method with its number of threads, or of samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,8 +38,6 @@ pub struct Cases {
     pub scenes: Vec<(String, Scene)>,
     /// Seed of whatever is random.
     pub seed: u64,
-    /// Where threads, blurred environments and pipelines are cached.
-    pub cache: Option<PathBuf>,
 }
 
 impl Cases {
@@ -59,8 +62,8 @@ impl Cases {
     ///
     /// # Errors
     /// The first that cannot.
-    pub fn check_materials(&self) -> Result<()> {
-        self.materials.iter().try_for_each(|(_, source)| load_material(source).map(drop))
+    pub fn check_materials(&self, memo: &Memo) -> Result<()> {
+        self.materials.iter().try_for_each(|(_, source)| memo.round(&()).ask(&LoadMaterial(source)).map(drop))
     }
 
     /// Calls `visit` for each combination of material, scene and environment, the last one changing fastest.
@@ -69,32 +72,31 @@ impl Cases {
     /// The first material, environment or scene that cannot be used; the first of `visit`; cancelled.
     pub fn for_each_place(
         &self,
+        memo: &Memo,
         observer: &dyn Observer,
         visit: &mut dyn FnMut(&mut Place<'_>) -> Result<()>,
     ) -> Result<()> {
+        let observer = &OnlyCancels(observer);
+        let round = memo.round(observer);
         let mut environments = Vec::new();
         for (name, source) in &self.environments {
-            let settings = EnvironmentSettings { source: source.clone(), ..EnvironmentSettings::default() };
-            environments.push((name, Arc::new(settings.load()?)));
+            environments.push((name, round.ask(&LoadEnvironment(source))?, None));
         }
         let mut scenes = Vec::new();
         for (name, scene) in &self.scenes {
             let display = Display { exposure: scene.image.exposure, gamma: scene.image.gamma };
-            scenes.push((name, self.prepare_scene(scene)?, display));
+            scenes.push((name, self.prepare_scene(scene, &round)?, display));
         }
-        self.check_materials()?;
+        self.check_materials(memo)?;
         for (material_name, source) in &self.materials {
-            let brdf = load_material(source)?;
-            let source = source.clone();
-            let mut material = vec![PreparedMaterial { name: material_name.clone(), brdf, source, threads: None }];
+            let brdf = memo.round(observer).ask(&LoadMaterial(source))?;
+            let mut material = vec![PreparedMaterial { name: material_name.clone(), brdf, threads: None }];
             let mut tables = Vec::new();
             for (scene, prepared, display) in &mut scenes {
                 // The scene borrows the material and the environment while they are looked at together.
                 std::mem::swap(&mut prepared.materials, &mut material);
-                for (environment_name, environment) in &mut environments {
-                    if observer.cancelled() {
-                        return Err(Error::Cancelled);
-                    }
+                for (environment_name, environment, renderer) in &mut environments {
+                    observer.check()?;
                     std::mem::swap(&mut prepared.environment, environment);
                     visit(&mut Place {
                         material: material_name,
@@ -102,9 +104,11 @@ impl Cases {
                         scene,
                         display: *display,
                         prepared,
+                        memo,
                         cases: self,
                         tables: &mut tables,
-                        observer: &OnlyCancels(observer),
+                        renderer,
+                        observer,
                     })?;
                     std::mem::swap(&mut prepared.environment, environment);
                 }
@@ -115,7 +119,7 @@ impl Cases {
     }
 
     /// The meshes, camera and settings of `scene`, with material and environment yet to come.
-    fn prepare_scene(&self, scene: &Scene) -> Result<Prepared> {
+    fn prepare_scene(&self, scene: &Scene, round: &Round) -> Result<Prepared> {
         let mut scene = scene.clone();
         // Something that costs no time in their place.
         let placeholder = MaterialSource::Model {
@@ -127,7 +131,7 @@ impl Cases {
         scene.environment.source = Source::Builtin("white".to_owned());
         scene.image.background = Background::None;
         scene.shading.method = Method::Uniform.name().to_owned();
-        prepare(&scene, self.cache.as_deref(), &())
+        prepare(&scene, round)
     }
 }
 
@@ -144,9 +148,13 @@ pub struct Place<'a> {
     /// All that is to be rendered; method and threads are those that [`Place::choose`] was last called with. Whoever
     /// changes anything else changes it back.
     pub prepared: &'a mut Prepared,
+    /// Where to ask for what it needs.
+    pub memo: &'a Memo,
     cases: &'a Cases,
     /// The threads made for the material so far.
-    tables: &'a mut Vec<(Estimator, Arc<Threads>)>,
+    tables: &'a mut Vec<Keyed<Threads>>,
+    /// The last renderer in the environment: what the next one has in common with it is filtered, uploaded and compiled once.
+    renderer: &'a mut Option<Renderer>,
     observer: &'a dyn Observer,
 }
 
@@ -157,32 +165,27 @@ impl Place<'_> {
     /// A number of threads that is out of range, or cancelled.
     pub fn choose(&mut self, estimator: Estimator) -> Result<()> {
         let Estimator { method, count } = estimator;
-        let material = &mut self.prepared.materials[0];
-        material.threads = match self.tables.iter().find(|(made_for, _)| *made_for == estimator) {
-            Some((_, table)) => Some(table.clone()),
-            None => {
-                let of = [count.into(), self.cases.seed];
-                let table = load_threads(method, &material.brdf, of, self.cases.cache.as_deref(), self.observer)?;
-                table.map(|(table, ..)| {
-                    let table = Arc::new(table);
-                    self.tables.push((estimator, table.clone()));
-                    table
-                })
-            }
-        };
+        let sampling = Sampling { count, seed: self.cases.seed };
+        let threads = ask_threads(&self.round(), method, &self.prepared.materials[0].brdf, sampling)?;
+        self.tables.extend(threads.clone());
+        self.prepared.materials[0].threads = threads;
         self.prepared.method = method;
-        self.prepared.sampling.count = count;
-        self.prepared.sampling.seed = self.cases.seed;
+        self.prepared.sampling = sampling;
         Ok(())
     }
-}
 
-/// Passes on whether to stop, but no progress: that of a part is not that of the whole.
-pub struct OnlyCancels<'a>(pub &'a dyn Observer);
+    /// Asks for something of this place.
+    pub fn round(&self) -> Round<'_> {
+        self.memo.round(self.observer)
+    }
 
-impl Observer for OnlyCancels<'_> {
-    fn progress(&self, _done: usize, _total: usize) {}
-    fn cancelled(&self) -> bool {
-        self.0.cancelled()
+    /// What renders it.
+    ///
+    /// # Errors
+    /// As for [`Renderer::new`].
+    pub fn renderer(&mut self, device: &Arc<Device>) -> Result<Renderer> {
+        let renderer = Renderer::new(device, self.prepared, &self.round())?;
+        *self.renderer = Some(renderer.clone());
+        Ok(renderer)
     }
 }

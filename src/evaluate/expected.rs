@@ -1,5 +1,4 @@
 //! The error that a picture is to be expected to have, from a few hundred of its pixels, and the fewest threads that stay within one.
-use std::path::Path;
 use std::sync::Arc;
 
 use rayon::prelude::*;
@@ -7,11 +6,12 @@ use rayon::prelude::*;
 use super::metrics::{Comparable, Differences, Display};
 use super::reference::{Integrator, TOLERANCE};
 use crate::error::{Error, Result};
+use crate::memo::Round;
 use crate::method::Method;
 use crate::pipeline::{Renderer, Wanted, render_geometry};
-use crate::prepare::{Prepared, check_count, prepare_again};
+use crate::prepare::{Prepared, check_count, prepare};
 use crate::scene::Scene;
-use crate::threads::{MAX_COUNT, Observer};
+use crate::threads::MAX_COUNT;
 use crate::vulkan::Device;
 
 /// Pixels that are looked at. Errors gather in a part of a picture, at rims and highlights, say a tenth of it: of 50 normal numbers
@@ -31,15 +31,11 @@ impl TrueSample {
     ///
     /// # Errors
     /// Whatever Vulkan refuses, or cancelled.
-    pub fn new(
-        prepared: &Prepared,
-        device: &Arc<Device>,
-        cache: Option<&Path>,
-        observer: &dyn Observer,
-    ) -> Result<Self> {
+    pub fn new(prepared: &Prepared, device: &Arc<Device>, round: &Round) -> Result<Self> {
         let view = &prepared.view;
-        let geometry = render_geometry(device, cache, prepared)?;
-        let brdfs = prepared.materials.iter().map(|material| &material.brdf);
+        let geometry = render_geometry(device, prepared, round)?;
+        let observer = round.observer();
+        let brdfs = prepared.materials.iter().map(|material| &*material.brdf);
         let integrator = Integrator::new(&prepared.environment, view.intensity, brdfs, view.subpixels);
         let place = |pixel: usize| [pixel % view.width as usize, pixel / view.width as usize];
         let is_covered = |pixel: &usize| {
@@ -75,35 +71,25 @@ fn spread(all: &[usize], count: usize) -> Vec<usize> {
 }
 
 /// Prepares `scene` with the fewest threads (or samples) of 1, 2, 3, 4, 6, 8, 12, 16, ... by which the expected RMS of display values is
-/// at most `most`; with that RMS. `observer` hears of threads.
+/// at most `most`; with that RMS. All attempts are of one `round`, so that what they have in common is made once.
 ///
 /// # Errors
-/// As for [`prepare_again`]; whatever Vulkan refuses; as many as there can be are not enough.
-pub fn prepare_within(
-    scene: &Scene,
-    most: f64,
-    device: &Arc<Device>,
-    cache: Option<&Path>,
-    observer: &dyn Observer,
-) -> Result<(Prepared, f64)> {
+/// As for [`prepare`]; whatever Vulkan refuses; as many as there can be are not enough.
+pub fn prepare_within(scene: &Scene, most: f64, device: &Arc<Device>, round: &Round) -> Result<(Prepared, f64)> {
     let method = Method::from_name(&scene.shading.method)?;
     let mut scene = scene.clone();
     let subpixels = scene.image.subpixels;
-    let mut tried: Option<(Prepared, Renderer)> = None;
     let mut sample = None;
     let mut reached = (0, f64::INFINITY);
     for count in counts().take_while(|&count| check_count(method, count, subpixels).is_ok()) {
         scene.shading.threads = Some(count);
-        let prepared = prepare_again(&scene, tried.as_ref().map(|(before, _)| before), cache, observer)?;
+        let prepared = prepare(&scene, round)?;
         // Only surfaces are looked at.
         let alone = Prepared { show_environment: false, ..prepared.clone() };
-        let renderer = match &tried {
-            Some((before, renderer)) => renderer.again(cache, before, &alone)?,
-            None => Renderer::new(device, cache, &alone)?,
-        };
+        let renderer = Renderer::new(device, &alone, round)?;
         let sample = match &sample {
             Some(sample) => sample,
-            None => sample.insert(TrueSample::new(&alone, device, cache, observer)?),
+            None => sample.insert(TrueSample::new(&alone, device, round)?),
         };
         let rendering = renderer.render(Wanted { radiance: true, ..Wanted::default() }, 1)?;
         let rms = sample.expected_rms(&rendering.radiance);
@@ -111,7 +97,7 @@ pub fn prepare_within(
         if rms <= most {
             return Ok((prepared, rms));
         }
-        (tried, reached) = (Some((alone, renderer)), (count, rms));
+        reached = (count, rms);
     }
     let (count, rms) = reached;
     let problem =

@@ -8,8 +8,9 @@ use super::sheet::{Sheet, Tile};
 use super::sweep::Measured;
 use super::tables::in_order;
 use crate::error::{Error, Result};
-use crate::pipeline::{Renderer, Wanted};
-use crate::threads::Observer;
+use crate::memo::Memo;
+use crate::pipeline::Wanted;
+use crate::progress::Observer;
 use crate::vulkan::Device;
 
 /// A picture and what it is of: good as the name of its file, without extension.
@@ -24,14 +25,15 @@ pub fn material_sheets(
     cases: &Cases,
     estimator: Estimator,
     device: &Arc<Device>,
+    memo: &Memo,
     observer: &dyn Observer,
 ) -> Result<Vec<Named>> {
     let mut tiles = Vec::new();
     observer.progress(0, cases.place_count());
-    cases.for_each_place(observer, &mut |place| {
+    cases.for_each_place(memo, observer, &mut |place| {
         place.choose(estimator)?;
         place.prepared.show_environment = true;
-        let renderer = Renderer::new(device, cases.cache.as_deref(), place.prepared);
+        let renderer = place.renderer(device);
         place.prepared.show_environment = false;
         let rendering = renderer?.render(Wanted { display: true, ..Wanted::default() }, 1)?;
         let rgba = rendering.display.as_chunks::<4>().0;

@@ -3,8 +3,8 @@ use std::sync::Arc;
 
 use super::reference::{ReferenceSettings, reference};
 use crate::error::Result;
+use crate::memo::Round;
 use crate::prepare::Prepared;
-use crate::threads::Observer;
 use crate::vulkan::Device;
 
 /// Equation (1) for every sub-pixel, as exact as asked for.
@@ -25,8 +25,8 @@ pub fn reference_picture(
     prepared: &Prepared,
     device: &Arc<Device>,
     settings: &ReferenceSettings,
-    observer: &dyn Observer,
+    round: &Round,
 ) -> Result<ReferencePicture> {
-    let image = reference(prepared, device, settings, observer)?;
+    let image = reference(prepared, device, settings, round)?;
     Ok(ReferencePicture { radiance: image.radiance, error_estimate: image.error_estimate })
 }

@@ -5,10 +5,12 @@ use serde::Serialize;
 
 use super::cases::{Cases, Estimator, Place};
 use crate::error::{Error, Result};
+use crate::memo::{Key, Keyed, Memo};
 use crate::passes::{BareLookups, PlacedMesh};
 use crate::pipeline::{Renderer, Rendering, Wanted, median, time_bare_lookups};
-use crate::threads::Observer;
-use crate::vulkan::{Device, PassTime, PipelineCache};
+use crate::progress::Observer;
+use crate::steps::{BoxFilter, pipelines};
+use crate::vulkan::{Device, PassTime};
 
 /// What to measure, and how.
 #[derive(Clone, Debug)]
@@ -116,7 +118,13 @@ const SERIES: [(Growing, &str, &[u32]); 4] = [
 /// # Errors
 /// The first material, environment or scene that cannot be used, or a scene without a surface; whatever Vulkan refuses;
 /// cancelled.
-pub fn run(speed: &Speed, device: &Arc<Device>, observer: &dyn Observer, timings: &mut Timings) -> Result<()> {
+pub fn run(
+    speed: &Speed,
+    device: &Arc<Device>,
+    memo: &Memo,
+    observer: &dyn Observer,
+    timings: &mut Timings,
+) -> Result<()> {
     let steps: usize = SERIES.iter().map(|(_, _, steps)| steps.len()).sum();
     let of_place = speed.cases.estimators().len() + speed.cases.methods.len() * steps;
     let total = speed.cases.place_count() * of_place * (speed.repeat.max(1) as usize + 1);
@@ -127,12 +135,11 @@ pub fn run(speed: &Speed, device: &Arc<Device>, observer: &dyn Observer, timings
         observer.progress(done, total);
         if observer.cancelled() { Err(Error::Cancelled) } else { Ok(()) }
     };
-    let cache = PipelineCache::new(device, speed.cases.cache.as_deref())?;
-    speed.cases.for_each_place(observer, &mut |place| {
+    speed.cases.for_each_place(memo, observer, &mut |place| {
         let mut entrants = Vec::new();
         for estimator in speed.cases.estimators() {
             place.choose(estimator)?;
-            entrants.push(Entrant::new(device, &cache, speed, place)?);
+            entrants.push(Entrant::new(device, place)?);
             advance()?;
         }
         timings.frames.extend(take_turns(entrants, device, speed.repeat, &mut advance)?);
@@ -142,7 +149,7 @@ pub fn run(speed: &Speed, device: &Arc<Device>, observer: &dyn Observer, timings
                 for &step in steps {
                     let entrant = |place: &mut Place| {
                         place.choose(Estimator { method, count: growing.count(step, speed.threads) })?;
-                        Entrant::new(device, &cache, speed, place)
+                        Entrant::new(device, place)
                     };
                     entrants.push(growing.at(step, place, entrant)?);
                     advance()?;
@@ -173,7 +180,9 @@ impl Growing {
             Self::Threads => {}
             Self::Triangles => {
                 for (_, mesh) in &mut place.prepared.meshes {
-                    *mesh = (0..step).fold(mesh.clone(), |mesh, _| Arc::new(mesh.subdivided()));
+                    *mesh = (0..step).fold(mesh.clone(), |mesh, _| {
+                        Keyed::new(Key::builder("subdivided").key(mesh.key).build(), mesh.subdivided())
+                    });
                 }
             }
         }
@@ -211,9 +220,9 @@ struct Entrant {
 
 impl Entrant {
     /// What `place` has been prepared for. Renders once, so that drivers have compiled when time counts.
-    fn new(device: &Arc<Device>, cache: &PipelineCache, speed: &Speed, place: &Place) -> Result<Self> {
-        let prepared = &place.prepared;
-        let renderer = Renderer::new(device, speed.cases.cache.as_deref(), prepared)?;
+    fn new(device: &Arc<Device>, place: &mut Place) -> Result<Self> {
+        let renderer = place.renderer(device)?;
+        let (prepared, round) = (&place.prepared, place.round());
         let lookups = render(&renderer)?.lookups;
         if lookups == 0 {
             let remedy = "point the camera at its objects, or leave the camera out";
@@ -222,7 +231,8 @@ impl Entrant {
         // As many pixels as the lookups suffice for.
         let threads = prepared.sampling.count;
         let pixels = lookups.div_ceil(u64::from(threads)) as u32;
-        let floor = BareLookups::new(device, cache, &prepared.environment, pixels, threads)?;
+        let pyramid = round.ask(&BoxFilter { environment: &prepared.environment, face_size: None })?;
+        let floor = BareLookups::new(device, &*pipelines(&round, device)?, &pyramid, pixels, threads)?;
         time_bare_lookups(device, &floor)?;
         let triangles = |object: &PlacedMesh| prepared.meshes[object.mesh].1.indices.len() as u64 / 3;
         let frame = TimedFrame {

@@ -4,15 +4,16 @@ use std::sync::Arc;
 use image::RgbImage;
 use serde::{Deserialize, Serialize};
 
-use super::cases::{Cases, OnlyCancels, Place};
+use super::cases::{Cases, Place};
 use super::expected::TrueSample;
 use super::metrics::{Comparable, Metrics, compare};
 use super::reference_picture::ReferencePicture;
 use super::sheet::over_grey;
-use crate::error::{Error, Result};
-use crate::pipeline::{Renderer, Rendering, Wanted};
+use crate::error::Result;
+use crate::memo::{Memo, Round};
+use crate::pipeline::{Rendering, Wanted};
 use crate::prepare::Prepared;
-use crate::threads::Observer;
+use crate::progress::Observer;
 use crate::vulkan::Device;
 
 /// What to measure, and how.
@@ -93,37 +94,29 @@ pub struct Measured {
 pub fn run(
     sweep: &Sweep,
     device: &Arc<Device>,
-    reference: &dyn Fn(&Prepared) -> Result<ReferencePicture>,
+    memo: &Memo,
+    reference: &dyn Fn(&Prepared, &Round) -> Result<ReferencePicture>,
     observer: &dyn Observer,
     measured: &mut Measured,
 ) -> Result<()> {
     let total = sweep.row_count();
     observer.progress(0, total);
-    // What one picture has in common with the next is uploaded and compiled once.
-    let mut previous: Option<(Renderer, Prepared)> = None;
-    sweep.cases.for_each_place(observer, &mut |place| {
+    sweep.cases.for_each_place(memo, observer, &mut |place| {
         let (width, height, display) = (place.prepared.view.width, place.prepared.view.height, place.display);
         let comparable =
             |radiance: &[[f32; 4]]| Comparable::from_radiance(width as usize, height as usize, radiance, true, display);
-        let truth = reference(place.prepared)?;
+        let truth = reference(place.prepared, &place.round())?;
         measured.reference_error = measured.reference_error.max(truth.error_estimate);
         if sweep.keep_pictures {
             let names = [place.material, place.environment, place.scene].map(str::to_owned);
             measured.references.push((names, over_grey(&truth.radiance, width, height, display)));
         }
         let truth = comparable(&truth.radiance);
-        let sample = || TrueSample::new(place.prepared, device, sweep.cases.cache.as_deref(), &OnlyCancels(observer));
+        let sample = || TrueSample::new(place.prepared, device, &place.round());
         let sample = sweep.expected.then(sample).transpose()?;
         for estimator in sweep.cases.estimators() {
-            if observer.cancelled() {
-                return Err(Error::Cancelled);
-            }
             place.choose(estimator)?;
-            let cache = sweep.cases.cache.as_deref();
-            let renderer = match &previous {
-                Some((renderer, before)) => renderer.again(cache, before, place.prepared)?,
-                None => Renderer::new(device, cache, place.prepared)?,
-            };
+            let renderer = place.renderer(device)?;
             let wanted = Wanted { radiance: true, ..Wanted::default() };
             // A frame that does not count: drivers compile then.
             renderer.render(wanted, 1)?;
@@ -135,7 +128,6 @@ pub fn run(
             if sweep.keep_pictures {
                 measured.pictures.push(over_grey(&rendering.radiance, width, height, display));
             }
-            previous = Some((renderer, place.prepared.clone()));
             observer.progress(measured.rows.len(), total);
         }
         Ok(())

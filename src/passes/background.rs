@@ -1,22 +1,28 @@
 //! Puts the environment behind the surface.
-use super::{CameraRays, FrameGraph, Identity, View, tiles_of};
+use super::{CameraRays, FrameGraph, View, tiles_of};
 use crate::Result;
 use crate::environment::Environment;
 use crate::graph::{Access, Image};
-use crate::vulkan::{
-    self, Bindings, ComputePipeline, Device, Groups, ImageShape, PipelineCache, Sampler, SamplerKind, compiled,
-};
+use crate::memo::Keyed;
+use crate::vulkan::{self, Bindings, ComputePipeline, Device, Groups, ImageShape, Sampler, SamplerKind};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 use half::f16;
 use std::sync::Arc;
 
 /// What the pass is made of: only where a background is asked for is the map itself on the device.
+#[derive(Clone)]
 pub struct Background {
-    pipeline: ComputePipeline,
-    map: vulkan::Image,
+    /// The shader.
+    pub pipeline: Keyed<ComputePipeline>,
+    /// The environment.
+    pub map: Keyed<BackgroundMap>,
+}
+
+/// The environment on the device, as a display shows it.
+pub struct BackgroundMap {
+    image: vulkan::Image,
     sampler: Sampler,
-    identity: Identity,
 }
 
 #[repr(C)]
@@ -28,12 +34,12 @@ struct Push {
     radiance_scale: f32,
 }
 
-impl Background {
-    /// Compiles the shader and uploads the map.
+impl BackgroundMap {
+    /// Uploads the map.
     ///
     /// # Errors
     /// No device memory left, or a map wider or higher than the device's images can be.
-    pub fn new(device: &Arc<Device>, cache: &PipelineCache, environment: &Environment) -> Result<Self> {
+    pub fn new(device: &Arc<Device>, environment: &Environment) -> Result<Self> {
         let remedy = "scale it down, or leave the background out with --background none";
         check_map_size(device, environment, [environment.width, environment.height], remedy)?;
         // A sun as bright as the largest half float is white on any display, so here, unlike in shading, it is cut off.
@@ -43,10 +49,8 @@ impl Background {
         let shape = ImageShape::plane(vk::Format::R16G16B16A16_SFLOAT, width, height);
         let bytes = bytemuck::cast_slice(&texels).to_vec();
         Ok(Self {
-            pipeline: ComputePipeline::new(device, cache, &compiled::BACKGROUND, &[])?,
-            map: vulkan::Image::with_texels(device, "environment map", shape, &[bytes])?,
+            image: vulkan::Image::with_texels(device, "environment map", shape, &[bytes])?,
             sampler: Sampler::new(device, "environment map", SamplerKind::WrappedLinear)?,
-            identity: Identity::new(),
         })
     }
 }
@@ -81,11 +85,14 @@ pub fn background<'a>(
         rotation: view.rotation(),
         radiance_scale: view.intensity as f32,
     };
-    pass.depends_on(&background.identity).depends_on(&bytemuck::bytes_of(&push));
+    pass.depends_on(&background.pipeline.key).depends_on(&background.map.key).depends_on(&bytemuck::bytes_of(&push));
     pass.record(Box::new(move |commands, resources| {
-        let Background { pipeline, map, sampler, .. } = background;
-        let bindings =
-            Bindings::new().image("radiance", resources.image(radiance)).sampled("environment_map", map, sampler);
+        let Background { pipeline, map } = background;
+        let bindings = Bindings::new().image("radiance", resources.image(radiance)).sampled(
+            "environment_map",
+            &map.image,
+            &map.sampler,
+        );
         commands.dispatch(pipeline, &bindings, bytemuck::bytes_of(&push), Groups::Direct(tiles_of(view)))
     }));
     radiance

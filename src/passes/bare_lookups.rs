@@ -2,7 +2,7 @@
 use super::FrameGraph;
 use super::light::DevicePyramid;
 use crate::Result;
-use crate::environment::Environment;
+use crate::environment::Pyramid;
 use crate::graph::{Access, Buffer, BufferDesc};
 use crate::vulkan::{Bindings, ComputePipeline, Device, Groups, PipelineCache, compiled};
 use bytemuck::{Pod, Zeroable};
@@ -30,18 +30,17 @@ struct Push {
 }
 
 impl BareLookups {
-    /// `lookup_count` lookups in the pyramid of `environment` for each of `pixel_count` pixels (at least 1).
+    /// `lookup_count` lookups in `pyramid` for each of `pixel_count` pixels (at least 1).
     ///
     /// # Errors
     /// No device memory left, or a driver that cannot compile the shader.
     pub fn new(
         device: &Arc<Device>,
         cache: &PipelineCache,
-        environment: &Environment,
+        pyramid: &Pyramid,
         pixel_count: u32,
         lookup_count: u32,
     ) -> Result<Self> {
-        let pyramid = environment.box_filtered();
         // Where texels are as large as a lookup's share of the hemisphere, and between two levels, so that both are fetched.
         let texel_sr = 2.0 * TAU / (6.0 * (pyramid.face_size * pyramid.face_size) as f64);
         let level = 0.5 * (TAU / f64::from(lookup_count) / texel_sr).log2();

@@ -1,11 +1,10 @@
 //! Sorts pixels into interior, edge and background, and lists those to shade: nothing else is looked at again.
-use super::{FrameGraph, Identity, View, clear, tiles_of};
-use crate::Result;
+use super::{FrameGraph, View, clear, tiles_of};
 use crate::graph::{Access, Buffer, BufferDesc, Image, ImageDesc};
-use crate::vulkan::{Bindings, ComputePipeline, Device, Groups, PipelineCache, compiled};
+use crate::memo::Keyed;
+use crate::vulkan::{Bindings, ComputePipeline, Groups};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
-use std::sync::Arc;
 
 /// Sub-pixels whose normals differ by less share one partitioned sum over the threads. Narrower than this, and curved
 /// parts of a mesh count as edges and cost as much as all sub-pixels shaded alone; wider, and the parts of the sum
@@ -47,9 +46,10 @@ impl Counters {
 }
 
 /// What the pass is made of.
+#[derive(Clone)]
 pub struct Classify {
-    pipeline: ComputePipeline,
-    identity: Identity,
+    /// The shader, for a number of sub-pixels.
+    pub pipeline: Keyed<ComputePipeline>,
 }
 
 #[repr(C)]
@@ -57,17 +57,6 @@ pub struct Classify {
 struct Push {
     size_px: [u32; 2],
     cos_smooth: f32,
-}
-
-impl Classify {
-    /// Compiles the shader for this many sub-pixels per axis.
-    ///
-    /// # Errors
-    /// A driver that cannot compile it.
-    pub fn new(device: &Arc<Device>, cache: &PipelineCache, subpixels: u32) -> Result<Self> {
-        let pipeline = ComputePipeline::new(device, cache, &compiled::CLASSIFY, &[("SUBPIXELS", subpixels)])?;
-        Ok(Self { pipeline, identity: Identity::new() })
-    }
 }
 
 /// What is to be shaded, and the image to shade into, already black where nothing is.
@@ -99,7 +88,7 @@ pub fn classify<'a>(graph: &mut FrameGraph<'a>, classify: &'a Classify, geometry
     let pixels = pass.write(pixels, Access::StorageWriteCompute);
     let radiance = pass.write(radiance, Access::StorageWriteCompute);
     let push = Push { size_px: [width, height], cos_smooth: SMOOTH_DEG.to_radians().cos() };
-    pass.depends_on(&classify.identity).depends_on(&bytemuck::bytes_of(&push));
+    pass.depends_on(&classify.pipeline.key).depends_on(&bytemuck::bytes_of(&push));
     pass.record(Box::new(move |commands, resources| {
         let bindings = Bindings::new()
             .image("geometry", resources.image(geometry))

@@ -1,7 +1,8 @@
 //! Pass 1 of the paper (section 4.1): normal and material of what is seen, at sub-pixel resolution.
-use super::{FrameGraph, Identity, View};
+use super::{FrameGraph, View};
 use crate::Result;
 use crate::graph::{Access, Image, ImageDesc};
+use crate::memo::Keyed;
 use crate::scene::Mesh;
 use crate::vulkan::{
     Buffer, ColorTarget, DepthTarget, Device, GraphicsPipeline, GraphicsState, PipelineCache, compiled,
@@ -59,11 +60,14 @@ pub struct PlacedMesh {
 }
 
 /// What the pass is made of.
+#[derive(Clone)]
 pub struct GeometryCache {
-    pipeline: GraphicsPipeline,
-    meshes: Vec<DeviceMesh>,
-    objects: Vec<PlacedMesh>,
-    identity: Identity,
+    /// The shaders: see [`geometry_pipeline`].
+    pub pipeline: Keyed<GraphicsPipeline>,
+    /// Each mesh once.
+    pub meshes: Vec<Keyed<DeviceMesh>>,
+    /// Which of them are where.
+    pub objects: Vec<PlacedMesh>,
 }
 
 /// `Object` in glsl/geometry_cache.glsl.
@@ -77,29 +81,23 @@ struct Push {
     material: u32,
 }
 
-impl GeometryCache {
-    /// Compiles the shaders and takes what they are to draw.
-    ///
-    /// # Errors
-    /// A driver that cannot compile them.
-    pub fn new(
-        device: &Arc<Device>,
-        cache: &PipelineCache,
-        meshes: Vec<DeviceMesh>,
-        objects: Vec<PlacedMesh>,
-    ) -> Result<Self> {
-        let state = GraphicsState {
-            attributes: &[(vk::Format::R32G32B32_SFLOAT, 12), (vk::Format::R32G32B32_SFLOAT, 12)],
-            colors: &[GEOMETRY_FORMAT],
-            depth: DEPTH_FORMAT,
-        };
-        let (vertex, fragment) = (&compiled::GEOMETRY_CACHE_VERT, &compiled::GEOMETRY_CACHE_FRAG);
-        let pipeline = GraphicsPipeline::new(device, cache, vertex, fragment, &state)?;
-        Ok(Self { pipeline, meshes, objects, identity: Identity::new() })
-    }
+/// Compiles the shaders of the pass.
+///
+/// # Errors
+/// A driver that cannot compile them.
+pub fn geometry_pipeline(device: &Arc<Device>, cache: &PipelineCache) -> Result<GraphicsPipeline> {
+    let state = GraphicsState {
+        attributes: &[(vk::Format::R32G32B32_SFLOAT, 12), (vk::Format::R32G32B32_SFLOAT, 12)],
+        colors: &[GEOMETRY_FORMAT],
+        depth: DEPTH_FORMAT,
+    };
+    let (vertex, fragment) = (&compiled::GEOMETRY_CACHE_VERT, &compiled::GEOMETRY_CACHE_FRAG);
+    Ok(GraphicsPipeline::new(device, cache, vertex, fragment, &state)?)
+}
 
+impl GeometryCache {
     /// The push constants of every object that is drawn.
-    fn draws(&self, view: &View) -> Vec<(&DeviceMesh, Push)> {
+    fn draws(&self, view: &View) -> Vec<(&Keyed<DeviceMesh>, Push)> {
         let (right, up, forward) = view.camera.basis();
         let eye = view.camera.eye;
         let half_height = (view.camera.fov_y_deg.to_radians() / 2.0).tan();
@@ -152,9 +150,9 @@ pub fn geometry_cache<'a>(graph: &mut FrameGraph<'a>, cache: &'a GeometryCache, 
     let geometry = pass.write(geometry, Access::ColorAttachment);
     let depth = pass.write(depth, Access::DepthAttachment);
     let draws = cache.draws(view);
-    pass.depends_on(&cache.identity);
-    for (_, push) in &draws {
-        pass.depends_on(&bytemuck::bytes_of(push));
+    pass.depends_on(&cache.pipeline.key);
+    for (mesh, push) in &draws {
+        pass.depends_on(&mesh.key).depends_on(&bytemuck::bytes_of(push));
     }
     pass.record(Box::new(move |commands, resources| {
         let color = ColorTarget { image: resources.image(geometry), clear: [0; 4] };

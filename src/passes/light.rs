@@ -1,18 +1,12 @@
 //! What shading looks up of the environment, on the device: only what its method and its materials need.
 use super::background::check_map_size;
-use super::vmf_pyramid::blurred;
 use crate::Result;
-use crate::brdf::{MIN_COS_THETA_D, half_vector_width};
-use crate::environment::sources::{CLEAR, clearance};
 use crate::environment::{Environment, LightMap, LightSource, Pyramid};
+use crate::light::{BlurredLight, Light};
 use crate::method::Method;
-use crate::prepare::PreparedMaterial;
-use crate::threads::Threads;
-use crate::threads::fitted::kernel::FINEST_WIDTH_RAD;
-use crate::vulkan::{self, Bindings, Buffer, Device, ImageKind, ImageShape, PipelineCache, Sampler, SamplerKind};
+use crate::vulkan::{self, Bindings, Buffer, Device, ImageKind, ImageShape, Sampler, SamplerKind};
 use ash::vk;
 use glam::DVec3;
-use std::path::Path;
 use std::sync::Arc;
 
 /// What a method looks up of the environment, on the device.
@@ -24,34 +18,6 @@ pub struct DeviceLight {
     sources: Option<Buffer>,
     map: Option<vulkan::Image>,
     aliases: Option<Buffer>,
-    /// For kernels: what is there besides the pyramid, whose finest level is this one.
-    extras: Extras,
-    finest_level: f32,
-}
-
-/// What kernels may look up besides the pyramid.
-#[derive(Clone, Copy, Default)]
-struct Extras {
-    /// The environment as it is, for those sharper than the pyramid.
-    map: bool,
-    /// The sources, for lobes in which they are mirrored.
-    sources: bool,
-}
-
-impl Extras {
-    /// What those of `materials` do, in a pyramid of this finest level.
-    fn of(environment: &Environment, materials: &[PreparedMaterial], finest_level: f32) -> Self {
-        let sources = &environment.small_sources().list;
-        let mirrors = |material: &PreparedMaterial| {
-            let lobe_width = (MIN_COS_THETA_D * half_vector_width(&material.brdf)) as f32;
-            sources.iter().any(|source| clearance(0.0, source.width_rad() as f32, lobe_width) < CLEAR[1])
-        };
-        let is_sharp = |material: &PreparedMaterial| match material.threads.as_deref() {
-            Some(Threads::Fitted(table)) => table.sharpest_level() < finest_level,
-            _ => false,
-        };
-        Self { map: materials.iter().any(is_sharp), sources: materials.iter().any(mirrors) }
-    }
 }
 
 /// A pyramid on the device.
@@ -64,76 +30,49 @@ pub(super) struct DevicePyramid {
 }
 
 impl DeviceLight {
-    /// Makes and uploads what `method` looks up of `environment` for `materials`; what takes long is kept in `cache_folder`.
+    /// Uploads what `method` looks up of `environment`, whose filtered forms are `light`.
     ///
     /// # Errors
     /// No device memory left, or a map wider or higher than the device's images can be.
-    pub fn new(
-        device: &Arc<Device>,
-        cache: &PipelineCache,
-        cache_folder: Option<&Path>,
-        method: Method,
-        environment: &Environment,
-        materials: &[PreparedMaterial],
-    ) -> Result<Self> {
-        let shader = method.shader()?;
-        let mut light = Self::default();
-        if shader.declares("irradiance_map")? {
-            light.add_blurred(device, cache, cache_folder, environment, materials)?;
-            return Ok(light);
+    pub fn new(device: &Arc<Device>, method: Method, environment: &Environment, light: &Light) -> Result<Self> {
+        let lookups = method.lookups();
+        let mut on_device = Self::default();
+        if let Some(blurred) = &light.blurred {
+            on_device.add_blurred(device, environment, blurred)?;
         }
-        if shader.declares("environment_pyramid")? {
-            let pyramid = environment.box_filtered();
+        if let Some(pyramid) = &light.box_filtered {
             let scale = pyramid.radiance_scale();
-            light.pyramid = Some(DevicePyramid::new(device, "environment pyramid", pyramid, scale)?);
+            on_device.pyramid = Some(DevicePyramid::new(device, "environment pyramid", pyramid, scale)?);
         }
-        if shader.declares("environment_map")? {
+        if lookups.map {
             let map = LightMap::new(environment);
-            light.map = Some(upload_map(device, environment, &map, 1.0)?);
-            if shader.declares("LightAliases")? {
+            on_device.map = Some(upload_map(device, environment, &map, 1.0)?);
+            if lookups.aliases {
                 let (aliases, storage) = (map.aliases(), vk::BufferUsageFlags::STORAGE_BUFFER);
                 let aliases = bytemuck::cast_slice(&aliases);
-                light.aliases = Some(Buffer::with_contents(device, "light aliases", storage, aliases)?);
+                on_device.aliases = Some(Buffer::with_contents(device, "light aliases", storage, aliases)?);
             }
         }
-        Ok(light)
+        Ok(on_device)
     }
 
-    /// Adds what fitted threads look up. Bindings that no kernel of `materials` will use have a single texel.
-    fn add_blurred(
-        &mut self,
-        device: &Arc<Device>,
-        cache: &PipelineCache,
-        cache_folder: Option<&Path>,
-        environment: &Environment,
-        materials: &[PreparedMaterial],
-    ) -> Result<()> {
-        let blurred = |part| blurred(device, cache, cache_folder, part, &());
-        let rest = blurred(environment.rest())?;
-        self.finest_level = (rest.finest_width_rad() / FINEST_WIDTH_RAD).log2() as f32;
-        self.extras = Extras::of(environment, materials, self.finest_level);
-        let pyramid = &rest.levels;
+    /// Adds what fitted threads look up. Bindings that no kernel will use have a single texel.
+    fn add_blurred(&mut self, device: &Arc<Device>, environment: &Environment, blurred: &BlurredLight) -> Result<()> {
         let nothing = Pyramid { face_size: 1, levels: vec![vec![[0.0; 3]; 6]] };
-        let sources_alone = environment.sources_alone().filter(|_| self.extras.sources);
-        let source_pyramid = sources_alone.map(blurred).transpose()?.map_or(&nothing, |pyramid| &pyramid.levels);
+        let pyramid = &blurred.rest.levels;
+        let source_pyramid = blurred.sources.as_ref().map_or(&nothing, |pyramid| &pyramid.levels);
         // One scale for all that is added up.
         let scale = pyramid.radiance_scale().max(source_pyramid.radiance_scale());
-        let map = match self.extras.map {
+        let map = match blurred.needs.map {
             true => LightMap::with_sources_marked(environment),
             false => LightMap { width: 1, height: 1, texels: vec![[0.0; 4]] },
         };
         self.map = Some(upload_map(device, environment, &map, scale)?);
         self.pyramid = Some(DevicePyramid::new(device, "environment pyramid", pyramid, scale)?);
         self.source_pyramid = Some(DevicePyramid::new(device, "source pyramid", source_pyramid, scale)?);
-        self.irradiance = Some(DevicePyramid::new(device, "irradiance map", environment.rest().irradiance(), scale)?);
+        self.irradiance = Some(DevicePyramid::new(device, "irradiance map", &blurred.irradiance, scale)?);
         self.sources = Some(source_buffer(device, &environment.small_sources().list, scale)?);
         Ok(())
-    }
-
-    /// Whether it has all that fitted threads of `materials` look up of `environment`, which it was made for.
-    pub fn serves(&self, environment: &Environment, materials: &[PreparedMaterial]) -> bool {
-        let needed = Extras::of(environment, materials, self.finest_level);
-        (self.extras.map || !needed.map) && (self.extras.sources || !needed.sources)
     }
 
     /// Adds all of it to `bindings`.

@@ -7,7 +7,6 @@ mod bare_lookups;
 mod classify;
 mod clear;
 mod geometry_cache;
-mod identity;
 mod light;
 #[cfg(feature = "viewer")]
 mod present;
@@ -19,12 +18,11 @@ mod ui;
 mod view;
 mod vmf_pyramid;
 
-pub use background::{Background, background};
+pub use background::{Background, BackgroundMap, background};
 pub use bare_lookups::{BareLookups, bare_lookups};
 pub use classify::{Classify, Counters, SMOOTH_DEG, Tiles, classify};
 pub use clear::clear;
-pub use geometry_cache::{DeviceMesh, GeometryCache, PlacedMesh, geometry_cache};
-pub use identity::Identity;
+pub use geometry_cache::{DeviceMesh, GeometryCache, PlacedMesh, geometry_cache, geometry_pipeline};
 pub use light::DeviceLight;
 #[cfg(feature = "viewer")]
 pub use present::{Area, present};
@@ -34,7 +32,7 @@ pub use tone_map::{ToneMap, tone_map};
 #[cfg(feature = "viewer")]
 pub use ui::ui;
 pub use view::{CameraRays, View};
-pub use vmf_pyramid::{filter_environment, vmf_pyramid};
+pub use vmf_pyramid::vmf_pyramid;
 
 use crate::graph::{Graph, Work};
 

@@ -1,11 +1,12 @@
 //! Pass 2 of the paper (section 4.2): the radiance of every listed pixel, by its partition of the sample threads.
-use super::{CameraRays, Counters, DeviceLight, FrameGraph, Identity, Tiles, View, clear};
+use super::{CameraRays, Counters, DeviceLight, FrameGraph, Tiles, View, clear};
 use crate::brdf::{Brdf, half_vector_width};
 use crate::graph::{self, Access, BufferDesc, Image};
+use crate::memo::Keyed;
 use crate::method::Method;
 use crate::threads::{Sample, SliceTable, Threads};
 use crate::vulkan::{
-    self, Bindings, Buffer, ComputePipeline, Device, Groups, ImageKind, ImageShape, PipelineCache, Sampler, SamplerKind,
+    self, Bindings, Buffer, ComputePipeline, Device, Groups, ImageKind, ImageShape, Sampler, SamplerKind,
 };
 use crate::{Error, Result};
 use ash::vk;
@@ -34,7 +35,7 @@ pub struct DeviceMaterials {
     tables: vulkan::Image,
     table_sampler: Sampler,
     /// Bit i: the BRDF of model i is evaluated.
-    models_used: u32,
+    pub models_used: u32,
 }
 
 impl DeviceMaterials {
@@ -52,7 +53,7 @@ impl DeviceMaterials {
         materials: impl IntoIterator<Item = (&'m Brdf, Option<&'m Threads>)>,
         evaluates_brdf: bool,
     ) -> Result<Self> {
-        let use_slices = method.shader()?.declares("Slices")?;
+        let use_slices = method.lookups().slices;
         let mut records = Vec::new();
         let mut threads: Vec<u32> = Vec::new();
         let mut slices: Vec<f32> = Vec::new();
@@ -191,14 +192,14 @@ pub struct Sampling {
 /// What the pass is made of.
 #[derive(Clone)]
 pub struct Shade {
-    pipeline: Arc<ComputePipeline>,
+    /// The variant of the shader for the method, the number of sub-pixels and the models that are evaluated.
+    pub pipeline: Keyed<ComputePipeline>,
     /// What objects are made of.
-    pub materials: Arc<DeviceMaterials>,
+    pub materials: Keyed<DeviceMaterials>,
     /// What lights them.
-    pub light: Arc<DeviceLight>,
+    pub light: Keyed<DeviceLight>,
     /// How many threads or samples, and which random numbers.
     pub sampling: Sampling,
-    identity: Identity,
 }
 
 #[repr(C)]
@@ -212,26 +213,6 @@ struct Push {
     radiance_scale: f32,
     sample_count: u32,
     seed: [u32; 2],
-}
-
-impl Shade {
-    /// Compiles the variant of the shader for `method`, with the models that `materials` use.
-    ///
-    /// # Errors
-    /// A driver that cannot compile it, or a method that has no shader.
-    pub fn new(
-        device: &Arc<Device>,
-        cache: &PipelineCache,
-        method: Method,
-        sampling: Sampling,
-        subpixels: u32,
-        materials: Arc<DeviceMaterials>,
-        light: Arc<DeviceLight>,
-    ) -> Result<Self> {
-        let constants = [("SUBPIXELS", subpixels), ("MODELS_USED", materials.models_used)];
-        let pipeline = Arc::new(ComputePipeline::new(device, cache, method.shader()?, &constants)?);
-        Ok(Self { pipeline, materials, light, sampling, identity: Identity::new() })
-    }
 }
 
 /// What shading leaves.
@@ -262,7 +243,7 @@ pub fn shade<'a>(
     pass.read(pixels, Access::StorageReadCompute);
     let radiance = pass.modify(radiance, Access::StorageWriteCompute);
     let lookups = pass.modify(lookups, Access::StorageWriteCompute);
-    let Shade { pipeline, materials, light, sampling, identity } = shade;
+    let Shade { pipeline, materials, light, sampling } = shade;
     let push = Push {
         camera: view.camera_rays(),
         size_px: [view.width, view.height],
@@ -273,7 +254,7 @@ pub fn shade<'a>(
         sample_count: sampling.count,
         seed: [sampling.seed as u32, (sampling.seed >> 32) as u32],
     };
-    pass.depends_on(identity).depends_on(&bytemuck::bytes_of(&push));
+    pass.depends_on(&[pipeline.key, materials.key, light.key]).depends_on(&bytemuck::bytes_of(&push));
     pass.record(Box::new(move |commands, resources| {
         let counters = resources.buffer(counters);
         let mut bindings = Bindings::new()

@@ -1,16 +1,16 @@
 //! Linear radiance to 8-bit display values: exposure, clamp, gamma.
-use super::{FrameGraph, Identity, View, tiles_of};
-use crate::Result;
+use super::{FrameGraph, View, tiles_of};
 use crate::graph::{Access, Image, ImageDesc};
-use crate::vulkan::{Bindings, ComputePipeline, Device, Groups, PipelineCache, compiled};
+use crate::memo::Keyed;
+use crate::vulkan::{Bindings, ComputePipeline, Groups};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
-use std::sync::Arc;
 
 /// What the pass is made of.
+#[derive(Clone)]
 pub struct ToneMap {
-    pipeline: ComputePipeline,
-    identity: Identity,
+    /// The shader.
+    pub pipeline: Keyed<ComputePipeline>,
 }
 
 #[repr(C)]
@@ -21,17 +21,6 @@ struct Push {
     inverse_gamma: f32,
 }
 
-impl ToneMap {
-    /// Compiles the shader.
-    ///
-    /// # Errors
-    /// A driver that cannot compile it.
-    pub fn new(device: &Arc<Device>, cache: &PipelineCache) -> Result<Self> {
-        let pipeline = ComputePipeline::new(device, cache, &compiled::TONE_MAP, &[])?;
-        Ok(Self { pipeline, identity: Identity::new() })
-    }
-}
-
 /// Makes the picture to look at out of `radiance`: RGBA, 8 bits each.
 pub fn tone_map<'a>(graph: &mut FrameGraph<'a>, tone_map: &'a ToneMap, radiance: Image, view: &'a View) -> Image {
     let (width, height) = (view.width, view.height);
@@ -40,7 +29,7 @@ pub fn tone_map<'a>(graph: &mut FrameGraph<'a>, tone_map: &'a ToneMap, radiance:
     pass.read(radiance, Access::StorageReadCompute);
     let display = pass.write(display, Access::StorageWriteCompute);
     let push = Push { size_px: [width, height], exposure: view.exposure, inverse_gamma: 1.0 / view.gamma };
-    pass.depends_on(&tone_map.identity).depends_on(&bytemuck::bytes_of(&push));
+    pass.depends_on(&tone_map.pipeline.key).depends_on(&bytemuck::bytes_of(&push));
     pass.record(Box::new(move |commands, resources| {
         let bindings =
             Bindings::new().image("radiance", resources.image(radiance)).image("display", resources.image(display));

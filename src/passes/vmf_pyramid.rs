@@ -3,16 +3,14 @@
 //! In many short submissions, since a device without a second queue (such as a processor) draws no frame until a submission has ended,
 //! and so that it can be cancelled.
 use super::{FrameGraph, Readbacks, texels};
-use crate::environment::{BlurKernel, BlurStep, Environment, Pyramid, VmfPyramid};
+use crate::environment::{BlurKernel, BlurStep, Pyramid, VmfPyramid};
 use crate::graph::{Access, BufferDesc, DeviceResource, Executable};
-use crate::method::Method;
-use crate::threads::Observer;
+use crate::progress::Observer;
 use crate::vulkan::{Bindings, Buffer, BufferUse, ComputePipeline, Device, Frames, Groups, PipelineCache, compiled};
 use crate::{Error, Result};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 use std::cell::Cell;
-use std::path::Path;
 use std::sync::Arc;
 
 /// Texels along the edges of a workgroup.
@@ -29,42 +27,6 @@ struct Push {
     kernel: u32,
     first_row: u32,
     first_face: u32,
-}
-
-/// Makes what `method` needs of `environment` before it is uploaded: long work, so that nothing long is left for the upload. `observer`
-/// hears of submissions.
-///
-/// # Errors
-/// Whatever Vulkan refuses; a method that does not run on the GPU; cancelled.
-pub fn filter_environment(
-    device: &Arc<Device>,
-    cache: &PipelineCache,
-    cache_folder: Option<&Path>,
-    method: Method,
-    environment: &Environment,
-    observer: &dyn Observer,
-) -> Result<()> {
-    let shader = method.shader()?;
-    if shader.declares("irradiance_map")? {
-        for part in std::iter::once(environment.rest()).chain(environment.sources_alone()) {
-            blurred(device, cache, cache_folder, part, observer)?;
-        }
-        environment.rest().watched_irradiance(observer)?;
-    } else if shader.declares("environment_pyramid")? {
-        environment.watched_box_filtered(observer)?;
-    }
-    Ok(())
-}
-
-/// `part` of an environment blurred by the kernels of fitted threads: from memory, disk or the device.
-pub(super) fn blurred<'e>(
-    device: &Arc<Device>,
-    cache: &PipelineCache,
-    cache_folder: Option<&Path>,
-    part: &'e Environment,
-    observer: &dyn Observer,
-) -> Result<&'e VmfPyramid> {
-    part.vmf_filtered(cache_folder, observer, |source| vmf_pyramid(device, cache, source, observer))
 }
 
 /// The pyramid of vMF kernels of the environment whose box-filtered one is `source`, made on `device`. `observer` hears of submissions.

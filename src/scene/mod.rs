@@ -1,13 +1,11 @@
 //! What is rendered: image settings, camera, environment, materials and objects, as a scene file or flags name them.
 use std::ops::RangeInclusive;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use glam::{DMat3, DQuat, EulerRot, Mat4, Quat, Vec3};
 use serde::{Deserialize, Serialize};
 
 use crate::brdf::Brdf;
-use crate::environment::Environment;
-use crate::error::Result;
 
 pub mod camera;
 mod file;
@@ -224,6 +222,33 @@ impl Scene {
     }
 }
 
+impl Scene {
+    /// The files that it names: of its environment, its meshes and its materials.
+    pub fn files(&self) -> impl Iterator<Item = &Path> {
+        let materials = self.materials.iter().filter_map(|material| match &material.source {
+            MaterialSource::File(path) => Some(path.as_path()),
+            _ => None,
+        });
+        let sources = std::iter::once(&self.environment.source).chain(self.objects.iter().map(|object| &object.mesh));
+        let of_sources = sources.filter_map(|source| match source {
+            Source::File(path) => Some(path.as_path()),
+            Source::Builtin(_) => None,
+        });
+        of_sources.chain(materials)
+    }
+
+    /// Names of the materials that objects have, each once, in the order in which objects name them first.
+    pub fn used_materials(&self) -> Vec<&str> {
+        let mut names: Vec<&str> = Vec::new();
+        for object in &self.objects {
+            if !names.contains(&object.material.as_str()) {
+                names.push(&object.material);
+            }
+        }
+        names
+    }
+}
+
 impl Default for ImageSettings {
     fn default() -> Self {
         Self { width: 640, height: 480, subpixels: 2, exposure: 1.0, gamma: 2.2, background: Background::Environment }
@@ -244,14 +269,6 @@ impl Default for EnvironmentSettings {
 }
 
 impl EnvironmentSettings {
-    /// Reads or makes the environment, without its turn and intensity.
-    pub fn load(&self) -> Result<Environment> {
-        match &self.source {
-            Source::File(path) => Environment::load(path),
-            Source::Builtin(name) => Environment::builtin(name),
-        }
-    }
-
     /// Takes a direction in the world to the direction in the environment's own picture that is seen there.
     pub fn environment_from_world(&self) -> DMat3 {
         DMat3::from_rotation_y(-self.rotation_deg.to_radians())
@@ -268,14 +285,6 @@ impl ObjectSettings {
     /// A mesh of a material, where it is.
     pub fn new(mesh: Source, material: &str) -> Self {
         Self { mesh, material: material.into(), translate: Vec3::ZERO, rotate_deg: Vec3::ZERO, scale: 1.0 }
-    }
-
-    /// Reads or makes the mesh, in object space.
-    pub fn load_mesh(&self) -> Result<Mesh> {
-        match &self.mesh {
-            Source::File(path) => Mesh::load(path),
-            Source::Builtin(name) => Mesh::builtin(name),
-        }
     }
 
     /// Object space to world space: scaled, then rotated, then translated.

@@ -3,10 +3,11 @@ use std::f32::consts::{FRAC_PI_2, PI};
 
 use glam::{DVec3, IVec2, Vec3};
 
-use super::{BlurredLight, Point, Surface};
+use super::{CpuShader, Point, Surface};
 use crate::brdf::MIN_COS_THETA_D;
 use crate::environment::sources::{CLEAR, clearance};
 use crate::environment::{LightMap, LightSource};
+use crate::light::BlurredLight;
 use crate::threads::Threads;
 use crate::threads::fitted::kernel::FINEST_WIDTH_RAD;
 
@@ -45,20 +46,26 @@ fn sharp_radiance(map: &LightMap, direction: Vec3, sources: f32) -> Vec3 {
     sum
 }
 
+fn blurred_light<'a>(twin: &'a CpuShader) -> &'a BlurredLight {
+    twin.light.blurred.as_ref().expect("the method looks the blurred environment up")
+}
+
 /// Twin of `blurred_radiance` in glsl/vmf_pyramid.glsl.
-fn blurred_radiance(light: &BlurredLight, direction: Vec3, level: f32, sources: f32) -> Vec3 {
+fn blurred_radiance(twin: &CpuShader, direction: Vec3, level: f32, sources: f32) -> Vec3 {
+    let light = blurred_light(twin);
     let finest = finest_level(light.rest.levels.face_size);
     let sharp = if level < finest { 1.0 - variance_of_level(level) / variance_of_level(finest) } else { 0.0 };
     let mut radiance = Vec3::ZERO;
     if sharp < 1.0 {
         let pyramid_level = (level - finest).max(0.0);
         radiance = (1.0 - sharp) * light.rest.levels.lookup(direction, pyramid_level);
-        if let Some(pyramid) = light.sources.filter(|_| sources > 0.0) {
+        if let Some(pyramid) = light.sources.as_ref().filter(|_| sources > 0.0) {
             radiance += (1.0 - sharp) * sources * pyramid.levels.lookup(direction, pyramid_level);
         }
     }
     if sharp > 0.0 {
-        radiance += sharp * sharp_radiance(&light.map, direction, sources);
+        let map = twin.map.as_ref().expect("fitted threads have the map");
+        radiance += sharp * sharp_radiance(map, direction, sources);
     }
     radiance
 }
@@ -89,12 +96,15 @@ fn mirrored(surface: &Surface, w_o: Vec3) -> Vec3 {
 
 /// Twin of `needs_subpixels`.
 pub(super) fn needs_subpixels(point: &Point) -> bool {
-    let Some(light) = &point.twin.blurred else { return false };
+    if point.twin.light.blurred.is_none() {
+        return false;
+    }
+    let sources = &point.twin.prepared.environment.small_sources().list;
     let deviation = point.surface.normal_variance.sqrt();
     let w_o = point.surface.view_direction();
     let mirror = mirrored(&point.surface, w_o);
     deviation > point.lobe_width()
-        || share_of_brdf(lobe_width_from(point, w_o), light.source_list, mirror, 3.0 * 2.0 * deviation) < 1.0
+        || share_of_brdf(lobe_width_from(point, w_o), sources, mirror, 3.0 * 2.0 * deviation) < 1.0
 }
 
 /// Twin of `risen`.
@@ -148,7 +158,8 @@ pub(super) fn estimate(point: &Point) -> Vec3 {
         panic!("fitted threads are there")
     };
     let surface = &point.surface;
-    let light = point.twin.blurred.as_ref().expect("the method declares the pyramid");
+    let light = blurred_light(point.twin);
+    let sources = &point.twin.prepared.environment.small_sources().list;
     let row = (surface.theta_o * (threads.rows as f32 / FRAC_PI_2)).min((threads.rows - 1) as f32);
     let (below, t) = (row as usize, row.fract());
     let above = (below + 1).min(threads.rows - 1);
@@ -156,19 +167,19 @@ pub(super) fn estimate(point: &Point) -> Vec3 {
     let cosine_part = a.lerp(b, t);
     let mut sum = Vec3::ZERO;
     let mut of_kernels = 0.0;
-    if !light.source_list.is_empty() {
+    if !sources.is_empty() {
         let w_o = surface.view_direction();
         let mirror = mirrored(surface, w_o);
         let lobe_width = lobe_width_from(point, w_o);
-        of_kernels = 1.0 - share_of_brdf(lobe_width, light.source_list, mirror, 0.0);
-        let (f_cos, cosine) = at_sources(point, light.source_list, lobe_width, w_o, mirror);
+        of_kernels = 1.0 - share_of_brdf(lobe_width, sources, mirror, 0.0);
+        let (f_cos, cosine) = at_sources(point, sources, lobe_width, w_o, mirror);
         sum = f_cos.lerp(cosine * cosine_part / PI, of_kernels);
     }
     for k in (point.first as usize..threads.count).step_by(point.stride) {
         let [a, b] = [below, above].map(|row| threads.row(row)[k].unpack());
         let direction = surface.frame * a.direction.lerp(b.direction, t).normalize();
         let level = level_within_pixel(a.level + t * (b.level - a.level), surface.normal_variance);
-        sum += a.weight.lerp(b.weight, t) * blurred_radiance(light, direction, level, of_kernels);
+        sum += a.weight.lerp(b.weight, t) * blurred_radiance(point.twin, direction, level, of_kernels);
     }
     sum += cosine_part * light.irradiance.lookup(surface.frame.z_axis, 0.0);
     sum.max(Vec3::ZERO)

@@ -4,11 +4,14 @@
 //! in double precision; everything else follows the shader line by line.
 use crate::Result;
 use crate::brdf::half_vector_width;
-use crate::environment::{Alias, Environment, LightMap, LightSource, Pyramid, VmfPyramid};
-use crate::method::Method;
+use crate::environment::{Alias, LightMap};
+use crate::light::Light;
+use crate::memo::Round;
+use crate::method::{Lookups, Method};
 use crate::packing::{octahedral_decode, unpack_snorm_2x16};
 use crate::passes::SMOOTH_DEG;
 use crate::prepare::{Prepared, PreparedMaterial};
+use crate::steps::light;
 use crate::threads::SliceTable;
 use glam::{Mat3, UVec2, Vec2, Vec3, Vec4};
 use random::random_bits;
@@ -98,8 +101,9 @@ const SHARED_VARIANCE: f32 = 1e-4;
 /// The CPU twin of pass 2 for one scene.
 pub struct CpuShader<'a> {
     prepared: &'a Prepared,
-    pyramid: Option<&'a Pyramid>,
-    blurred: Option<BlurredLight<'a>>,
+    /// What has to be filtered of the environment.
+    light: Light,
+    /// The environment as it is, or for fitted threads with its sources marked.
     map: Option<LightMap>,
     aliases: Vec<Alias>,
     /// One for each material, for methods that draw by them.
@@ -108,53 +112,29 @@ pub struct CpuShader<'a> {
     lobe_widths: Vec<f32>,
 }
 
-/// What fitted threads look up.
-struct BlurredLight<'a> {
-    rest: &'a VmfPyramid,
-    sources: Option<&'a VmfPyramid>,
-    source_list: &'a [LightSource],
-    irradiance: &'a Pyramid,
-    map: LightMap,
-}
-
-impl<'a> BlurredLight<'a> {
-    fn new(environment: &'a Environment) -> Result<Self> {
-        let blurred = |part: &'a Environment| part.vmf_filtered(None, &(), |source| Ok(VmfPyramid::new(source)));
-        Ok(Self {
-            rest: blurred(environment.rest())?,
-            sources: environment.sources_alone().map(blurred).transpose()?,
-            source_list: &environment.small_sources().list,
-            irradiance: environment.rest().irradiance(),
-            map: LightMap::with_sources_marked(environment),
-        })
-    }
-}
-
 impl<'a> CpuShader<'a> {
     /// Makes what the method of `prepared` looks up, as the device has it.
     ///
     /// # Errors
     /// A shader that cannot be read.
-    pub fn new(prepared: &'a Prepared) -> Result<Self> {
-        let shader = prepared.method.shader()?;
-        let environment = &prepared.environment;
-        let is_blurred = shader.declares("irradiance_map")?;
-        let pyramid = (shader.declares("environment_pyramid")? && !is_blurred).then(|| environment.box_filtered());
-        let map = (shader.declares("environment_map")? && !is_blurred).then(|| LightMap::new(environment));
-        let aliases = map.as_ref().filter(|_| shader.declares("LightAliases").unwrap_or(false));
-        let mut twin = Self {
-            prepared,
-            pyramid,
-            blurred: is_blurred.then(|| BlurredLight::new(environment)).transpose()?,
-            aliases: aliases.map(LightMap::aliases).unwrap_or_default(),
-            map,
-            slices: vec![],
-            lobe_widths: prepared.materials.iter().map(|material| half_vector_width(&material.brdf) as f32).collect(),
+    pub fn new(prepared: &'a Prepared, round: &Round) -> Result<Self> {
+        let Prepared { method, environment, materials, .. } = prepared;
+        let lookups = method.lookups();
+        let light = light(round, None, *method, environment, &prepared.shaded())?;
+        let map = match lookups {
+            Lookups { blurred: true, .. } => Some(LightMap::with_sources_marked(environment)),
+            Lookups { map: true, .. } => Some(LightMap::new(environment)),
+            _ => None,
         };
-        if shader.declares("Slices")? {
-            twin.slices = prepared.materials.iter().map(|material| SliceTable::new(&material.brdf)).collect();
-        }
-        Ok(twin)
+        let slices = lookups.slices.then(|| materials.iter().map(|material| SliceTable::new(&material.brdf)).collect());
+        Ok(Self {
+            prepared,
+            light,
+            aliases: map.as_ref().filter(|_| lookups.aliases).map(LightMap::aliases).unwrap_or_default(),
+            map,
+            slices: slices.unwrap_or_default(),
+            lobe_widths: materials.iter().map(|material| half_vector_width(&material.brdf) as f32).collect(),
+        })
     }
 
     /// Linear radiance times coverage, and coverage, of the pixel that sees `texels`: its sub-pixels, row by row.
@@ -258,7 +238,7 @@ impl Point<'_> {
 
     /// The pyramid's mean radiance over `solid_angle` (sr) around `direction`.
     fn filtered_radiance(&self, direction: Vec3, solid_angle: f32) -> Vec3 {
-        let pyramid = self.twin.pyramid.expect("the method declares the pyramid");
+        let pyramid = self.twin.light.box_filtered.as_ref().expect("the method looks the pyramid up");
         pyramid.lookup(direction, pyramid.level_of(solid_angle, direction))
     }
 

@@ -4,10 +4,11 @@ use std::f64::consts::PI;
 use glam::DVec3;
 use rayon::prelude::*;
 
+use super::MIN_COS;
 use super::cones::Cones;
 use super::slice::Slice;
-use super::{MIN_COS, Observer};
 use crate::error::{Error, Result};
+use crate::progress::Observer;
 
 /// Equation (9): strength of the force at x = distance / sum of the cones' radii.
 pub fn strength(x: f64) -> f64 {

@@ -5,10 +5,11 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::slice::{Slice, fibonacci_lattice};
-use super::{MIN_COS, Observer, Sample, ThreadSettings, ThreadTable, theta_o};
+use super::{MIN_COS, Sample, ThreadSettings, ThreadTable, theta_o};
 use super::{forces, peaks, smoothing};
 use crate::brdf::Brdf;
 use crate::error::{Error, Result};
+use crate::progress::Observer;
 
 /// Most steps along the forces in a row; with 50 or 200 pictures came out no nearer to their references, only later.
 const ITERATIONS: usize = 25;

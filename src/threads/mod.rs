@@ -16,8 +16,8 @@ use glam::{DVec3, dvec3};
 
 use crate::brdf::{Brdf, luminance};
 use crate::error::{Error, Result};
+use crate::progress::Observer;
 
-mod cache;
 pub mod cones;
 mod file;
 pub mod fitted;
@@ -31,7 +31,6 @@ pub mod smoothing;
 #[cfg(test)]
 pub(crate) mod test_materials;
 
-pub use cache::{CacheState, default_directory, load_or_generate};
 pub use file::{FORMAT_VERSION, read, write};
 pub use fitted::FittedTable;
 pub use plot::plot;
@@ -191,22 +190,6 @@ impl ThreadSettings {
             return Err(Error::input("rows", "0 is not possible", "use at least 1; the paper uses 90"));
         }
         Ok(())
-    }
-}
-
-/// Watches a long computation and can end it.
-pub trait Observer: Sync {
-    /// `done` of `total` rows are finished.
-    fn progress(&self, done: usize, total: usize);
-    /// True ends the computation with [`Error::Cancelled`].
-    fn cancelled(&self) -> bool;
-}
-
-/// Neither watches nor cancels.
-impl Observer for () {
-    fn progress(&self, _done: usize, _total: usize) {}
-    fn cancelled(&self) -> bool {
-        false
     }
 }
 

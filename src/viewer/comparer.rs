@@ -1,10 +1,12 @@
 //! When the other picture of a comparison is made: begins anew when the view changes, waits while it moves.
-use std::path::Path;
 use std::sync::Arc;
 
 use super::comparison::{Compared, Other, Wipe, compare_with};
 use super::latest_job::{LatestJob, Progress};
+use super::loaded::Loaded;
+use crate::memo::{Key, Memo};
 use crate::prepare::{Prepared, view_of};
+use crate::progress::Observer;
 use crate::scene::Scene;
 use crate::vulkan::Device;
 use crate::{Error, Result};
@@ -19,7 +21,7 @@ pub struct Comparer {
     pub shows_heat_map: bool,
     jobs: LatestJob<Compared>,
     /// What was compared last, or is.
-    begun: Option<(Scene, Other)>,
+    begun: Option<(Option<Key>, Scene, Other)>,
     compared: Option<Arc<Compared>>,
 }
 
@@ -71,32 +73,34 @@ impl Comparer {
         Ok(is_new)
     }
 
-    /// Begins anew if what is `shown` (all of which `prepared` has loaded) is not what was compared; not while it `is_moving`.
+    /// Begins anew if what is `shown` (all of which has been `loaded`) is not what was compared; not while it `is_moving`.
     ///
     /// # Errors
     /// Objects that no camera can frame.
     pub fn update(
         &mut self,
         shown: &Scene,
-        prepared: &Prepared,
+        loaded: &Loaded,
         device: &Arc<Device>,
-        cache: Option<&Path>,
+        memo: &Arc<Memo>,
         is_moving: bool,
     ) -> Result<()> {
-        let wanted = self.other.clone().map(|other| (shown.clone(), other));
+        let wanted = self.other.clone().map(|other| (loaded.key, shown.clone(), other));
         if self.begun.is_some() && (self.begun != wanted || is_moving) {
             self.jobs.cancel();
             (self.begun, self.compared) = (None, None);
         }
-        let Some((scene, other)) = wanted.clone().filter(|_| self.begun.is_none() && !is_moving) else { return Ok(()) };
-        let view = view_of(&scene, prepared.bounding_sphere())?;
-        let prepared = Prepared { scene, view, ..prepared.clone() };
-        let (device, cache) = (device.clone(), cache.map(Path::to_owned));
+        let Some((_, scene, other)) = wanted.clone().filter(|_| self.begun.is_none() && !is_moving) else {
+            return Ok(());
+        };
+        let view = view_of(&scene, loaded.prepared.bounding_sphere())?;
+        let prepared = Prepared { scene, view, ..(*loaded.prepared).clone() };
+        let (device, memo) = (device.clone(), memo.clone());
         self.begun = wanted;
         self.jobs.request(move |task| {
             task.begin("comparison");
             let mut last = None;
-            compare_with(&prepared, &other, &device, cache.as_deref(), task, &mut |compared| {
+            compare_with(&prepared, &other, &device, &memo, task, &mut |compared| {
                 // The last one is what the work returns.
                 if let Some(before) = last.replace(compared) {
                     task.publish(before);

@@ -2,7 +2,6 @@
 //!
 //! The other picture is made in the background, so that the frame stays what it is: by another method or number of threads, or as the
 //! reference, stage by stage.
-use std::path::Path;
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
@@ -11,13 +10,13 @@ use crate::error::Result;
 use crate::evaluate::difference::heat_map;
 use crate::evaluate::reference::{Estimate, ReferenceImage, STAGES, progressive, tone_map};
 use crate::evaluate::{Comparable, Display, Metrics, compare};
+use crate::memo::{Memo, Round};
 use crate::method::Method;
-use crate::passes::filter_environment;
 use crate::pipeline::{Renderer, Wanted, render_geometry};
-use crate::prepare::{Prepared, prepare_again};
+use crate::prepare::{Prepared, prepare};
+use crate::progress::Observer;
 use crate::scene::{Scene, ShadingSettings};
-use crate::threads::Observer;
-use crate::vulkan::{Device, PipelineCache};
+use crate::vulkan::Device;
 
 /// Where the line between two pictures is: to its left the one, to its right the other.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -83,21 +82,22 @@ pub fn compare_with(
     prepared: &Prepared,
     other: &Other,
     device: &Arc<Device>,
-    cache: Option<&Path>,
+    memo: &Memo,
     observer: &dyn Observer,
     publish: &mut dyn FnMut(Compared),
 ) -> Result<()> {
-    let own = render(prepared, device, cache, observer)?;
+    let round = &memo.round(observer);
+    let own = render(prepared, device, round)?;
     match other {
         Other::Shading(shading) => {
             let scene = Scene { shading: shading.clone(), ..prepared.scene.clone() };
-            let other = prepare_again(&scene, Some(prepared), cache, observer)?;
-            let radiance = render(&other, device, cache, observer)?;
+            let other = prepare(&scene, round)?;
+            let radiance = render(&other, device, round)?;
             let name = name_of(&other);
             publish(compared(prepared, name, &own, radiance, 1, None));
         }
         Other::Reference => {
-            let geometry = render_geometry(device, cache, prepared)?;
+            let geometry = render_geometry(device, prepared, round)?;
             progressive(prepared, &geometry, STAGES, observer, &mut |estimate| {
                 let Estimate { stage, radiance, error_estimate } = estimate;
                 let name = Method::Reference.name().to_owned();
@@ -109,15 +109,9 @@ pub fn compare_with(
 }
 
 /// Linear radiance times coverage of the objects alone, and coverage.
-fn render(
-    prepared: &Prepared,
-    device: &Arc<Device>,
-    cache: Option<&Path>,
-    observer: &dyn Observer,
-) -> Result<Vec<[f32; 4]>> {
-    let pipelines = PipelineCache::new(device, cache)?;
-    filter_environment(device, &pipelines, cache, prepared.method, &prepared.environment, observer)?;
-    let renderer = Renderer::of_objects(device, cache, prepared, prepared.method, prepared.sampling)?;
+fn render(prepared: &Prepared, device: &Arc<Device>, round: &Round) -> Result<Vec<[f32; 4]>> {
+    let objects = Prepared { show_environment: false, ..prepared.clone() };
+    let renderer = Renderer::new(device, &objects, round)?;
     Ok(renderer.render(Wanted { radiance: true, ..Wanted::default() }, 1)?.radiance)
 }
 

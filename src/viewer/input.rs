@@ -30,9 +30,9 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
+use super::change::Change;
 use super::comparison::Other;
 use super::orbit;
-use super::session::Change;
 use crate::error::{Error, Result};
 use crate::scene::{MaterialSource, Source};
 

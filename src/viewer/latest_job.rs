@@ -6,7 +6,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use crate::error::{Error, Result};
-use crate::threads::Observer;
+use crate::progress::Observer;
 
 /// Progress wakes the event loop this often at most: a bar is no smoother for more.
 const WAKE_INTERVAL: Duration = Duration::from_millis(40);
@@ -196,11 +196,6 @@ impl<T: Send> Task<T> {
         (self.shared.wake)();
     }
 
-    /// Says what is being done from now on.
-    pub fn begin(&self, what: &str) {
-        self.report(|progress| *progress = Progress { what: what.to_owned(), done: 0, total: 0 });
-    }
-
     fn report(&self, change: impl FnOnce(&mut Progress)) {
         let mut state = self.shared.lock();
         if self.cancelled() {
@@ -219,6 +214,10 @@ impl<T: Send> Task<T> {
 }
 
 impl<T: Send> Observer for Task<T> {
+    fn begin(&self, what: &str) {
+        self.report(|progress| *progress = Progress { what: what.to_owned(), done: 0, total: 0 });
+    }
+
     fn progress(&self, done: usize, total: usize) {
         self.report(|progress| (progress.done, progress.total) = (done, total));
     }

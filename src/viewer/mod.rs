@@ -4,22 +4,26 @@
 //! |---|---|---|
 //! | what the user does, as data | [`input`] | pure |
 //! | the camera's orbit | [`orbit`] | pure |
-//! | the scene being edited, and what a change asks for | [`session`] | pure |
-//! | how coarse a moving picture is | [`pace`] | pure |
-//! | loading and making in the background | [`jobs`] | threads |
+//! | what can be changed of a scene | [`change`] | pure |
+//! | the scene that is asked for, and the one that is seen | [`session`] | pure |
+//! | how coarse a moving picture is | [`dynamic_resolution`] | pure |
+//! | loading and making in the background | [`latest_job`] | threads |
 //! | another picture of the same view, and the difference | [`comparison`] | |
 //! | when that is made anew | [`comparer`] | |
 //! | the threads of what is under the cursor | [`threads_seen`] | egui |
-//! | what inputs do, and the frames that follow | [`viewer`] | |
+//! | what inputs do, and the frames that follow | [`interaction`] | |
 //! | what is shown and set beside the picture | `panel` | egui |
-//! | frames into the window | [`stage`] | Vulkan, by the frame graph |
+//! | frames into the window | [`presenter`] | Vulkan, by the frame graph |
 //! | the window | `window` | winit |
 
+pub mod change;
 pub mod comparer;
 pub mod comparison;
 pub mod dynamic_resolution;
 pub mod input;
+pub mod interaction;
 pub mod latest_job;
+pub mod loaded;
 pub mod orbit;
 mod panel;
 pub mod presenter;
@@ -27,7 +31,6 @@ pub mod session;
 #[cfg(feature = "hot-reload")]
 mod shader_watch;
 pub mod threads_seen;
-pub mod viewer;
 mod window;
 
 use crate::scene::Scene;

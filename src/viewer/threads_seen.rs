@@ -173,7 +173,7 @@ mod tests {
         scene.shading.threads = Some(4);
         scene.environment.source = Source::Builtin("white".into());
         scene.environment.rotation_deg = 90.0;
-        prepare(&scene, None, &()).unwrap()
+        prepare(&scene, &crate::memo::Memo::default().round(&())).unwrap()
     }
 
     #[test]

@@ -1,9 +1,10 @@
 //! The window: what winit tells becomes inputs, and frames are drawn when there is something new.
 use super::input::{Button, Drag, Input, Scroll};
+use super::interaction::Viewer;
 use super::panel::{self, Panel};
 use super::presenter::Presenter;
-use super::viewer::Viewer;
 use super::{ViewerSettings, failed};
+use crate::memo::Memo;
 use crate::output;
 use crate::passes::Area;
 use crate::vulkan::{Device, Instance, Messages, Surface, UiFrame};
@@ -108,7 +109,7 @@ impl App {
             Some(device.limits().max_image_dimension2_d as usize),
         );
         let proxy = self.proxy.clone();
-        let viewer = Viewer::new(scene.clone(), &device, cache.clone(), move || {
+        let viewer = Viewer::new(scene.clone(), &device, Memo::new(cache.as_deref()), move || {
             // A loop that has ended needs no waking.
             let _ = proxy.send_event(Wake);
         });

@@ -55,7 +55,8 @@ pub(super) struct Interface {
 }
 
 impl Shader {
-    pub(super) fn words(&self) -> Vec<u32> {
+    /// Its SPIR-V.
+    pub(crate) fn words(&self) -> Vec<u32> {
         #[cfg(feature = "hot-reload")]
         if let Some(words) = super::hot_reload::words_of(self.name) {
             return words;

@@ -3,6 +3,7 @@
 use glam::UVec2;
 use std::path::PathBuf;
 use std::sync::Arc;
+use threadlight::memo::{Memo, Round};
 use threadlight::pipeline::{Renderer, Rendering, Wanted};
 use threadlight::prepare::{Prepared, prepare};
 use threadlight::scene::{MaterialSettings, MaterialSource, Scene, Source};
@@ -11,6 +12,8 @@ use threadlight::vulkan::{Device, Instance, Messages};
 /// A device with validation on; `finish` fails the test if validation said anything, from first call to last.
 pub struct Validated {
     pub device: Arc<Device>,
+    /// In memory only.
+    pub memo: Memo,
     messages: Messages,
 }
 
@@ -19,15 +22,23 @@ impl Validated {
         let instance = Instance::new(true).expect("an instance with validation");
         let wanted = std::env::var("THREADLIGHT_TEST_DEVICE").ok();
         let device = Device::new(&instance, wanted.as_deref()).expect("a device");
-        Self { device, messages: instance.messages() }
+        Self { device, memo: Memo::default(), messages: instance.messages() }
     }
 
     pub fn render(&self, prepared: &Prepared, wanted: Wanted) -> Rendering {
-        Renderer::new(&self.device, None, prepared).expect("a renderer").render(wanted, 1).expect("a rendering")
+        self.renderer(prepared).render(wanted, 1).expect("a rendering")
+    }
+
+    pub fn renderer(&self, prepared: &Prepared) -> Renderer {
+        Renderer::new(&self.device, prepared, &self.round()).expect("a renderer")
+    }
+
+    pub fn round(&self) -> Round<'_> {
+        self.memo.round(&())
     }
 
     pub fn finish(self) {
-        let Self { device, messages } = self;
+        let Self { device, messages, .. } = self;
         assert_eq!(Arc::strong_count(&device), 1, "something still holds the device");
         drop(device);
         assert_eq!(messages.all(), Vec::<String>::new());
@@ -65,7 +76,7 @@ pub fn sphere(material: MaterialSource, environment: &str, threads: u32, (width,
 }
 
 pub fn ready(scene: &Scene) -> Prepared {
-    prepare(scene, None, &()).expect("a scene that can be prepared")
+    prepare(scene, &Memo::default().round(&())).expect("a scene that can be prepared")
 }
 
 /// A material given by its model and parameters in TOML.

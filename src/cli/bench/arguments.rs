@@ -8,11 +8,13 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use threadlight::evaluate::reference::{Processor, ReferenceSettings};
 use threadlight::evaluate::sweep::Measured;
-use threadlight::evaluate::{Cases, Sweep, cases::OnlyCancels, reference_picture, sweep};
+use threadlight::evaluate::{Cases, Sweep, reference_picture, sweep};
+use threadlight::memo::{Memo, Round};
 use threadlight::method::Method;
 use threadlight::output;
+use threadlight::progress::Observer;
 use threadlight::scene::{MAX_SUBPIXELS, MaterialSource, ObjectSettings, Scene, Source, mesh};
-use threadlight::threads::{MAX_COUNT, Observer};
+use threadlight::threads::MAX_COUNT;
 use threadlight::vulkan::{Device, Instance};
 use threadlight::{Error, Result, environment};
 
@@ -91,8 +93,12 @@ impl CasesArguments {
                 .map(|(name, text)| Ok((name, self.scene_of(text, size)?)))
                 .collect::<Result<_>>()?,
             seed: self.seed,
-            cache: cache_folder(self.no_cache),
         })
+    }
+
+    /// What measurements ask for what they need.
+    pub fn memo(&self) -> Memo {
+        Memo::new(cache_folder(self.no_cache).as_deref())
     }
 
     /// The scene that `text` names: a scene file, or a mesh in the built-in scene.
@@ -156,17 +162,16 @@ impl TruthArguments {
         tolerance: f64,
         sweep: &Sweep,
         device: &Arc<Device>,
+        memo: &Memo,
         observer: &dyn Observer,
         measured: &mut Measured,
     ) -> Result<()> {
-        let inner = OnlyCancels(observer);
         let settings = ReferenceSettings {
             tolerance: self.reference_tolerance.unwrap_or(tolerance.max(self.reference_on.default_tolerance())),
             processor: self.reference_on,
-            cache: sweep.cases.cache.clone(),
         };
-        let reference = |prepared: &_| reference_picture(prepared, device, &settings, &inner);
-        sweep::run(sweep, device, &reference, observer, measured)
+        let reference = |prepared: &_, round: &Round| reference_picture(prepared, device, &settings, round);
+        sweep::run(sweep, device, memo, &reference, observer, measured)
     }
 }
 

@@ -73,9 +73,10 @@ impl BenchError {
             keep_pictures: false,
         };
         let device = self.cases.open_device()?;
+        let memo = self.cases.memo();
         let progress = TerminalProgress::of("bench error", "pictures")?;
         let mut measured = Measured::default();
-        let result = self.truth.sweep(reference::TOLERANCE, &sweep, &device, &progress, &mut measured);
+        let result = self.truth.sweep(reference::TOLERANCE, &sweep, &device, &memo, &progress, &mut measured);
         progress.finish();
         // What took hours is not thrown away because it was interrupted; bad input leaves no files behind.
         if !matches!(result, Err(Error::Input { .. })) && !measured.rows.is_empty() {

@@ -10,6 +10,7 @@ use threadlight::evaluate::sweep::Measured;
 use threadlight::evaluate::{Cases, Estimator, Sweep, tables};
 use threadlight::method::Method;
 use threadlight::output;
+use threadlight::progress::Observer;
 use threadlight::scene::MaterialSource;
 use threadlight::threads::MAX_COUNT;
 use threadlight::{Error, Result};
@@ -74,13 +75,14 @@ impl BenchGallery {
             keep_pictures: true,
         };
 
-        sweep.cases.check_materials()?;
+        let memo = self.cases.memo();
+        sweep.cases.check_materials(&memo)?;
         let device = self.cases.open_device()?;
         let progress = TerminalProgress::of("materials", "pictures")?;
-        let mut sheets = gallery::material_sheets(&materials, estimator, &device, &progress)?;
-        progress.restart("methods");
+        let mut sheets = gallery::material_sheets(&materials, estimator, &device, &memo, &progress)?;
+        progress.begin("methods");
         let mut measured = Measured::default();
-        self.truth.sweep(QUICK_TOLERANCE, &sweep, &device, &progress, &mut measured)?;
+        self.truth.sweep(QUICK_TOLERANCE, &sweep, &device, &memo, &progress, &mut measured)?;
         progress.finish();
         sheets.extend(gallery::comparison_sheets(&measured));
         write_pictures(&sheets, folder)?;

@@ -11,6 +11,7 @@ use threadlight::evaluate::sweep::Measured;
 use threadlight::evaluate::{Cases, Estimator, Row, Sweep, gallery};
 use threadlight::method::Method;
 use threadlight::output;
+use threadlight::progress::Observer;
 use threadlight::scene::MaterialSource;
 use threadlight::threads::MAX_COUNT;
 use threadlight::vulkan::Device;
@@ -81,14 +82,15 @@ impl BenchReport {
         let estimator = Estimator { method, count: highest };
 
         let device = self.cases.open_device()?;
+        let memo = self.cases.memo();
         let progress = TerminalProgress::of("errors", "done")?;
         let mut measured = Measured::default();
-        self.truth.sweep(QUICK_TOLERANCE, &sweep, &device, &progress, &mut measured)?;
+        self.truth.sweep(QUICK_TOLERANCE, &sweep, &device, &memo, &progress, &mut measured)?;
         let mut report = Report { facts: facts(&device), ..Report::default() };
-        progress.restart("times");
-        speed::run(&speed, &device, &progress, &mut report.timings)?;
-        progress.restart("materials");
-        let sheets = gallery::material_sheets(&shown, estimator, &device, &progress)?;
+        progress.begin("times");
+        speed::run(&speed, &device, &memo, &progress, &mut report.timings)?;
+        progress.begin("materials");
+        let sheets = gallery::material_sheets(&shown, estimator, &device, &memo, &progress)?;
         progress.finish();
         let light = format!("{}, {}", shown.environments[0].0, shown.scenes[0].0);
         let caption = format!("{light}; method {}, {highest} threads or samples", estimator.method.name());

@@ -65,9 +65,10 @@ impl BenchSpeed {
         })?;
         let speed = Speed { cases, threads: self.threads, repeat: self.repeat };
         let device = self.cases.open_device()?;
+        let memo = self.cases.memo();
         let progress = TerminalProgress::of("bench speed", "frames")?;
         let mut timings = Timings::default();
-        let result = speed::run(&speed, &device, &progress, &mut timings);
+        let result = speed::run(&speed, &device, &memo, &progress, &mut timings);
         progress.finish();
         if !matches!(result, Err(Error::Input { .. })) && !timings.frames.is_empty() {
             let mut sections = tables::frame_tables(&timings);

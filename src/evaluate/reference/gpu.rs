@@ -1,5 +1,4 @@
 //! The reference on the GPU: means of frames that are shaded by method `mis`, each with other points.
-use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -8,11 +7,11 @@ use glam::{DVec3, Vec4};
 use super::{Display, ReferenceImage, rms};
 use crate::Result;
 use crate::error::Error;
+use crate::memo::Round;
 use crate::method::Method;
 use crate::passes::Sampling;
 use crate::pipeline::{Renderer, Wanted};
 use crate::prepare::Prepared;
-use crate::threads::Observer;
 use crate::vulkan::Device;
 
 /// Samples of a frame: with 4 x 4 sub-pixels half of the 65535 iterations after which lavapipe leaves loops. Points of one frame
@@ -26,13 +25,13 @@ const MOST_FRAMES: u32 = 1024;
 pub fn reference_on_gpu(
     prepared: &Prepared,
     device: &Arc<Device>,
-    cache: Option<&Path>,
     tolerance: f64,
-    observer: &dyn Observer,
+    round: &Round,
 ) -> Result<ReferenceImage> {
     let start = Instant::now();
     let sampling = Sampling { count: FRAME_SAMPLES, seed: 0 };
-    let mut renderer = Renderer::of_objects(device, cache, prepared, Method::Mis, sampling)?;
+    let objects = Prepared { method: Method::Mis, sampling, show_environment: false, ..prepared.clone() };
+    let (mut renderer, observer) = (Renderer::new(device, &objects, round)?, round.observer());
     let display = Display::of(&prepared.view);
     let mut evaluations = 0;
     let mut sums: Vec<Sums> = Vec::new();

@@ -6,7 +6,7 @@ use super::light::{CellPlace, Light};
 use crate::brdf::{Brdf, MIN_COS_THETA_D, lobe_radius};
 use crate::environment::Environment;
 use crate::evaluate::metrics::Display;
-use crate::threads::Observer;
+use crate::progress::Observer;
 use crate::{Error, Result};
 
 /// A pixel gives up at so many cells.

@@ -9,7 +9,6 @@
 //!
 //! [`Environment::radiance`]: crate::environment::Environment::radiance
 //! [`Brdf::evaluate`]: crate::brdf::Brdf::evaluate
-use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::time::Instant;
@@ -18,20 +17,21 @@ use glam::{DMat3, DVec3, UVec2, dvec3};
 use rayon::prelude::*;
 
 use crate::evaluate::metrics::Display;
+use crate::memo::{Origin, Round, Step};
 use crate::passes::View;
 use crate::pipeline::render_geometry;
 use crate::prepare::Prepared;
+use crate::progress::Observer;
 use crate::shading::{display_value, unpack_geometry};
-use crate::threads::Observer;
 use crate::vulkan::Device;
 use crate::{Error, Result};
 
-mod cache;
 mod cubature;
 mod gpu;
 mod integrator;
 mod light;
 mod progressive;
+mod step;
 #[cfg(test)]
 mod tests;
 
@@ -71,13 +71,11 @@ pub struct ReferenceSettings {
     pub tolerance: f64,
     /// Where to make it.
     pub processor: Processor,
-    /// Folder to keep results in, and to take them from.
-    pub cache: Option<PathBuf>,
 }
 
 impl Default for ReferenceSettings {
     fn default() -> Self {
-        Self { tolerance: TOLERANCE, processor: Processor::Cpu, cache: None }
+        Self { tolerance: TOLERANCE, processor: Processor::Cpu }
     }
 }
 
@@ -138,7 +136,7 @@ fn to_environment(view: &View) -> DMat3 {
     DMat3::from_rotation_y(-view.rotation_deg.to_radians())
 }
 
-/// The reference of `prepared`, for the geometry that `device` rasterises. `observer` hears of rows of pixels, or of frames.
+/// The reference of `prepared`, for the geometry that `device` rasterises. The observer of `round` hears of rows of pixels, or of frames.
 ///
 /// # Errors
 /// Whatever Vulkan refuses; a tolerance that is not positive; cancelled.
@@ -146,29 +144,20 @@ pub fn reference(
     prepared: &Prepared,
     device: &Arc<Device>,
     settings: &ReferenceSettings,
-    observer: &dyn Observer,
+    round: &Round,
 ) -> Result<ReferenceImage> {
     if !(settings.tolerance > 0.0 && settings.tolerance.is_finite()) {
         let problem = format!("is {}", settings.tolerance);
         return Err(Error::input("tolerance", problem, format!("use a positive number, such as {TOLERANCE}")));
     }
     if settings.processor == Processor::Gpu {
-        return gpu::reference_on_gpu(prepared, device, settings.cache.as_deref(), settings.tolerance, observer);
+        return gpu::reference_on_gpu(prepared, device, settings.tolerance, round);
     }
     let start = Instant::now();
-    let geometry = render_geometry(device, settings.cache.as_deref(), prepared)?;
-    let key = cache::key(prepared, &geometry, settings.tolerance);
-    if let Some(image) = settings.cache.as_deref().and_then(|folder| cache::read(folder, &key, &prepared.view)) {
-        return Ok(ReferenceImage { seconds: start.elapsed().as_secs_f64(), cached: true, ..image });
-    }
-    let brdfs = prepared.materials.iter().map(|material| &material.brdf);
-    let integrator = Integrator::new(&prepared.environment, prepared.view.intensity, brdfs, prepared.view.subpixels);
-    let image = integrator.image(&prepared.view, &geometry, settings.tolerance, observer)?;
-    let image = ReferenceImage { seconds: start.elapsed().as_secs_f64(), ..image };
-    if let Some(folder) = &settings.cache {
-        cache::write(folder, &key, &prepared.view, &image);
-    }
-    Ok(image)
+    let geometry = render_geometry(device, prepared, round)?;
+    let image = round.ask(&step::Integrate { prepared, geometry: &geometry, tolerance: settings.tolerance })?;
+    let cached = round.asked(step::Integrate::NAME).last().is_some_and(|asked| asked.origin != Origin::Made);
+    Ok(ReferenceImage { seconds: start.elapsed().as_secs_f64(), cached, ..(*image).clone() })
 }
 
 /// A pixel that sees a surface.

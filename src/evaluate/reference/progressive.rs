@@ -5,7 +5,7 @@ use super::{Integrator, rms};
 use crate::error::Result;
 use crate::passes::View;
 use crate::prepare::Prepared;
-use crate::threads::Observer;
+use crate::progress::Observer;
 
 /// A step on the way.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,7 +56,7 @@ pub fn progressive(
     observer: &dyn Observer,
     publish: &mut dyn FnMut(Estimate),
 ) -> Result<()> {
-    let brdfs = prepared.materials.iter().map(|material| &material.brdf);
+    let brdfs = prepared.materials.iter().map(|material| &*material.brdf);
     let integrator = Integrator::new(&prepared.environment, prepared.view.intensity, brdfs, prepared.view.subpixels);
     let view = &prepared.view;
     let (width, height) = (view.width as usize, view.height as usize);

@@ -10,8 +10,9 @@ use super::solve::{Effort, Fit, Kernel};
 use super::table::FittedTable;
 use crate::brdf::Brdf;
 use crate::error::{Error, Result};
+use crate::progress::Observer;
 use crate::threads::slice::Slice;
-use crate::threads::{Observer, ThreadSettings, theta_o};
+use crate::threads::{ThreadSettings, theta_o};
 
 /// Steps of the first row, which starts from cells, and of the others.
 const FIRST: Effort = Effort { steps: 300, least_gain: 1e-5 };

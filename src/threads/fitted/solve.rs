@@ -5,7 +5,7 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 use super::kernel::{Pair, SHARPEST_LEVEL, WIDEST_LEVEL, kappa_of_level, overlap, scale_rad};
 use super::lights::{Light, SCALES, TestLights, light_kappa};
 use crate::error::{Error, Result};
-use crate::threads::Observer;
+use crate::progress::Observer;
 
 /// A thread in one row: a kernel of the environment's pyramid, and the radiance it gives under light of radiance 1.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -8,8 +8,9 @@ use super::solve::Kernel;
 use super::{FittedTable, MAX_COUNT, PackedKernel, generate};
 use crate::brdf::Brdf;
 use crate::error::Error;
+use crate::progress::Observer;
 use crate::threads::slice::{Slice, fibonacci_lattice};
-use crate::threads::{Observer, ThreadKind, ThreadSettings, Threads, read, test_materials, theta_o, write};
+use crate::threads::{ThreadKind, ThreadSettings, Threads, read, test_materials, theta_o, write};
 
 fn small(count: usize, rows: usize) -> ThreadSettings {
     ThreadSettings { kind: ThreadKind::Fitted, count, rows, seed: 0 }

@@ -5,7 +5,7 @@ use crate::passes::Area;
 use crate::scene::{MAX_SAMPLES, ShadingSettings};
 use crate::viewer::comparison::{Compared, Other, Wipe};
 use crate::viewer::input::Input;
-use crate::viewer::viewer::Viewer;
+use crate::viewer::interaction::Viewer;
 use egui::{
     Align2, Color32, ColorImage, ComboBox, Context, CursorIcon, DragValue, FontId, Id, LayerId, Order, ProgressBar,
     Rect, Sense, Stroke, TextureHandle, TextureOptions, Ui, pos2, vec2,

@@ -1,9 +1,9 @@
 //! How radiance becomes display values, and what is seen behind the objects.
 use super::{group, on_change};
 use crate::scene::Background;
+use crate::viewer::change::Change;
 use crate::viewer::input::Input;
-use crate::viewer::session::Change;
-use crate::viewer::viewer::Viewer;
+use crate::viewer::interaction::Viewer;
 use egui::Ui;
 
 pub fn show(ui: &mut Ui, viewer: &Viewer, inputs: &mut Vec<Input>) {

@@ -2,9 +2,9 @@
 use super::{group, on_change, source};
 use crate::environment;
 use crate::scene::Source;
+use crate::viewer::change::Change;
 use crate::viewer::input::Input;
-use crate::viewer::session::Change;
-use crate::viewer::viewer::Viewer;
+use crate::viewer::interaction::Viewer;
 use egui::Ui;
 
 #[derive(Default)]

@@ -2,9 +2,9 @@
 use super::{group, on_change, source};
 use crate::brdf::Brdf;
 use crate::scene::{MaterialSettings, MaterialSource};
+use crate::viewer::change::{Change, model_of};
 use crate::viewer::input::Input;
-use crate::viewer::session::{Change, model_of};
-use crate::viewer::viewer::Viewer;
+use crate::viewer::interaction::Viewer;
 use egui::Ui;
 
 #[derive(Default)]

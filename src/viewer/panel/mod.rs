@@ -9,9 +9,9 @@ mod shading;
 mod statistics;
 mod threads;
 
+use super::change::Change;
 use super::input::Input;
-use super::session::Change;
-use super::viewer::Viewer;
+use super::interaction::Viewer;
 use egui::{Align2, Color32, Context, Frame, RichText, ScrollArea, SidePanel, Ui};
 
 /// Width of the panel in points.

@@ -1,9 +1,9 @@
 //! Which mesh.
 use super::{group, source};
 use crate::scene::{Source, mesh};
+use crate::viewer::change::Change;
 use crate::viewer::input::Input;
-use crate::viewer::session::Change;
-use crate::viewer::viewer::Viewer;
+use crate::viewer::interaction::Viewer;
 use egui::Ui;
 
 #[derive(Default)]

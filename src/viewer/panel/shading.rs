@@ -2,9 +2,9 @@
 use super::{group, on_change};
 use crate::method::Method;
 use crate::scene::{MAX_SAMPLES, MAX_SUBPIXELS};
+use crate::viewer::change::Change;
 use crate::viewer::input::Input;
-use crate::viewer::session::Change;
-use crate::viewer::viewer::Viewer;
+use crate::viewer::interaction::Viewer;
 use egui::Ui;
 
 pub fn show(ui: &mut Ui, viewer: &Viewer, inputs: &mut Vec<Input>) {

@@ -1,6 +1,6 @@
 //! What frames cost: time by pass, lookups, memory; and on what.
 use super::group;
-use crate::viewer::viewer::Viewer;
+use crate::viewer::interaction::Viewer;
 use egui::{Color32, Rect, Sense, Ui, vec2};
 
 pub fn show(ui: &mut Ui, viewer: &Viewer) {

@@ -1,18 +1,17 @@
 //! The threads of the material under the cursor, and where in the environment they look.
 use super::comparison::on_screen;
 use super::group;
-use crate::environment::Environment;
 use crate::evaluate::Display;
+use crate::memo::Key;
+use crate::viewer::interaction::Viewer;
 use crate::viewer::threads_seen::{self, Surface, in_picture};
-use crate::viewer::viewer::Viewer;
 use egui::{TextureHandle, TextureOptions, Ui};
 use std::path::Path;
-use std::sync::Arc;
 
 /// The environment's thumbnail as it was last uploaded, with its environment, intensity and display.
 #[derive(Default)]
 pub struct State {
-    thumbnail: Option<(Arc<Environment>, f64, Display, TextureHandle)>,
+    thumbnail: Option<(Key, f64, Display, TextureHandle)>,
 }
 
 impl State {
@@ -42,13 +41,13 @@ impl State {
             let image = &viewer.session.shown().image;
             let intensity = viewer.session.shown().environment.intensity;
             let display = Display { exposure: image.exposure, gamma: image.gamma };
-            let is_good = |(environment, of, shown, _): &(Arc<Environment>, f64, Display, TextureHandle)| {
-                Arc::ptr_eq(environment, &prepared.environment) && (*of, *shown) == (intensity, display)
+            let is_good = |(environment, of, shown, _): &(Key, f64, Display, TextureHandle)| {
+                (*environment, *of, *shown) == (prepared.environment.key, intensity, display)
             };
             if !self.thumbnail.as_ref().is_some_and(is_good) {
                 let picture = threads_seen::thumbnail(&prepared.environment, intensity, display);
                 let texture = ui.ctx().load_texture("environment", picture, TextureOptions::LINEAR);
-                self.thumbnail = Some((prepared.environment.clone(), intensity, display, texture));
+                self.thumbnail = Some((prepared.environment.key, intensity, display, texture));
             }
             if let Some((.., texture)) = &self.thumbnail {
                 threads_seen::draw_environment(ui, texture.id(), material.threads.as_deref(), surface.as_ref());

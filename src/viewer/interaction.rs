@@ -1,36 +1,30 @@
 //! The viewer: what inputs do to the session, and the frames that follow from it. Knows nothing of the window system.
+use super::change::Change;
 use super::comparer::Comparer;
 use super::comparison::Wipe;
 use super::dynamic_resolution::DynamicResolution;
 use super::input::{DragAction, Dropped, Input, change_of_dropped};
 use super::latest_job::{LatestJob, Progress};
+use super::loaded::Loaded;
 use super::orbit::{Bounds, Orbit, environment_turn_deg};
 use super::presenter::{Drawn, Extras, Presenter, ShownPicture};
-use super::session::{Change, Session};
+use super::session::Session;
+use crate::memo::{Key, Memo};
 use crate::output::{self, Format};
-use crate::passes::{Area, Counters, View, filter_environment};
+use crate::passes::{Area, Counters, View};
 use crate::pipeline::{Renderer, Wanted};
-use crate::prepare::{Prepared, prepare_again, view_of};
+use crate::prepare::{key_of, prepare, view_of};
 use crate::scene::{Background, Scene};
-use crate::vulkan::{Device, PassTime, PipelineCache, UiFrame};
+use crate::vulkan::{Device, PassTime, UiFrame};
 use crate::{Error, Result};
 use egui::TexturesDelta;
 use glam::DVec2;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// A picture is still moving for so long after the last motion: a scroll wheel has no release.
 const SETTLING: Duration = Duration::from_millis(150);
-
-/// All that a scene needs, on the device.
-#[derive(Clone)]
-pub struct Loaded {
-    /// In memory.
-    pub prepared: Arc<Prepared>,
-    /// On the device.
-    pub renderer: Arc<Renderer>,
-}
 
 /// Something to tell the user.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -93,25 +87,20 @@ pub struct Viewer {
     pub cursor: Option<[f64; 2]>,
     loaded: Option<Loaded>,
     loading: LatestJob<Loaded>,
-    /// The scene whose preparation was asked for last, as [`Self::needs`] has it.
-    requested: Option<Scene>,
+    /// What was asked for last.
+    requested: Option<Key>,
     dynamic_resolution: DynamicResolution,
     last_motion: Option<Instant>,
     last_turn: Option<Instant>,
     #[cfg(feature = "hot-reload")]
     shaders: super::shader_watch::ShaderWatch,
     device: Arc<Device>,
-    cache: Option<PathBuf>,
+    memo: Arc<Memo>,
 }
 
 impl Viewer {
     /// A viewer of `scene`, which begins to load. `wake` is called when there is something new to be drawn.
-    pub fn new(
-        scene: Scene,
-        device: &Arc<Device>,
-        cache: Option<PathBuf>,
-        wake: impl Fn() + Send + Sync + 'static,
-    ) -> Self {
+    pub fn new(scene: Scene, device: &Arc<Device>, memo: Memo, wake: impl Fn() + Send + Sync + 'static) -> Self {
         let wake = Arc::new(wake);
         let wake_too = wake.clone();
         #[cfg(feature = "hot-reload")]
@@ -134,7 +123,7 @@ impl Viewer {
             #[cfg(feature = "hot-reload")]
             shaders: super::shader_watch::ShaderWatch::new(move || wake_for_shaders()),
             device: device.clone(),
-            cache,
+            memo: Arc::new(memo),
         };
         viewer.request();
         viewer
@@ -201,6 +190,7 @@ impl Viewer {
                     let mut scene = Scene::load(&path)?;
                     // The window stays as large as it is.
                     (scene.image.width, scene.image.height) = (self.area.width, self.area.height);
+                    scene.files().for_each(|path| self.memo.look_again(path));
                     self.session.replace(scene);
                     self.request();
                     Ok(())
@@ -271,6 +261,9 @@ impl Viewer {
 
     /// Makes a change; what it needs is loaded in the background.
     fn change(&mut self, change: &Change) -> Result<()> {
+        if let Some(path) = change.file() {
+            self.memo.look_again(path);
+        }
         self.session.change(change)?;
         self.request();
         Ok(())
@@ -286,41 +279,21 @@ impl Viewer {
         self.change(&Change::Camera(Some(orbit.camera())))
     }
 
-    /// What of a scene has to be loaded, made or compiled: all but what a frame is given anew each time.
-    fn needs(scene: &Scene) -> Scene {
-        let default = Scene::default();
-        let mut needs = scene.clone();
-        needs.camera = None;
-        let image = needs.image.clone();
-        needs.image =
-            crate::scene::ImageSettings { subpixels: image.subpixels, background: image.background, ..default.image };
-        (needs.environment.rotation_deg, needs.environment.intensity) = (0.0, 1.0);
-        needs
-    }
-
     /// Asks for what is wanted, if that is another than what was asked for last.
     fn request(&mut self) {
         let scene = self.session.wanted().clone();
-        let needs = Self::needs(&scene);
-        if self.requested.as_ref() == Some(&needs) {
+        // Where a file cannot be read there is no key, and asking for it tells why.
+        let key = key_of(&scene, &self.memo).ok();
+        if key.is_some() && self.requested == key {
             return;
         }
-        self.requested = Some(needs);
-        let (before, device, cache) = (self.loaded.clone(), self.device.clone(), self.cache.clone());
+        self.requested = key;
+        let (device, memo) = (self.device.clone(), self.memo.clone());
         self.loading.request(move |task| {
-            task.begin("threads");
-            let known = before.as_ref().map(|before| &*before.prepared);
-            let prepared = prepare_again(&scene, known, cache.as_deref(), task)?;
-            task.begin("environment");
-            let pipelines = PipelineCache::new(&device, cache.as_deref())?;
-            let Prepared { method, environment, .. } = &prepared;
-            filter_environment(&device, &pipelines, cache.as_deref(), *method, environment, task)?;
-            task.begin("upload");
-            let renderer = match &before {
-                Some(Loaded { prepared: known, renderer }) => renderer.again(cache.as_deref(), known, &prepared)?,
-                None => Renderer::new(&device, cache.as_deref(), &prepared)?,
-            };
-            Ok(Loaded { prepared: Arc::new(prepared), renderer: Arc::new(renderer) })
+            let round = memo.round(task);
+            let prepared = prepare(&scene, &round)?;
+            let renderer = Renderer::new(&device, &prepared, &round)?;
+            Ok(Loaded { prepared: Arc::new(prepared), renderer: Arc::new(renderer), key })
         });
     }
 
@@ -328,15 +301,15 @@ impl Viewer {
     #[cfg(feature = "hot-reload")]
     fn reload_shaders(&mut self) {
         let scene = self.session.wanted().clone();
-        self.requested = Some(Self::needs(&scene));
-        let (before, device, cache) = (self.loaded.clone(), self.device.clone(), self.cache.clone());
+        let key = key_of(&scene, &self.memo).ok();
+        self.requested = key;
+        let (device, memo) = (self.device.clone(), self.memo.clone());
         self.loading.request(move |task| {
             task.begin("shaders");
-            let known = before.as_ref().map(|before| &*before.prepared);
-            let prepared = prepare_again(&scene, known, cache.as_deref(), task)?;
-            let build = || Renderer::new(&device, cache.as_deref(), &prepared);
-            let renderer = Arc::new(crate::vulkan::hot_reload::reload(build)?);
-            Ok(Loaded { prepared: Arc::new(prepared), renderer })
+            let round = memo.round(task);
+            let prepared = prepare(&scene, &round)?;
+            let renderer = crate::vulkan::hot_reload::reload(|| Renderer::new(&device, &prepared, &round))?;
+            Ok(Loaded { prepared: Arc::new(prepared), renderer: Arc::new(renderer), key })
         });
     }
 
@@ -357,14 +330,14 @@ impl Viewer {
             is_new = true;
             match result {
                 Ok(loaded) => {
-                    self.session.prepared(&loaded.prepared.scene);
+                    self.session.loaded(loaded.prepared.scene.clone());
                     self.loaded = Some(loaded);
                 }
                 Err(Error::Cancelled) => {}
                 Err(error) if self.loaded.is_none() => return Err(error),
                 Err(error) => {
                     self.session.failed();
-                    self.requested = self.loaded.as_ref().map(|loaded| Self::needs(&loaded.prepared.scene));
+                    self.requested = self.loaded.as_ref().and_then(|loaded| loaded.key);
                     self.tell_error(&error);
                 }
             }
@@ -447,8 +420,8 @@ impl Viewer {
             }
             None => None,
         };
-        if let Some(Loaded { prepared, .. }) = &loaded {
-            self.comparer.update(self.session.shown(), prepared, &self.device, self.cache.as_deref(), is_moving)?;
+        if let Some(loaded) = &loaded {
+            self.comparer.update(self.session.shown(), loaded, &self.device, &self.memo, is_moving)?;
         }
         let picture = loaded.as_ref().zip(view.as_ref()).map(|(loaded, view)| ShownPicture {
             renderer: &loaded.renderer,

@@ -1,0 +1,63 @@
+//! What shading looks up of an environment, in memory: its filtered forms, and which of them the kernels of threads need.
+use crate::brdf::{Brdf, MIN_COS_THETA_D, half_vector_width};
+use crate::environment::sources::{CLEAR, clearance};
+use crate::environment::{Environment, Pyramid, VmfPyramid};
+use crate::memo::Keyed;
+use crate::threads::Threads;
+use crate::threads::fitted::kernel::FINEST_WIDTH_RAD;
+
+/// What a method looks up of an environment, as far as it has to be filtered.
+#[derive(Clone, Default)]
+pub struct Light {
+    /// The box-filtered pyramid.
+    pub box_filtered: Option<Keyed<Pyramid>>,
+    /// What fitted threads look up.
+    pub blurred: Option<BlurredLight>,
+}
+
+/// What fitted threads look up.
+#[derive(Clone)]
+pub struct BlurredLight {
+    /// The environment without its small sources, blurred.
+    pub rest: Keyed<VmfPyramid>,
+    /// Its small sources alone, blurred, if some lobe mirrors them.
+    pub sources: Option<Keyed<VmfPyramid>>,
+    /// Irradiance over pi, without the small sources.
+    pub irradiance: Keyed<Pyramid>,
+    /// What kernels look up besides.
+    pub needs: KernelNeeds,
+}
+
+/// What kernels look up besides the pyramid of the environment without its small sources.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct KernelNeeds {
+    /// The environment as it is, for kernels sharper than the pyramid.
+    pub map: bool,
+    /// The small sources, for lobes in which they are mirrored.
+    pub sources: bool,
+}
+
+/// Level 0 of `pyramid` on the scale of kernels, whose level 0 has the finest width.
+pub fn finest_level(pyramid: &VmfPyramid) -> f32 {
+    (pyramid.finest_width_rad() / FINEST_WIDTH_RAD).log2() as f32
+}
+
+impl KernelNeeds {
+    /// What those of `materials` do, where the environment without its small sources is blurred as `rest`.
+    pub fn of(environment: &Environment, materials: &[(&Brdf, Option<&Threads>)], rest: &VmfPyramid) -> Self {
+        let finest_level = finest_level(rest);
+        let sources = &environment.small_sources().list;
+        let mirrors = |brdf: &Brdf| {
+            let lobe_width = (MIN_COS_THETA_D * half_vector_width(brdf)) as f32;
+            sources.iter().any(|source| clearance(0.0, source.width_rad() as f32, lobe_width) < CLEAR[1])
+        };
+        let is_sharp = |threads: &Option<&Threads>| match threads {
+            Some(Threads::Fitted(table)) => table.sharpest_level() < finest_level,
+            _ => false,
+        };
+        Self {
+            map: materials.iter().any(|(_, threads)| is_sharp(threads)),
+            sources: materials.iter().any(|(brdf, _)| mirrors(brdf)),
+        }
+    }
+}

@@ -1,0 +1,65 @@
+//! Outputs on disk: a file each, named by its key.
+use super::Key;
+use crate::error::{Error, Result};
+use std::path::{Path, PathBuf};
+
+/// Reads an output from the file at a path.
+pub type Read<'s, T> = dyn Fn(&Path) -> Result<T> + 's;
+/// Writes an output to the file at a path.
+pub type Write<'s, T> = dyn Fn(&Path, &T) -> Result<()> + 's;
+
+/// How an output is kept on disk.
+pub struct Stored<'s, T> {
+    /// Extension of its file.
+    pub extension: &'static str,
+    /// Reads it; a damaged file is an error, and the output is made again.
+    pub read: Box<Read<'s, T>>,
+    /// Writes it, whole or not at all.
+    pub write: Box<Write<'s, T>>,
+}
+
+/// The folder for what takes long to make: the environment variable THREADLIGHT_CACHE, else the user's cache folder; none where the user
+/// has no home.
+pub fn default_folder() -> Option<PathBuf> {
+    match std::env::var_os("THREADLIGHT_CACHE").filter(|folder| !folder.is_empty()) {
+        Some(folder) => Some(folder.into()),
+        None => directories::ProjectDirs::from("", "", "threadlight").map(|folders| folders.cache_dir().to_path_buf()),
+    }
+}
+
+impl<T> Stored<'_, T> {
+    fn path(&self, folder: &Path, key: Key) -> PathBuf {
+        folder.join(format!("{key}.{}", self.extension))
+    }
+
+    /// The output of `key`, if it is there; what is damaged is reported.
+    pub(super) fn read(&self, folder: &Path, key: Key) -> Option<T> {
+        let path = self.path(folder, key);
+        // Only of a file: reading a pipe would wait for someone to write.
+        let kind = std::fs::metadata(&path).ok()?.file_type();
+        let output = if kind.is_file() {
+            (self.read)(&path)
+        } else {
+            Err(Error::in_file(&path, "is not a file", "it is replaced"))
+        };
+        output.inspect_err(|error| tracing::warn!("what was kept on disk is useless: {error}")).ok()
+    }
+
+    /// Keeps `output` under `key`. A folder that cannot be written to costs time later, nothing else, so it only warns.
+    pub(super) fn write(&self, folder: &Path, key: Key, output: &T) {
+        let path = self.path(folder, key);
+        let made = std::fs::create_dir_all(folder).map_err(|cause| Error::unwritable(folder, cause));
+        let written = made.and_then(|()| make_way(&path)).and_then(|()| (self.write)(&path, output));
+        if let Err(error) = written {
+            tracing::warn!("what was made is not kept on disk: {error}");
+        }
+    }
+}
+
+/// Removes an empty folder from where a file is to be: a rename replaces anything else.
+fn make_way(path: &Path) -> Result<()> {
+    match path.symlink_metadata() {
+        Ok(metadata) if metadata.is_dir() => std::fs::remove_dir(path).map_err(|cause| Error::unwritable(path, cause)),
+        _ => Ok(()),
+    }
+}

@@ -1,0 +1,89 @@
+//! Files that steps read: known by their contents, not by their names.
+use super::Key;
+use crate::error::{Error, Result};
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+/// The keys of files' contents, as they were when they were looked at. Contents that were read for their key are kept until someone takes
+/// them or the round is over.
+#[derive(Default)]
+pub(super) struct Files(Mutex<Known>);
+
+type Known = HashMap<PathBuf, (Key, Option<Vec<u8>>)>;
+
+impl Files {
+    /// The key of the contents of the file at `path`; it is read unless that is known.
+    pub fn key(&self, path: &Path) -> Result<Key> {
+        if let Some((key, _)) = self.lock().get(path) {
+            return Ok(*key);
+        }
+        let bytes = read(path)?;
+        let key = Key::of_bytes(&bytes);
+        self.lock().insert(path.to_owned(), (key, Some(bytes)));
+        Ok(key)
+    }
+
+    /// The contents that [`Self::key`] names.
+    pub fn bytes(&self, path: &Path) -> Result<Vec<u8>> {
+        let known = self.key(path)?;
+        if let Some(bytes) = self.lock().get_mut(path).and_then(|(_, bytes)| bytes.take()) {
+            return Ok(bytes);
+        }
+        let bytes = read(path)?;
+        if Key::of_bytes(&bytes) == known {
+            return Ok(bytes);
+        }
+        Err(Error::in_file(path, "was changed since it was opened", "open it again"))
+    }
+
+    /// Lets go of contents that nobody took.
+    pub fn release(&self) {
+        self.lock().values_mut().for_each(|(_, bytes)| *bytes = None);
+    }
+
+    /// Nothing is known of the file at `path` any more.
+    pub fn forget(&self, path: &Path) {
+        self.lock().remove(path);
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Known> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+fn read(path: &Path) -> Result<Vec<u8>> {
+    let unreadable = |cause| Error::unreadable(path, cause);
+    // A pipe or a device would never end.
+    let kind = std::fs::metadata(path).map_err(unreadable)?.file_type();
+    if !kind.is_file() && !kind.is_dir() {
+        return Err(Error::in_file(path, "is not a file", "name a file"));
+    }
+    std::fs::read(path).map_err(unreadable)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_is_its_contents_and_is_looked_at_again_only_when_asked_to() {
+        let folder = tempfile::tempdir().unwrap();
+        let [a, b] = ["a", "b"].map(|name| folder.path().join(name));
+        let files = Files::default();
+        std::fs::write(&a, "one").unwrap();
+        std::fs::write(&b, "one").unwrap();
+        let one = files.key(&a).unwrap();
+        assert_eq!(files.key(&b).unwrap(), one);
+        std::fs::write(&a, "two").unwrap();
+        assert_eq!(files.key(&a).unwrap(), one);
+        assert_eq!(files.bytes(&a).unwrap(), b"one");
+        assert!(files.bytes(&a).unwrap_err().to_string().contains("changed"));
+        files.forget(&a);
+        assert_ne!(files.key(&a).unwrap(), one);
+        assert_eq!(files.bytes(&a).unwrap(), b"two");
+        files.forget(&a);
+        std::fs::remove_file(&a).unwrap();
+        assert!(files.key(&a).is_err());
+    }
+}

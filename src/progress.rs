@@ -1,0 +1,41 @@
+//! Long work: how it says how far it is, and how it is told to stop.
+
+use crate::error::{Error, Result};
+
+/// Watches long work.
+pub trait Observer: Sync {
+    /// What is being made from now on, in a word or two; its parts are counted from 0.
+    fn begin(&self, _what: &str) {}
+
+    /// `done` of `total` parts are finished.
+    fn progress(&self, done: usize, total: usize);
+
+    /// Whether the work is to end with [`Error::Cancelled`].
+    fn cancelled(&self) -> bool;
+
+    /// An error if the work is to end.
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`].
+    fn check(&self) -> Result<()> {
+        if self.cancelled() { Err(Error::Cancelled) } else { Ok(()) }
+    }
+}
+
+/// Neither watches nor cancels.
+impl Observer for () {
+    fn progress(&self, _done: usize, _total: usize) {}
+    fn cancelled(&self) -> bool {
+        false
+    }
+}
+
+/// Passes on whether to stop, but no progress: that of a part is not that of the whole.
+pub struct OnlyCancels<'a>(pub &'a dyn Observer);
+
+impl Observer for OnlyCancels<'_> {
+    fn progress(&self, _done: usize, _total: usize) {}
+    fn cancelled(&self) -> bool {
+        self.0.cancelled()
+    }
+}

@@ -1,0 +1,159 @@
+//! Filters environments: what the methods look up of them, in memory.
+use crate::Result;
+use crate::brdf::Brdf;
+use crate::environment::{Environment, Pyramid, VmfPyramid, irradiance_map, vmf_file};
+use crate::light::{BlurredLight, KernelNeeds, Light};
+use crate::memo::{Key, Keyed, Memo, Round, Step, Stored};
+use crate::method::Method;
+use crate::passes::vmf_pyramid;
+use crate::steps::pipelines;
+use crate::threads::Threads;
+use crate::vulkan::Device;
+use std::sync::Arc;
+
+/// Texels along the edge of a face of the box-filtered pyramid that the blur begins with: that of its own would show on maps of few
+/// pixels, so their texels are a quarter as large.
+fn face_size_before_blur(environment: &Environment) -> usize {
+    const FEWEST: usize = 512;
+    let face_size = Pyramid::face_size_for(environment);
+    face_size.max((4 * face_size).min(FEWEST))
+}
+
+/// The box-filtered pyramid of an environment.
+pub struct BoxFilter<'a> {
+    /// Of what.
+    pub environment: &'a Keyed<Environment>,
+    /// Texels along the edge of a face of level 0, a power of two; none for as many as the environment's pixels need.
+    pub face_size: Option<usize>,
+}
+
+impl Step for BoxFilter<'_> {
+    type Output = Pyramid;
+    const NAME: &'static str = "environment";
+
+    fn key(&self, _: &Memo) -> Result<Key> {
+        let key = Key::builder("box").key(self.environment.key);
+        Ok(key.number(self.face_size.unwrap_or_default() as u64).build())
+    }
+
+    fn make(&self, round: &Round) -> Result<Pyramid> {
+        let face_size = self.face_size.unwrap_or_else(|| Pyramid::face_size_for(self.environment));
+        Pyramid::box_filtered_to(self.environment, face_size, round.observer())
+    }
+}
+
+/// Irradiance over pi.
+struct Irradiance<'a>(&'a Keyed<Environment>);
+
+impl Step for Irradiance<'_> {
+    type Output = Pyramid;
+    const NAME: &'static str = "irradiance";
+
+    fn key(&self, _: &Memo) -> Result<Key> {
+        Ok(Key::builder("irradiance").key(self.0.key).build())
+    }
+
+    fn make(&self, round: &Round) -> Result<Pyramid> {
+        irradiance_map(self.0, round.observer())
+    }
+}
+
+/// An environment without its small sources, or these alone.
+struct Part<'a> {
+    environment: &'a Keyed<Environment>,
+    of_sources: bool,
+}
+
+impl Step for Part<'_> {
+    type Output = Environment;
+    const NAME: &'static str = "sources";
+
+    fn key(&self, _: &Memo) -> Result<Key> {
+        Ok(Key::builder("part").key(self.environment.key).number(u64::from(self.of_sources)).build())
+    }
+
+    fn make(&self, _: &Round) -> Result<Environment> {
+        Ok(self.environment.part(self.of_sources))
+    }
+}
+
+/// An environment blurred by the kernels of fitted threads.
+pub struct Blur<'a> {
+    /// Of what.
+    pub environment: &'a Keyed<Environment>,
+    /// What makes it; none for the processor. Which does is not part of the key: they agree to 1e-5.
+    pub device: Option<&'a Arc<Device>>,
+}
+
+impl Step for Blur<'_> {
+    type Output = VmfPyramid;
+    const NAME: &'static str = "environment";
+
+    fn key(&self, _: &Memo) -> Result<Key> {
+        Ok(Key::builder("blur").key(self.environment.key).number(vmf_file::FORMAT_VERSION).build())
+    }
+
+    fn make(&self, round: &Round) -> Result<VmfPyramid> {
+        let face_size = face_size_before_blur(self.environment);
+        let face_size = (face_size != Pyramid::face_size_for(self.environment)).then_some(face_size);
+        let source = round.ask(&BoxFilter { environment: self.environment, face_size })?;
+        match self.device {
+            Some(device) => vmf_pyramid(device, &*pipelines(round, device)?, &source, round.observer()),
+            None => Ok(VmfPyramid::new(&source)),
+        }
+    }
+
+    fn stored(&self) -> Option<Stored<'_, VmfPyramid>> {
+        Some(Stored { extension: "pyramid", read: Box::new(vmf_file::read), write: Box::new(vmf_file::write) })
+    }
+}
+
+/// What `method` looks up of `environment` for these materials; `device` blurs, if there is one.
+///
+/// # Errors
+/// Whatever Vulkan refuses; cancelled.
+pub fn light(
+    round: &Round,
+    device: Option<&Arc<Device>>,
+    method: Method,
+    environment: &Keyed<Environment>,
+    materials: &[(&Brdf, Option<&Threads>)],
+) -> Result<Light> {
+    let lookups = method.lookups();
+    Ok(Light {
+        box_filtered: match lookups.box_filtered {
+            true => Some(round.ask(&BoxFilter { environment, face_size: None })?),
+            false => None,
+        },
+        blurred: match lookups.blurred {
+            true => Some(blurred_light(round, device, environment, materials)?),
+            false => None,
+        },
+    })
+}
+
+/// What fitted threads look up of `environment` for these materials.
+///
+/// # Errors
+/// Whatever Vulkan refuses; cancelled.
+pub fn blurred_light(
+    round: &Round,
+    device: Option<&Arc<Device>>,
+    environment: &Keyed<Environment>,
+    materials: &[(&Brdf, Option<&Threads>)],
+) -> Result<BlurredLight> {
+    let has_sources = !environment.small_sources().list.is_empty();
+    let part = |of_sources| match has_sources {
+        true => round.ask(&Part { environment, of_sources }),
+        false => Ok(environment.clone()),
+    };
+    let rest = part(false)?;
+    let irradiance = round.ask(&Irradiance(&rest))?;
+    let rest = round.ask(&Blur { environment: &rest, device })?;
+    let needs = KernelNeeds::of(environment, materials, &rest);
+    let sources = match has_sources && needs.sources {
+        true => Some(round.ask(&Blur { environment: &part(true)?, device })?),
+        false => None,
+    };
+    Ok(BlurredLight { rest, sources, irradiance, needs })
+}

@@ -1,0 +1,12 @@
+//! Steps of the memo: load, fit, filter, compile, upload. Each says what its output is a function of and how it is made.
+mod compile;
+mod filter;
+mod fit;
+mod load;
+mod upload;
+
+pub use compile::{CompileCompute, CompileGeometryCache, pipelines};
+pub use filter::{Blur, BoxFilter, blurred_light, light};
+pub use fit::FitThreads;
+pub use load::{LoadEnvironment, LoadMaterial, LoadMesh};
+pub use upload::{UploadBackground, UploadLight, UploadMaterials, UploadMesh};

@@ -1,0 +1,121 @@
+//! Uploads to the device what passes read.
+use super::compile::on;
+use crate::Result;
+use crate::brdf::Brdf;
+use crate::environment::Environment;
+use crate::light::Light;
+use crate::memo::{Key, Keyed, Memo, Round, Step};
+use crate::method::Method;
+use crate::passes::{BackgroundMap, DeviceLight, DeviceMaterials, DeviceMesh};
+use crate::scene::Mesh;
+use crate::threads::Threads;
+use crate::vulkan::Device;
+use std::sync::Arc;
+
+/// Uploads the triangles of a mesh.
+pub struct UploadMesh<'a> {
+    /// To where.
+    pub device: &'a Arc<Device>,
+    /// Its name, for people who look at the device's objects.
+    pub name: &'a str,
+    /// What.
+    pub mesh: &'a Keyed<Mesh>,
+}
+
+impl Step for UploadMesh<'_> {
+    type Output = DeviceMesh;
+    const NAME: &'static str = "upload of meshes";
+
+    fn key(&self, _: &Memo) -> Result<Key> {
+        Ok(on(self.device, "mesh").key(self.mesh.key).build())
+    }
+
+    fn make(&self, _: &Round) -> Result<DeviceMesh> {
+        DeviceMesh::new(self.device, self.name, self.mesh)
+    }
+}
+
+/// A material as shading needs it: its BRDF, and its threads for methods that have any.
+pub type Shaded<'a> = (&'a Keyed<Brdf>, Option<&'a Keyed<Threads>>);
+
+/// Uploads what a method looks up of materials.
+pub struct UploadMaterials<'a> {
+    /// To where.
+    pub device: &'a Arc<Device>,
+    /// What for.
+    pub method: Method,
+    /// In the order of the indices that objects have.
+    pub materials: &'a [Shaded<'a>],
+    /// Whether BRDFs are evaluated.
+    pub evaluates_brdf: bool,
+}
+
+impl Step for UploadMaterials<'_> {
+    type Output = DeviceMaterials;
+    const NAME: &'static str = "upload of materials";
+
+    fn key(&self, _: &Memo) -> Result<Key> {
+        let key = on(self.device, self.method.name()).number(u64::from(self.evaluates_brdf));
+        let of = |(brdf, threads): &Shaded| [Some(brdf.key), threads.map(|threads| threads.key)];
+        Ok(key.keys(self.materials.iter().flat_map(of).flatten()).build())
+    }
+
+    fn make(&self, _: &Round) -> Result<DeviceMaterials> {
+        let materials = self.materials.iter().map(|(brdf, threads)| (&***brdf, threads.map(|threads| &**threads)));
+        DeviceMaterials::new(self.device, self.method, materials, self.evaluates_brdf)
+    }
+}
+
+/// Uploads what a method looks up of an environment.
+pub struct UploadLight<'a> {
+    /// To where.
+    pub device: &'a Arc<Device>,
+    /// What for.
+    pub method: Method,
+    /// Of what.
+    pub environment: &'a Keyed<Environment>,
+    /// Its filtered forms.
+    pub light: &'a Light,
+}
+
+impl Step for UploadLight<'_> {
+    type Output = DeviceLight;
+    const NAME: &'static str = "upload of the environment";
+
+    fn key(&self, _: &Memo) -> Result<Key> {
+        let lookups = self.method.lookups();
+        let mut key = on(self.device, "light").key(self.environment.key);
+        for part in [lookups.box_filtered, lookups.blurred, lookups.map, lookups.aliases] {
+            key = key.number(u64::from(part));
+        }
+        if let Some(blurred) = &self.light.blurred {
+            key = key.number(u64::from(blurred.needs.map)).number(u64::from(blurred.needs.sources));
+        }
+        Ok(key.build())
+    }
+
+    fn make(&self, _: &Round) -> Result<DeviceLight> {
+        DeviceLight::new(self.device, self.method, self.environment, self.light)
+    }
+}
+
+/// Uploads the environment as it is seen behind objects.
+pub struct UploadBackground<'a> {
+    /// To where.
+    pub device: &'a Arc<Device>,
+    /// What.
+    pub environment: &'a Keyed<Environment>,
+}
+
+impl Step for UploadBackground<'_> {
+    type Output = BackgroundMap;
+    const NAME: &'static str = "upload of the background";
+
+    fn key(&self, _: &Memo) -> Result<Key> {
+        Ok(on(self.device, "background").key(self.environment.key).build())
+    }
+
+    fn make(&self, _: &Round) -> Result<BackgroundMap> {
+        BackgroundMap::new(self.device, self.environment)
+    }
+}

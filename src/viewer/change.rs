@@ -1,0 +1,231 @@
+//! Changes of the scene, as the panel, a key or a dropped file makes them.
+use serde::{Deserialize, Serialize};
+
+use crate::brdf::Brdf;
+use crate::error::{Error, Result};
+use crate::method::Method;
+use crate::prepare::check_count;
+use crate::scene::{
+    Background, Camera, EXPOSURE, GAMMA, INTENSITY, MAX_SAMPLES, MAX_SIZE_PX, MAX_SUBPIXELS, MaterialSettings,
+    MaterialSource, Scene, Source,
+};
+use std::fmt::Display;
+use std::ops::RangeInclusive;
+use std::path::Path;
+
+/// A change of the scene, as the panel, a key or a dropped file makes it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Change {
+    /// The material of all objects.
+    Material(MaterialSource),
+    /// A parameter of one of the scene's materials, which becomes a model with parameters of its own if it is none yet. Measured
+    /// tables have no parameters.
+    Parameter {
+        /// Name of the material in the scene.
+        material: String,
+        /// Key of the parameter.
+        key: String,
+        /// As it would stand in the scene file.
+        value: toml::Value,
+    },
+    /// The light.
+    Environment(Source),
+    /// Turn of the environment in degrees.
+    Rotation(f64),
+    /// Factor of its radiance.
+    Intensity(f64),
+    /// The mesh in place of all objects.
+    Mesh(Source),
+    /// Name of the shading method. The number of threads becomes what suits it.
+    Method(String),
+    /// Number of threads or samples; none for as many as suit the method.
+    Threads(Option<u32>),
+    /// Seed of whatever is random.
+    Seed(u64),
+    /// Columns and rows of the image.
+    Size(u32, u32),
+    /// Sub-pixels along each axis of a pixel.
+    Subpixels(u32),
+    /// Factor on radiance before display.
+    Exposure(f64),
+    /// Exponent of the display.
+    Gamma(f64),
+    /// What is seen past the objects.
+    Background(Background),
+    /// Where from; none frames the objects.
+    Camera(Option<Camera>),
+}
+
+impl Change {
+    /// The file that it names: its contents may be others than when it was last named.
+    pub fn file(&self) -> Option<&Path> {
+        match self {
+            Self::Material(MaterialSource::File(path))
+            | Self::Environment(Source::File(path))
+            | Self::Mesh(Source::File(path)) => Some(path),
+            _ => None,
+        }
+    }
+
+    /// Makes the change in `scene`.
+    ///
+    /// # Errors
+    /// A value that is out of range, a name that is not known, a parameter of a material that has none; then `scene` is as it was.
+    pub fn apply(&self, scene: &mut Scene) -> Result<()> {
+        let mut changed = scene.clone();
+        let Scene { image, environment, shading, .. } = &mut changed;
+        match self {
+            Self::Material(source) => {
+                let name = match source {
+                    MaterialSource::File(path) => path.display().to_string(),
+                    MaterialSource::Builtin(name) => name.clone(),
+                    MaterialSource::Model { model, .. } => model.clone(),
+                };
+                changed.use_material(&name, source.clone());
+            }
+            Self::Parameter { material, key, value } => set_parameter(&mut changed, material, key, value)?,
+            Self::Environment(source) => environment.source = source.clone(),
+            Self::Rotation(degrees) => {
+                environment.rotation_deg = within("rotation", *degrees, &(f64::MIN..=f64::MAX))?;
+            }
+            Self::Intensity(factor) => environment.intensity = within("intensity", *factor, &INTENSITY)?,
+            Self::Mesh(source) => changed.use_mesh(source.clone()),
+            Self::Method(name) => {
+                Method::from_name(name)?;
+                (shading.method, shading.threads) = (name.clone(), None);
+            }
+            Self::Threads(count) => {
+                count.map(|count| within("threads", count, &(1..=MAX_SAMPLES))).transpose()?;
+                shading.threads = *count;
+            }
+            Self::Seed(seed) => shading.seed = *seed,
+            Self::Size(width, height) => {
+                let side = |side| within("size", side, &(1..=MAX_SIZE_PX));
+                (image.width, image.height) = (side(*width)?, side(*height)?);
+            }
+            Self::Subpixels(side) => image.subpixels = within("subpixels", *side, &(1..=MAX_SUBPIXELS))?,
+            Self::Exposure(factor) => image.exposure = within("exposure", *factor, &EXPOSURE)?,
+            Self::Gamma(gamma) => image.gamma = within("gamma", *gamma, &GAMMA)?,
+            Self::Background(background) => image.background = *background,
+            Self::Camera(camera) => {
+                if let Some(camera) = camera {
+                    camera.validate().map_err(|problem| Error::input("camera", problem, "move the camera"))?;
+                }
+                changed.camera = *camera;
+            }
+        }
+        let (method, count) = sampling(&changed);
+        if let Some(method) = method {
+            check_count(method, count, changed.image.subpixels)?;
+        }
+        *scene = changed;
+        Ok(())
+    }
+}
+
+/// `value` if it is in `range`: no range holds NaN.
+fn within<T: PartialOrd + Display + Copy>(name: &str, value: T, range: &RangeInclusive<T>) -> Result<T> {
+    if range.contains(&value) {
+        return Ok(value);
+    }
+    let remedy = format!("use a value from {} to {}", range.start(), range.end());
+    Err(Error::input(name, format!("{value} is out of range"), remedy))
+}
+
+/// The method of `scene`, if there is one of that name, and its number of threads.
+fn sampling(scene: &Scene) -> (Option<Method>, u32) {
+    let method = Method::from_name(&scene.shading.method).ok();
+    let default_count = method.map_or(0, Method::default_count);
+    (method, scene.shading.threads.unwrap_or(default_count))
+}
+
+/// The model and the parameters of a material.
+///
+/// # Errors
+/// A file that cannot be read; a measured table, which has no parameters.
+pub fn model_of(material: &MaterialSettings) -> Result<(String, toml::Table)> {
+    let none = || Error::input(&material.name, "has no parameters", "choose a material that is a model");
+    match &material.source {
+        MaterialSource::Model { model, parameters } => Ok((model.clone(), parameters.clone())),
+        MaterialSource::Builtin(name) => Brdf::builtin_model(name).ok_or_else(none),
+        MaterialSource::File(path) if path.extension().is_some_and(|extension| extension == "toml") => {
+            Brdf::load_model(path)
+        }
+        MaterialSource::File(_) => Err(none()),
+    }
+}
+
+fn set_parameter(scene: &mut Scene, name: &str, key: &str, value: &toml::Value) -> Result<()> {
+    let names: Vec<_> = scene.materials.iter().map(|material| material.name.clone()).collect();
+    let material = scene.materials.iter_mut().find(|material| material.name == name).ok_or_else(|| {
+        let remedy = format!("name one of {}", names.join(", "));
+        Error::input(format!("material \"{name}\""), "is not in the scene", remedy)
+    })?;
+    let (model, mut parameters) = model_of(material)?;
+    parameters.insert(key.into(), value.clone());
+    Brdf::from_parameters(&model, parameters.clone()).map_err(|error| error.within(format!("material \"{name}\"")))?;
+    material.source = MaterialSource::Model { model, parameters };
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_parameter_turns_a_builtin_into_a_model() {
+        let mut scene = Scene::default();
+        let parameter =
+            |key: &str, value: toml::Value| Change::Parameter { material: "gold".into(), key: key.into(), value };
+        parameter("alpha", 0.3.into()).apply(&mut scene).unwrap();
+        let MaterialSource::Model { model, parameters } = &scene.materials[0].source else { panic!("no model") };
+        assert_eq!((model.as_str(), parameters["alpha"].as_float()), ("conductor", Some(0.3)));
+
+        for (change, what) in [
+            (parameter("alpha", 7.0.into()), "alpha"),
+            (parameter("alfa", 0.3.into()), "alfa"),
+            (Change::Parameter { material: "tin".into(), key: "alpha".into(), value: 0.1.into() }, "tin"),
+        ] {
+            let before = scene.clone();
+            let error = change.apply(&mut scene).unwrap_err().to_string();
+            assert!(error.contains(what), "{error}");
+            assert_eq!(scene, before);
+        }
+        Change::Material(MaterialSource::File("x.binary".into())).apply(&mut scene).unwrap();
+        let change = Change::Parameter { material: "x.binary".into(), key: "alpha".into(), value: 0.1.into() };
+        assert!(change.apply(&mut scene).unwrap_err().to_string().contains("no parameters"));
+    }
+
+    #[test]
+    fn values_out_of_range_are_errors_and_change_nothing() {
+        for (change, what) in [
+            (Change::Exposure(-1.0), "exposure"),
+            (Change::Exposure(f64::NAN), "exposure"),
+            (Change::Gamma(0.0), "gamma"),
+            (Change::Rotation(f64::INFINITY), "rotation"),
+            (Change::Intensity(-1.0), "intensity"),
+            (Change::Size(0, 480), "size"),
+            (Change::Size(640, 100_000), "size"),
+            (Change::Subpixels(5), "subpixels"),
+            (Change::Threads(Some(0)), "threads"),
+            (Change::Threads(Some(129)), "threads"),
+            (Change::Method("magic".into()), "magic"),
+            (Change::Camera(Some(Camera { fov_y_deg: 0.0, ..Camera::framing(glam::DVec3::ZERO, 1.0, 1.0) })), "fov"),
+        ] {
+            let mut scene = Scene::default();
+            let error = change.apply(&mut scene).unwrap_err().to_string();
+            assert!(error.contains(what) && !error.contains('\n'), "{error}");
+            assert_eq!(scene, Scene::default());
+        }
+    }
+
+    #[test]
+    fn another_method_has_as_many_threads_as_suit_it() {
+        let mut scene = Scene::default();
+        Change::Method("paper".into()).apply(&mut scene).unwrap();
+        Change::Threads(Some(1000)).apply(&mut scene).unwrap();
+        Change::Method("fitted".into()).apply(&mut scene).unwrap();
+        assert_eq!(scene.shading.threads, None);
+    }
+}

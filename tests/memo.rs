@@ -1,0 +1,218 @@
+//! What a frame asks of the memo is made once: each change makes what it needs and nothing else, and what is no longer needed is let go.
+mod common;
+use common::{Validated, sphere};
+use std::path::Path;
+use std::sync::Mutex;
+use threadlight::memo::Memo;
+use threadlight::pipeline::{Renderer, Wanted};
+use threadlight::prepare::{key_of, prepare};
+use threadlight::progress::Observer;
+use threadlight::scene::{Background, Camera, MaterialSource, ObjectSettings, Scene, Source};
+
+fn small() -> Scene {
+    sphere(MaterialSource::Builtin("clay".into()), "white", 4, (32, 24))
+}
+
+/// Asks for all that a frame of `scene` needs; gives what had to be made for it, by name.
+fn ask(gpu: &Validated, scene: &Scene) -> (Renderer, Vec<&'static str>) {
+    let round = gpu.round();
+    let prepared = prepare(scene, &round).expect("a scene that can be prepared");
+    let renderer = Renderer::new(&gpu.device, &prepared, &round).expect("a renderer");
+    (renderer, round.made())
+}
+
+#[test]
+fn each_change_makes_what_it_needs_and_nothing_else() {
+    let gpu = Validated::new();
+    let before = small();
+    let (renderer, made) = ask(&gpu, &before);
+    assert!(
+        ["mesh", "material", "threads", "environment", "shaders"].iter().all(|step| made.contains(step)),
+        "{made:?}"
+    );
+    type Change = fn(&mut Scene);
+    let silver = MaterialSource::Builtin("silver".into());
+    let changes: [(&str, Change, &[&str]); 15] = [
+        ("nothing", |_| (), &[]),
+        ("exposure", |scene| scene.image.exposure = 2.0, &[]),
+        ("gamma", |scene| scene.image.gamma = 1.8, &[]),
+        ("size", |scene| scene.image.width = 48, &[]),
+        ("turn of the light", |scene| scene.environment.rotation_deg = 10.0, &[]),
+        ("intensity", |scene| scene.environment.intensity = 2.0, &[]),
+        ("camera", |scene| scene.camera = Some(Camera::framing(glam::DVec3::ZERO, 2.0, 1.0)), &[]),
+        ("no background", |scene| scene.image.background = Background::None, &[]),
+        ("place of an object", |scene| scene.objects[0].scale = 2.0, &[]),
+        ("sub-pixels", |scene| scene.image.subpixels = 1, &["shaders"]),
+        ("as many threads as there are", |scene| scene.shading.threads = Some(4), &[]),
+        ("threads", |scene| scene.shading.threads = Some(2), &["threads", "upload of materials"]),
+        (
+            "method",
+            |scene| scene.shading.method = "uniform".into(),
+            &["upload of materials", "upload of the environment", "shaders"],
+        ),
+        (
+            "environment",
+            |scene| scene.environment.source = Source::Builtin("sky".into()),
+            &["environment", "irradiance", "upload of the environment", "upload of the background"],
+        ),
+        (
+            "material",
+            |scene| scene.materials[0].source = MaterialSource::Builtin("gold".into()),
+            &["material", "threads", "upload of materials"],
+        ),
+    ];
+    for (name, change, expected) in changes {
+        let mut after = before.clone();
+        change(&mut after);
+        let (_, made) = ask(&gpu, &after);
+        assert_eq!(made, expected, "{name}");
+        // Models that shaders evaluate are compiled in: fitted threads evaluate none without small sources.
+        let keys = [&before, &after].map(|scene| key_of(scene, &gpu.memo).unwrap());
+        assert!(expected.is_empty() || keys[0] != keys[1], "{name}");
+    }
+    let mut unused = before.clone();
+    unused.materials.push(threadlight::scene::MaterialSettings { name: "unused".into(), source: silver });
+    assert_eq!(ask(&gpu, &unused).1, Vec::<&str>::new());
+    assert_eq!(key_of(&unused, &gpu.memo).unwrap(), key_of(&before, &gpu.memo).unwrap());
+    drop(renderer);
+    gpu.finish();
+}
+
+#[test]
+fn files_count_by_content() {
+    let gpu = Validated::new();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("material.toml");
+    let write = |reflectance: f64| {
+        std::fs::write(&path, format!("model = \"lambert\"\nreflectance = [{reflectance}, 0.5, 0.5]\n")).unwrap();
+    };
+    write(0.25);
+    let mut scene = small();
+    scene.materials[0].source = MaterialSource::File(path.clone());
+    let mut other_name = scene.clone();
+    let copy = folder.path().join("copy.toml");
+    std::fs::copy(&path, &copy).unwrap();
+    other_name.materials[0].source = MaterialSource::File(copy);
+
+    let (renderer, _) = ask(&gpu, &scene);
+    let picture =
+        |renderer: &Renderer| renderer.render(Wanted { radiance: true, ..Wanted::default() }, 1).unwrap().radiance;
+    let first = picture(&renderer);
+    assert_eq!(
+        ask(&gpu, &other_name).1,
+        Vec::<&str>::new(),
+        "a file of another name and the same contents is the same"
+    );
+    write(0.75);
+    assert_eq!(ask(&gpu, &scene).1, Vec::<&str>::new(), "what nobody has named again is as it was");
+    gpu.memo.look_again(&path);
+    let (edited, made) = ask(&gpu, &scene);
+    assert_eq!(made, ["material", "threads", "upload of materials"]);
+    assert_ne!(picture(&edited), first);
+    drop((renderer, edited));
+    gpu.finish();
+}
+
+#[test]
+fn a_mesh_file_named_as_a_builtin_is_the_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("sphere");
+    std::fs::write(&path, "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+    let mut scene = small();
+    let material = scene.materials[0].name.clone();
+    scene.objects = vec![
+        ObjectSettings::new(Source::Builtin("sphere".into()), &material),
+        ObjectSettings::new(Source::File(path), &material),
+    ];
+    let memo = Memo::default();
+    let prepared = prepare(&scene, &memo.round(&())).unwrap();
+    let triangles: Vec<_> = prepared.meshes.iter().map(|(_, mesh)| mesh.indices.len() / 3).collect();
+    assert!(triangles.len() == 2 && triangles[0] > 1000 && triangles[1] == 1, "{triangles:?}");
+}
+
+/// Resident memory of this process, in bytes; none where the system does not tell.
+fn resident_bytes() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find(|line| line.starts_with("VmRSS:"))?;
+    Some(1024 * line.split_whitespace().nth(1)?.parse::<u64>().ok()?)
+}
+
+#[test]
+fn two_hundred_changes_do_not_grow_memory() {
+    let gpu = Validated::new();
+    let environments = ["white", "sky", "studio", "sun"];
+    let mut scene = small();
+    let mut used = Vec::new();
+    let mut renderer = None;
+    for change in 0..200 {
+        let alpha = 0.2 + 0.003 * f64::from(change);
+        let parameters = format!("reflectance = [{alpha}, 0.5, 0.5]").parse().unwrap();
+        scene.materials[0].source = MaterialSource::Model { model: "lambert".into(), parameters };
+        scene.environment.source = Source::Builtin(environments[change as usize / 10 % 4].into());
+        scene.shading.method = if change % 7 == 0 { "cosine" } else { "filtered" }.into();
+        scene.objects[0].scale = 1.0 + change as f32 / 100.0;
+        let (next, _) = ask(&gpu, &scene);
+        next.render(Wanted { display: true, ..Wanted::default() }, 1).unwrap();
+        renderer = Some(next);
+        used.push((gpu.memo.outputs_in_memory(), gpu.device.allocated_bytes(), resident_bytes().unwrap_or_default()));
+    }
+    // All that is seen from the 40th change on was seen before: each environment, each method.
+    let most =
+        |of: fn(&(usize, u64, u64)) -> u64, range: std::ops::Range<usize>| used[range].iter().map(of).max().unwrap();
+    for (name, of) in [
+        ("outputs", (|used| used.0 as u64) as fn(&(usize, u64, u64)) -> u64),
+        ("bytes on the device", |used| used.1),
+        ("resident bytes", |used| used.2),
+    ] {
+        let (early, late) = (most(of, 40..120), most(of, 120..200));
+        println!("{name}: at most {early} in changes 40 to 120, {late} in changes 120 to 200");
+        // The allocator of the system keeps some of what is freed: a twentieth, here.
+        let slack = if name == "resident bytes" { early / 20 } else { 0 };
+        assert!(late <= early + slack, "{name}: {early}, then {late}");
+    }
+    drop(renderer);
+    assert_eq!(gpu.memo.outputs_in_memory(), 0);
+    gpu.finish();
+}
+
+/// Notes what is begun, and how far it comes.
+#[derive(Default)]
+struct Notes(Mutex<Vec<(String, usize)>>);
+
+impl Observer for Notes {
+    fn begin(&self, what: &str) {
+        self.0.lock().unwrap().push((what.to_owned(), 0));
+    }
+    fn progress(&self, _: usize, total: usize) {
+        if let Some(last) = self.0.lock().unwrap().last_mut() {
+            last.1 = total;
+        }
+    }
+    fn cancelled(&self) -> bool {
+        false
+    }
+}
+
+#[test]
+fn every_slow_step_says_what_it_is_and_how_far_it_is() {
+    let gpu = Validated::new();
+    let notes = Notes::default();
+    let folder = tempfile::tempdir().unwrap();
+    let ask = |folder: &Path, notes: &dyn Observer| {
+        let memo = Memo::new(Some(folder));
+        let round = memo.round(notes);
+        let mut scene = small();
+        scene.environment.source = Source::Builtin("studio".into());
+        let prepared = prepare(&scene, &round).unwrap();
+        Renderer::new(&gpu.device, &prepared, &round).unwrap();
+    };
+    ask(folder.path(), &notes);
+    let notes = notes.0.into_inner().unwrap();
+    let parts = |what: &str| notes.iter().filter(|(name, _)| name == what).map(|(_, total)| *total).max();
+    assert!(parts("threads") >= Some(90) && parts("environment") > Some(10), "{notes:?}");
+    // What is on disk the second time is not begun again.
+    let again = Notes::default();
+    ask(folder.path(), &again);
+    assert!(again.0.into_inner().unwrap().iter().all(|(name, _)| name != "threads"));
+    gpu.finish();
+}
