@@ -92,7 +92,7 @@ fn equations_are_numbered_in_order() {
     let mut in_block = false;
     let mut numbers = Vec::new();
     for line in text.lines() {
-        if line.starts_with("```") {
+        if line.trim_start().starts_with("```") {
             in_block = !in_block;
         } else if in_block {
             numbers.extend(line.split_whitespace().next_back().and_then(number));
