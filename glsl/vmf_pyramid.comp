@@ -14,7 +14,7 @@ layout(set = 0, binding = 1, std430) writeonly buffer Destination {
     float destination[];
 };
 
-// How wide the kernels are that texels were convolved with, in `mean_cos_deficit`.
+// How wide the kernels are that texels were convolved with, in `texel_deficit`.
 const uint BOX = 0;    // the texel itself
 const uint VMF = 1;    // of a level of the pyramid
 const uint MEAN = 2;  // of the level of twice this size, and then means of 2 x 2 texels

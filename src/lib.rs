@@ -35,12 +35,15 @@
 //! (which passes run, in which order, with which barriers, in which memory, and what is kept between frames) and [`vulkan`] (the
 //! only `unsafe` code) on one side, [`scene`], [`environment`], [`threads`] and [`brdf`] on the other. The method on one screen
 //! is `declare` in `pipeline.rs`.
+//!
+//! The [`guide`] has all of it at length: usage, every equation, architecture, results, limits.
 
 pub mod brdf;
 pub mod environment;
 pub mod error;
 pub mod evaluate;
 pub mod graph;
+pub mod guide;
 pub mod light;
 pub mod memo;
 pub mod method;
