@@ -13,6 +13,10 @@ macro_rules! brdf_models {
 }
 include!("src/brdf/models.rs");
 
+#[cfg(not(feature = "shaderc-from-source"))]
+#[path = "src/vulkan/glslc.rs"]
+mod glslc;
+
 fn main() {
     println!("cargo:rerun-if-changed=glsl");
     println!("cargo:rerun-if-changed=src/brdf/models.rs");
@@ -97,20 +101,16 @@ fn compile(table: &mut String, source: &Path, name: &str, stage: &str, includes:
 
 #[cfg(not(feature = "shaderc-from-source"))]
 fn to_spirv(source: &Path, spirv: &Path, includes: &[&Path]) {
-    let compiler = env::var_os("GLSLC").unwrap_or_else(|| "glslc".into());
-    let mut command = std::process::Command::new(&compiler);
-    command.args(["--target-env=vulkan1.2", "-Werror", "-o"]).arg(spirv).arg(source);
-    for folder in includes {
-        command.arg("-I").arg(folder);
-    }
-    let output = command.output().unwrap_or_else(|cause| {
+    let output = glslc::command(source, spirv, includes.iter().copied()).output().unwrap_or_else(|cause| {
         panic!(
-            "{compiler:?} cannot be run ({cause}): install glslc (Debian 12, Ubuntu 24.04: apt-get install glslc; elsewhere the Vulkan SDK), or build with --features shaderc-from-source"
+            "{:?} cannot be run ({cause}): install glslc (Debian 12, Ubuntu 24.04: apt-get install glslc; elsewhere the Vulkan SDK), or build with --features shaderc-from-source",
+            glslc::compiler()
         )
     });
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
 }
 
+/// With the settings that `glslc` has in glslc.rs.
 #[cfg(feature = "shaderc-from-source")]
 fn to_spirv(source: &Path, spirv: &Path, includes: &[&Path]) {
     let kind = match text(source.extension()).as_str() {
@@ -121,9 +121,13 @@ fn to_spirv(source: &Path, spirv: &Path, includes: &[&Path]) {
     let mut options = shaderc::CompileOptions::new().expect("shaderc options");
     options.set_target_env(shaderc::TargetEnv::Vulkan, shaderc::EnvVersion::Vulkan1_2 as u32);
     options.set_warnings_as_errors();
-    options.set_include_callback(|name, _, _, _| {
-        let found = includes.iter().map(|folder| folder.join(name)).find(|file| file.is_file());
-        let file = found.ok_or_else(|| format!("{name} is in none of {includes:?}"))?;
+    options.set_include_callback(|name, kind, includer, _| {
+        // As glslc looks for "name": beside the file that includes it, then in the folders.
+        let beside = Path::new(includer).parent().filter(|_| kind == shaderc::IncludeType::Relative);
+        let mut places = beside.into_iter().chain(includes.iter().copied()).map(|folder| folder.join(name));
+        let file = places
+            .find(|file| file.is_file())
+            .ok_or_else(|| format!("{name} is neither beside {includer} nor in any of {includes:?}"))?;
         let content = fs::read_to_string(&file).map_err(|cause| cause.to_string())?;
         Ok(shaderc::ResolvedInclude { resolved_name: file.display().to_string(), content })
     });

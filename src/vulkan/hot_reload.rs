@@ -1,9 +1,9 @@
 //! Shaders compiled anew while the program runs, for work on them (feature `hot-reload`): by `glslc`, as build.rs does.
+use super::glslc;
 use crate::{Error, Result};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::process::Command;
 use std::sync::{PoisonError, RwLock};
 
 /// How a shader is compiled.
@@ -45,15 +45,9 @@ pub fn reload<T>(build: impl FnOnce() -> Result<T>) -> Result<T> {
 fn compile(recipe: &Recipe) -> Result<(&'static str, Vec<u32>)> {
     let Recipe { name, source, includes } = *recipe;
     let refuse = |problem: String, remedy: &str| Error::in_file(Path::new(source), problem, remedy);
-    let compiler = std::env::var_os("GLSLC").unwrap_or_else(|| "glslc".into());
-    let mut command = Command::new(&compiler);
-    command.args(["--target-env=vulkan1.2", "-Werror", "-o", "-"]).arg(source);
-    for folder in includes {
-        command.arg("-I").arg(folder);
-    }
-    let output = command
+    let output = glslc::command(Path::new(source), Path::new("-"), includes.iter().map(Path::new))
         .output()
-        .map_err(|cause| refuse(format!("{} cannot be run ({cause})", compiler.display()), "install glslc"))?;
+        .map_err(|cause| refuse(format!("{} cannot be run ({cause})", glslc::compiler().display()), "install glslc"))?;
     if !output.status.success() {
         let said = String::from_utf8_lossy(&output.stderr).lines().collect::<Vec<_>>().join("; ");
         return Err(refuse(format!("does not compile: {said}"), "the old shaders stay until it does"));

@@ -17,6 +17,8 @@ mod device;
 mod error;
 mod frames;
 #[cfg(feature = "hot-reload")]
+mod glslc;
+#[cfg(feature = "hot-reload")]
 pub mod hot_reload;
 mod instance;
 mod memory;
