@@ -40,6 +40,7 @@ pub mod brdf;
 pub mod environment;
 pub mod error;
 pub mod evaluate;
+pub mod geometry_texel;
 pub mod graph;
 pub mod method;
 pub mod output;

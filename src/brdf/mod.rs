@@ -13,10 +13,12 @@ mod builtin;
 mod lobe;
 mod microfacet;
 mod parameters;
+mod record;
 
 pub use lobe::{MIN_COS_THETA_D, half_vector_width, lobe_radius};
 pub use microfacet::{Distribution, fresnel_conductor, fresnel_dielectric};
 pub use parameters::{Domain, Parameter, Parameters};
+pub use record::MaterialRecord;
 
 /// What every model offers; [`Brdf`] dispatches to it.
 pub trait Model: Sized {

@@ -23,7 +23,7 @@ pub use light_map::{Alias, LightMap};
 pub use load::RepairCounts;
 pub use procedural::builtin_names;
 pub use pyramid::Pyramid;
-pub use sources::{LightSource, MAX_SOURCES, SmallSources};
+pub use sources::{LightSource, MAX_SOURCES, SmallSources, SourceRecord};
 pub use vmf_pyramid::{BlurKernel, BlurStep, VmfPyramid};
 
 /// Radiance from every direction, as a lat-long picture: linear, Rec. 709.

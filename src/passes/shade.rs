@@ -1,9 +1,9 @@
 //! Pass 2 of the paper (section 4.2): the radiance of every listed pixel, by its partition of the sample threads.
 use super::{CameraRays, Counters, DeviceLight, FrameGraph, Identity, Tiles, View, clear};
-use crate::brdf::{Brdf, half_vector_width};
+use crate::brdf::{Brdf, MaterialRecord};
 use crate::graph::{self, Access, BufferDesc, Image};
 use crate::method::Method;
-use crate::threads::{Sample, SliceTable, Threads};
+use crate::threads::{SliceTable, Threads};
 use crate::vulkan::{
     self, Bindings, Buffer, ComputePipeline, Device, Groups, ImageKind, ImageShape, PipelineCache, Sampler, SamplerKind,
 };
@@ -11,20 +11,6 @@ use crate::{Error, Result};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 use std::sync::Arc;
-
-/// `Material` in glsl/material.glsl.
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-struct MaterialRecord {
-    parameters: [f32; 12],
-    model: u32,
-    first_thread: u32,
-    thread_count: u32,
-    row_count: u32,
-    first_slice: u32,
-    lobe_width: f32,
-    padding: [u32; 2],
-}
 
 /// Materials, their threads or CDFs, and their tables on the device.
 pub struct DeviceMaterials {
@@ -59,31 +45,23 @@ impl DeviceMaterials {
         let mut tables = TableAtlas::default();
         let mut models_used = 0;
         for (brdf, thread_table) in materials {
-            let mut parameters = brdf.gpu_parameters();
+            let mut record = MaterialRecord::new(brdf);
             if let Some(table) = brdf.table().filter(|_| evaluates_brdf) {
-                // glsl/brdf/merl.glsl reads its place in the atlas from a.xy.
-                parameters[..2].copy_from_slice(&tables.add(device, table.texels())?.map(|texels| texels as f32));
+                record = record.with_table_at(tables.add(device, table.texels())?);
             }
             if evaluates_brdf {
-                models_used |= 1 << brdf.model_index();
+                models_used |= 1 << record.model;
             }
             if let Some(kind) = method.threads() {
                 assert_eq!(thread_table.map(Threads::kind), Some(kind), "threads of method {}", method.name());
             }
-            let [row_count, thread_count] = thread_table.map_or([0, 0], Threads::size);
-            records.push(MaterialRecord {
-                parameters,
-                model: brdf.model_index(),
-                first_thread: (threads.len() / words_a_thread(thread_table)) as u32,
-                thread_count: thread_count as u32,
-                row_count: row_count as u32,
-                first_slice: slices.len() as u32,
-                lobe_width: half_vector_width(brdf) as f32,
-                padding: [0; 2],
-            });
             if let Some(table) = thread_table {
-                append_threads(&mut threads, table);
+                [record.row_count, record.thread_count] = table.size().map(|size| size as u32);
+                record.first_thread = (threads.len() / table.device_element_words()) as u32;
+                threads.extend(table.device_words());
             }
+            record.first_slice = slices.len() as u32;
+            records.push(record);
             if use_slices {
                 slices.extend(SliceTable::new(brdf).cdfs);
             }
@@ -99,30 +77,6 @@ impl DeviceMaterials {
             table_sampler: Sampler::new(device, "brdf tables", SamplerKind::WrappedLinear)?,
             models_used,
         })
-    }
-}
-
-/// Words of an element of the buffer of threads, as their shader declares it: a vec4, or a word.
-fn words_a_thread(threads: Option<&Threads>) -> usize {
-    if matches!(threads, Some(Threads::Paper(_))) { 4 } else { 1 }
-}
-
-/// Appends `threads` as their shader reads them: glsl/methods/paper.glsl, glsl/methods/fitted.glsl.
-fn append_threads(words: &mut Vec<u32>, threads: &Threads) {
-    match threads {
-        Threads::Fitted(table) => {
-            for (row, cosine_part) in table.cosine_part.iter().enumerate() {
-                words.extend(cosine_part.map(f32::to_bits));
-                words.extend(table.row(row).iter().flat_map(|kernel| kernel.0));
-            }
-        }
-        Threads::Paper(table) => {
-            for (row, [red, green, blue]) in table.albedo.iter().copied().enumerate() {
-                words.extend([red, green, blue, 0.0].map(f32::to_bits));
-                let thread = |sample: &Sample| sample.direction().as_vec3().extend(sample.p.log2()).to_array();
-                words.extend(table.row(row).iter().flat_map(thread).map(f32::to_bits));
-            }
-        }
     }
 }
 

@@ -3,10 +3,10 @@
 //! It starts from the texels of the geometry cache, so that the two can be compared pixel by pixel. BRDFs are evaluated
 //! in double precision; everything else follows the shader line by line.
 use crate::Result;
-use crate::brdf::half_vector_width;
-use crate::environment::{Alias, Environment, LightMap, LightSource, Pyramid, VmfPyramid};
+use crate::brdf::MaterialRecord;
+use crate::environment::{Alias, Environment, LightMap, Pyramid, SourceRecord, VmfPyramid};
+use crate::geometry_texel::GeometryTexel;
 use crate::method::Method;
-use crate::packing::{octahedral_decode, unpack_snorm_2x16};
 use crate::passes::SMOOTH_DEG;
 use crate::prepare::{Prepared, PreparedMaterial};
 use crate::threads::SliceTable;
@@ -70,26 +70,19 @@ fn any_tangent(n: Vec3) -> Vec3 {
     Vec3::new(1.0 + s * n.x * n.x * a, s * n.x * n.y * a, -s * n.x)
 }
 
-/// Normal and material index of a texel of the geometry cache; `None` for the background.
-/// Twin of `geometry_normal` and `geometry_material`.
-pub fn unpack_geometry(texel: UVec2) -> Option<(Vec3, usize)> {
-    let normal = octahedral_decode(unpack_snorm_2x16(texel.x));
-    (texel.y != 0).then(|| (normal, texel.y as usize - 1))
-}
-
 /// Whether the sub-pixels of a pixel lie on one smooth surface. Twin of glsl/classify.comp.
 pub fn is_interior(texels: &[UVec2]) -> bool {
-    let Some((first_normal, first_material)) = texels.first().copied().and_then(unpack_geometry) else { return false };
+    let Some(first) = texels.first().copied().and_then(GeometryTexel::unpack) else { return false };
     texels.iter().all(|texel| {
-        unpack_geometry(*texel).is_some_and(|(normal, material)| {
-            material == first_material && normal.dot(first_normal) >= SMOOTH_DEG.to_radians().cos()
+        GeometryTexel::unpack(*texel).is_some_and(|GeometryTexel { normal, material }| {
+            material == first.material && normal.dot(first.normal) >= SMOOTH_DEG.to_radians().cos()
         })
     })
 }
 
 /// The sum of the normals of these sub-pixels. Twin of `normal_sum` in glsl/shade.comp.
 fn normal_sum(texels: &[UVec2]) -> Vec3 {
-    texels.iter().filter_map(|texel| unpack_geometry(*texel)).map(|(normal, _)| normal).sum()
+    texels.iter().filter_map(|texel| GeometryTexel::unpack(*texel)).map(|texel| texel.normal).sum()
 }
 
 /// Variance of the normal above which a pixel is a sum for each sub-pixel; why, says the shader.
@@ -104,15 +97,15 @@ pub struct CpuShader<'a> {
     aliases: Vec<Alias>,
     /// One for each material, for methods that draw by them.
     slices: Vec<SliceTable>,
-    /// `half_vector_width` of each material.
-    lobe_widths: Vec<f32>,
+    /// One for each material.
+    records: Vec<MaterialRecord>,
 }
 
 /// What fitted threads look up.
 struct BlurredLight<'a> {
     rest: &'a VmfPyramid,
     sources: Option<&'a VmfPyramid>,
-    source_list: &'a [LightSource],
+    source_list: Vec<SourceRecord>,
     irradiance: &'a Pyramid,
     map: LightMap,
 }
@@ -123,7 +116,7 @@ impl<'a> BlurredLight<'a> {
         Ok(Self {
             rest: blurred(environment.rest())?,
             sources: environment.sources_alone().map(blurred).transpose()?,
-            source_list: &environment.small_sources().list,
+            source_list: environment.small_sources().list.iter().map(|source| source.record(1.0)).collect(),
             irradiance: environment.rest().irradiance(),
             map: LightMap::with_sources_marked(environment),
         })
@@ -149,7 +142,7 @@ impl<'a> CpuShader<'a> {
             aliases: aliases.map(LightMap::aliases).unwrap_or_default(),
             map,
             slices: vec![],
-            lobe_widths: prepared.materials.iter().map(|material| half_vector_width(&material.brdf) as f32).collect(),
+            records: prepared.materials.iter().map(|material| MaterialRecord::new(&material.brdf)).collect(),
         };
         if shader.declares("Slices")? {
             twin.slices = prepared.materials.iter().map(|material| SliceTable::new(&material.brdf)).collect();
@@ -174,9 +167,9 @@ impl<'a> CpuShader<'a> {
             Surface { normal_variance, ..Surface::new(to_environment(normal), to_environment(w_o)) }
         };
         let axis = to_environment(rays.right());
-        let first_texel = texels.first().copied().and_then(unpack_geometry);
+        let first_texel = texels.first().copied().and_then(GeometryTexel::unpack);
         let middle = (interior && may_share && normal_variance < SHARED_VARIANCE).then_some(first_texel).flatten();
-        let middle = middle.map(|(_, material)| {
+        let middle = middle.map(|GeometryTexel { material, .. }| {
             let position = (pixel.as_vec2() + 0.5) / UVec2::new(view.width, view.height).as_vec2();
             let surface = surface_at(position, normals.normalize(), normal_variance);
             Point { twin: self, surface, axis, material, subpixel: pixel * view.subpixels, first: 0, stride: 1 }
@@ -189,7 +182,7 @@ impl<'a> CpuShader<'a> {
         let mut sum = Vec3::ZERO;
         let mut covered = 0;
         for (j, texel) in texels.iter().enumerate() {
-            let Some((normal, material)) = unpack_geometry(*texel) else { continue };
+            let Some(GeometryTexel { normal, material }) = GeometryTexel::unpack(*texel) else { continue };
             covered += 1;
             let subpixel = pixel * view.subpixels + UVec2::new(j as u32 % view.subpixels, j as u32 / view.subpixels);
             let surface = surface_at((subpixel.as_vec2() + 0.5) / size.as_vec2(), normal, normal_variance);
@@ -237,7 +230,7 @@ impl Point<'_> {
     }
 
     fn lobe_width(&self) -> f32 {
-        self.twin.lobe_widths[self.material]
+        self.twin.records[self.material].lobe_width
     }
 
     fn sample_count(&self) -> u32 {
