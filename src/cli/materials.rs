@@ -18,11 +18,13 @@ impl Materials {
         }
         let list = |names: &[&str]| names.join(", ");
         let models: Vec<_> = Brdf::MODELS.iter().copied().filter(|model| *model != "merl").collect();
-        let methods: Vec<_> = Method::ALL.iter().map(|method| method.name()).collect();
         writeln!(out, "Models (in a .toml or a scene file): {}", list(&models))?;
         writeln!(out, "Environments (--environment; or an .hdr or .exr): {}", list(environment::builtin_names()))?;
         writeln!(out, "Meshes (--mesh; or an .obj): {}", list(mesh::builtin_names()))?;
-        writeln!(out, "Methods (--method): {}", list(&methods))?;
+        writeln!(out, "Methods (--method):")?;
+        for method in Method::ALL {
+            writeln!(out, "  {:<24} {}", method.name(), method.summary())?;
+        }
         Ok(())
     }
 }

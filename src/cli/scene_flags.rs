@@ -1,10 +1,10 @@
 //! The flags that say what is rendered, and on what: `render` and `view` have them in common.
 use super::{cache_folder, number};
-use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::value_parser;
 use std::path::PathBuf;
 use threadlight::environment;
-use threadlight::method::Method;
+use threadlight::method::{DEFAULT_SAMPLES, Method};
 use threadlight::scene::{
     Background, EXPOSURE, GAMMA, MAX_SAMPLES, MAX_SIZE_PX, MAX_SUBPIXELS, MaterialSource, Scene, Source, mesh,
 };
@@ -26,9 +26,7 @@ pub struct SceneFlags {
     /// Shading method.
     #[arg(long, value_name = "NAME", value_parser = methods())]
     pub method: Option<String>,
-    /// Sample threads per pixel: fitted 1 to 128 (default 16), paper 1 to 1024 (default 100); or samples per pixel of methods that
-    /// have none, 1 to 10000 (default 100).
-    #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=i64::from(MAX_SAMPLES)))]
+    #[arg(long, help = threads_help(), value_name = "N", value_parser = value_parser!(u32).range(1..=i64::from(MAX_SAMPLES)))]
     pub threads: Option<u32>,
     /// Sub-pixels per axis, 1 to 4.
     #[arg(long, value_name = "S", value_parser = value_parser!(u32).range(1..=i64::from(MAX_SUBPIXELS)))]
@@ -117,9 +115,24 @@ pub fn parse_size(text: &str) -> Result<(u32, u32), String> {
     sides.ok_or_else(|| format!("use width x height in pixels, each 1 to {MAX_SIZE_PX}, such as 640x480"))
 }
 
-/// The name of a method.
+/// The name of a method; an older one is read too.
 fn methods() -> PossibleValuesParser {
-    PossibleValuesParser::new(Method::ALL.iter().map(|method| method.name()))
+    PossibleValuesParser::new(Method::ALL.iter().map(|method| {
+        let value = PossibleValue::new(method.name()).help(method.summary());
+        method.older_name().into_iter().fold(value, PossibleValue::alias)
+    }))
+}
+
+/// What `--threads` takes.
+fn threads_help() -> String {
+    let kinds = Method::ALL.iter().filter_map(|method| {
+        let kind = method.threads()?;
+        Some(format!("{} 1 to {} (default {})", method.name(), kind.max_count(), kind.default_count()))
+    });
+    let kinds = kinds.collect::<Vec<_>>().join(", ");
+    format!(
+        "Sample threads per pixel: {kinds}; or samples per pixel of methods that have none, 1 to {MAX_SAMPLES} (default {DEFAULT_SAMPLES})"
+    )
 }
 
 /// `environment` or `none`.

@@ -13,19 +13,26 @@ use crate::threads::SliceTable;
 use glam::{Mat3, UVec2, Vec2, Vec3, Vec4};
 use random::random_bits;
 
-mod cosine;
-mod environment;
-mod filtered;
-mod fitted;
-mod importance;
 mod importance_sampling;
 mod light_sampling;
 mod low_discrepancy;
-mod mis;
-mod paper;
 mod random;
-mod ris;
-mod uniform;
+
+/// Makes the modules and the dispatch from the table in methods.rs.
+macro_rules! methods {
+    ($($name:ident => $Method:ident: $properties:expr,)+) => {
+        $(mod $name;)+
+
+        /// The estimate of `method` for `point`.
+        fn estimate(method: Method, point: &Point) -> Vec3 {
+            match method {
+                $(Method::$Method => $name::estimate(point),)+
+                Method::Reference => unreachable!("a twin is made for methods that have a shader"),
+            }
+        }
+    };
+}
+include!("methods.rs");
 
 /// A point to shade: its shading frame and view angle. Twin of `Surface` in glsl/surface.glsl.
 #[derive(Clone, Copy, Debug)]
@@ -211,18 +218,7 @@ struct Point<'a> {
 
 impl Point<'_> {
     fn estimate(&self) -> Vec3 {
-        match self.twin.prepared.method {
-            Method::Fitted => fitted::estimate(self),
-            Method::Paper => paper::estimate(self),
-            Method::Uniform => uniform::estimate(self),
-            Method::Cosine => cosine::estimate(self),
-            Method::Importance => importance::estimate(self),
-            Method::Filtered => filtered::estimate(self),
-            Method::Environment => environment::estimate(self),
-            Method::Ris => ris::estimate(self),
-            Method::Mis => mis::estimate(self),
-            Method::Reference => unreachable!("a twin is made for methods that have a shader"),
-        }
+        estimate(self.twin.prepared.method, self)
     }
 
     fn material(&self) -> &PreparedMaterial {
