@@ -59,12 +59,8 @@ pub fn load_material(source: &MaterialSource) -> Result<Brdf> {
     match source {
         MaterialSource::File(path) => Brdf::load(path),
         MaterialSource::Builtin(name) => Brdf::builtin(name).ok_or_else(|| {
-            let known: Vec<_> = Brdf::builtin_names().collect();
-            Error::input(
-                format!("material \"{name}\""),
-                "is neither built in nor a file",
-                format!("name a .binary or .toml file or one of: {}", known.join(", ")),
-            )
+            let remedy = format!("give {}", Brdf::FILES.files_or_builtins());
+            Error::input(format!("material \"{name}\""), "is neither built in nor a file", remedy)
         }),
         MaterialSource::Model { model, parameters } => Brdf::from_parameters(model, parameters.clone()),
     }

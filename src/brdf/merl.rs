@@ -8,8 +8,9 @@ use std::sync::Arc;
 
 use glam::{DVec2, DVec3, Vec4, dvec2, dvec3};
 
-use super::{Model, Parameters};
+use super::{Brdf, Model, Parameters};
 use crate::error::{Error, Result};
+use crate::file_format::FileFormat;
 
 /// Bins over theta_h (square-root spaced, 0 to 90 degrees).
 pub const THETA_H_BINS: usize = 90;
@@ -24,6 +25,15 @@ const FILE_BYTES: usize = HEADER_BYTES + 3 * 8 * CELLS;
 
 /// Stored value to 1/sr, per channel (the database's own reader, BRDFRead.cpp).
 const SCALE: [f64; 3] = [1.0 / 1500.0, 1.15 / 1500.0, 1.66 / 1500.0];
+
+pub(super) const FORMAT: FileFormat<Brdf> =
+    FileFormat { extension: "binary", name: "a MERL .binary", is_of_format: |_| true, parse };
+
+fn parse(path: &Path, bytes: &[u8]) -> Result<Brdf> {
+    MerlTable::from_bytes(bytes).map(Brdf::MerlTable).map_err(|problem| {
+        Error::in_file(path, problem, "fetch or write the file again; a MERL table is 90 x 90 x 180 cells")
+    })
+}
 
 /// A measured BRDF. Cheap to clone.
 #[derive(Clone)]
@@ -40,16 +50,8 @@ impl std::fmt::Debug for MerlTable {
 }
 
 impl MerlTable {
-    /// Reads a `.binary` file. Errors: unreadable, other dimensions, wrong size, a value that is not finite, nothing
-    /// but zeros or invalid cells.
-    pub fn load(path: &Path) -> Result<Self> {
-        let bytes = std::fs::read(path).map_err(|cause| Error::unreadable(path, cause))?;
-        Self::from_bytes(&bytes).map_err(|problem| {
-            Error::in_file(path, problem, "fetch or write the file again; a MERL table is 90 x 90 x 180 cells")
-        })
-    }
-
-    /// The table in the bytes of a `.binary` file; the error is what is wrong with them.
+    /// The table in the bytes of a `.binary` file; the error is what is wrong with them: other dimensions, wrong size, a value that is
+    /// not finite, nothing but zeros or invalid cells.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, String> {
         let header = bytes.get(..HEADER_BYTES).ok_or("is too short to be a MERL table")?;
         let dims: Vec<i32> = header.as_chunks().0.iter().map(|&dim| i32::from_le_bytes(dim)).collect();

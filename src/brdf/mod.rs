@@ -8,12 +8,14 @@ use std::path::Path;
 use glam::{DVec2, DVec3, dvec3};
 
 use crate::error::{Error, Result};
+use crate::file_format::{self, FileKind};
 
 mod builtin;
 mod lobe;
 mod microfacet;
 mod parameters;
 mod record;
+mod toml_file;
 
 pub use lobe::{MIN_COS_THETA_D, half_vector_width, lobe_radius};
 pub use microfacet::{Distribution, fresnel_conductor, fresnel_dielectric};
@@ -97,16 +99,19 @@ impl Brdf {
         dispatch!(self, model => model.evaluate_all(w_i, w_o))
     }
 
-    /// Reads a material file: a MERL table (`.binary`), or a TOML file with `model = "..."` and the model's parameters.
+    /// The formats of material files.
+    pub const FILES: FileKind<Brdf> = FileKind {
+        what: "material",
+        formats: &[merl::FORMAT, toml_file::FORMAT],
+        builtin_names: || Brdf::builtin_names().collect(),
+    };
+
+    /// Reads a material file: see [`Self::FILES`].
+    ///
+    /// # Errors
+    /// What cannot be read or is no material.
     pub fn load(path: &Path) -> Result<Brdf> {
-        match path.extension().and_then(|extension| extension.to_str()) {
-            Some("binary") => Ok(Brdf::MerlTable(MerlTable::load(path)?)),
-            Some("toml") => {
-                let (model, parameters) = Brdf::load_model(path)?;
-                Brdf::from_parameters(&model, parameters).map_err(|error| error.within(path.display()))
-            }
-            _ => Err(Error::in_file(path, "is not a material file", "name a MERL .binary or a .toml with a model")),
-        }
+        Self::FILES.load(path)
     }
 
     /// A BRDF from `model` and its parameters as they stand in a scene file. Errors name the key; use [`Error::within`] to
@@ -130,8 +135,7 @@ impl Brdf {
 
     /// The model that a material file (`.toml`) names, and its parameters, not yet checked.
     pub fn load_model(path: &Path) -> Result<(String, toml::Table)> {
-        let text = std::fs::read_to_string(path).map_err(|cause| Error::unreadable(path, cause))?;
-        model_of(&text).map_err(|error| error.within(path.display()))
+        toml_file::parse_model(path, &file_format::read(path)?)
     }
 
     /// The model of the built-in material `name`, and its parameters.

@@ -3,10 +3,11 @@ use super::{cache_folder, number};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::value_parser;
 use std::path::PathBuf;
-use threadlight::environment;
+use threadlight::brdf::Brdf;
+use threadlight::environment::{self, Environment};
 use threadlight::method::{DEFAULT_SAMPLES, Method};
 use threadlight::scene::{
-    Background, EXPOSURE, GAMMA, MAX_SAMPLES, MAX_SIZE_PX, MAX_SUBPIXELS, MaterialSource, Scene, Source, mesh,
+    Background, EXPOSURE, GAMMA, MAX_SAMPLES, MAX_SIZE_PX, MAX_SUBPIXELS, MaterialSource, Mesh, Scene, Source, mesh,
 };
 
 /// What is rendered.
@@ -14,14 +15,11 @@ use threadlight::scene::{
 pub struct SceneFlags {
     /// Scene file (TOML); without one, the built-in scene: a gold sphere in a studio.
     pub scene: Option<PathBuf>,
-    /// Mesh in place of the scene's objects: a built-in name or an OBJ file.
-    #[arg(long, value_name = "NAME|FILE")]
+    #[arg(long, help = format!("Mesh in place of the scene's objects: a built-in name or {}", Mesh::FILES.names()), value_name = "NAME|FILE")]
     pub mesh: Option<String>,
-    /// Material of every object: a built-in name, a MERL .binary, or a .toml with a model and its parameters.
-    #[arg(long, value_name = "NAME|FILE")]
+    #[arg(long, help = format!("Material of every object: a built-in name or {}", Brdf::FILES.names()), value_name = "NAME|FILE")]
     pub material: Option<String>,
-    /// Light from all directions: a built-in name, a Radiance .hdr or an .exr, latitude-longitude.
-    #[arg(long, value_name = "NAME|FILE")]
+    #[arg(long, help = environment_help(), value_name = "NAME|FILE")]
     pub environment: Option<String>,
     /// Shading method.
     #[arg(long, value_name = "NAME", value_parser = methods())]
@@ -121,6 +119,11 @@ fn methods() -> PossibleValuesParser {
         let value = PossibleValue::new(method.name()).help(method.summary());
         method.older_name().into_iter().fold(value, PossibleValue::alias)
     }))
+}
+
+/// What `--environment` takes.
+fn environment_help() -> String {
+    format!("Light from all directions: a built-in name or {}, latitude-longitude", Environment::FILES.names())
 }
 
 /// What `--threads` takes.

@@ -10,6 +10,8 @@ use crate::threads::Observer;
 
 mod cache;
 pub mod cube;
+mod exr_file;
+mod hdr_file;
 mod irradiance;
 mod light_map;
 mod load;

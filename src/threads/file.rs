@@ -30,6 +30,7 @@ use serde::{Deserialize, Serialize};
 use super::fitted::FittedTable;
 use super::{ThreadKind, ThreadTable, Threads};
 use crate::error::{Error, Result};
+use crate::file_format;
 use crate::output::write_whole;
 
 /// Version of the file format and of the threads in it: to be raised when either changes, since caches depend on it.
@@ -54,7 +55,7 @@ pub fn write(threads: &Threads, path: &Path) -> Result<()> {
 
 /// Reads threads back. Errors: unreadable, not a thread file, of another version, damaged.
 pub fn read(path: &Path) -> Result<Threads> {
-    let bytes = std::fs::read(path).map_err(|cause| Error::unreadable(path, cause))?;
+    let bytes = file_format::read(path)?;
     decode(&bytes).map_err(|problem| Error::in_file(path, problem, "generate it again"))
 }
 

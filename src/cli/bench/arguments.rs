@@ -98,7 +98,7 @@ impl CasesArguments {
     /// The scene that `text` names: a scene file, or a mesh in the built-in scene.
     fn scene_of(&self, text: &str, size: Option<(u32, u32)>) -> Result<Scene> {
         let path = Path::new(text);
-        let mut scene = if path.extension().is_some_and(|extension| extension == "toml") {
+        let mut scene = if Scene::FILES.format_of(path).is_ok() {
             Scene::load(path)?
         } else {
             let mut scene = Scene::default();

@@ -1,6 +1,6 @@
 //! Which environment, its turn and its intensity.
 use super::{group, on_change, source};
-use crate::environment;
+use crate::environment::{self, Environment};
 use crate::scene::Source;
 use crate::viewer::input::Input;
 use crate::viewer::session::Change;
@@ -17,8 +17,11 @@ impl State {
         let settings = &viewer.session.wanted().environment;
         group(ui, "Light", |ui| {
             let (current, names) = (settings.source.to_string(), environment::builtin_names());
-            let tooltip = "Distant light from all directions: a built-in environment, or a latitude-longitude picture (.hdr, .exr).";
-            let chosen = source(ui, "environment", &current, names, &mut self.path, tooltip, "file: .hdr or .exr");
+            let files = &Environment::FILES;
+            let tooltip =
+                format!("Distant light from all directions: built in, or {}, latitude-longitude.", files.names());
+            let hint = format!("file: {}", files.extensions());
+            let chosen = source(ui, "environment", &current, names, &mut self.path, &tooltip, &hint);
             if let Some(name) = chosen {
                 inputs.push(Input::Set(Change::Environment(Source::named(&name, names))));
             }

@@ -31,8 +31,10 @@ impl State {
                 MaterialSource::File(path) => path.display().to_string(),
                 MaterialSource::Model { model, .. } => format!("{} ({model})", settings.name),
             };
-            let tooltip = "The BRDF of all objects: a built-in model, a measured MERL table (.binary) or a model with its parameters (.toml).";
-            let chosen = source(ui, "material", &current, &names, &mut self.path, tooltip, "file: .binary or .toml");
+            let files = &Brdf::FILES;
+            let tooltip = format!("The BRDF of all objects: built in, or {}.", files.names());
+            let hint = format!("file: {}", files.extensions());
+            let chosen = source(ui, "material", &current, &names, &mut self.path, &tooltip, &hint);
             if let Some(name) = chosen {
                 inputs.push(Input::Set(Change::Material(MaterialSource::named(&name))));
             }
