@@ -19,7 +19,7 @@ mod toml_file;
 
 pub use lobe::{MIN_COS_THETA_D, half_vector_width, lobe_radius};
 pub use microfacet::{Distribution, fresnel_conductor, fresnel_dielectric};
-pub use parameters::{Domain, Parameter, Parameters};
+pub use parameters::{Domain, Parameter, Parameters, Spacing, as_number, channels};
 pub use record::MaterialRecord;
 
 /// What every model offers; [`Brdf`] dispatches to it.
