@@ -63,6 +63,7 @@ pub fn load_material(source: &MaterialSource) -> Result<Brdf> {
             Error::input(format!("material \"{name}\""), "is neither built in nor a file", remedy)
         }),
         MaterialSource::Model { model, parameters } => Brdf::from_parameters(model, parameters.clone()),
+        MaterialSource::Custom(custom) => Ok(Brdf::Custom(custom.clone())),
     }
 }
 

@@ -17,6 +17,7 @@ mod parameters;
 mod record;
 mod toml_file;
 
+pub use custom::CustomBrdf;
 pub use lobe::{MIN_COS_THETA_D, half_vector_width, lobe_radius};
 pub use microfacet::{Distribution, fresnel_conductor, fresnel_dielectric};
 pub use parameters::{Domain, Parameter, Parameters, Spacing, as_number, channels};
@@ -24,6 +25,9 @@ pub use record::MaterialRecord;
 
 /// What every model offers; [`Brdf`] dispatches to it.
 pub trait Model: Sized {
+    /// Whether material and scene files can have its parameters.
+    const HAS_PARAMETERS: bool = true;
+
     /// f(w_i, w_o) in 1/sr, linear Rec. 709, for unit vectors with both z positive.
     fn evaluate(&self, w_i: DVec3, w_o: DVec3) -> DVec3;
 
@@ -35,8 +39,10 @@ pub trait Model: Sized {
     /// Reads the model's parameters from a table; unknown keys are reported by the caller.
     fn from_parameters(parameters: &mut Parameters) -> Result<Self>;
 
-    /// The model's parameters as its GLSL twin expects them: `BrdfParameters { vec4 a, b, c }`.
-    fn gpu_parameters(&self) -> [f32; 12];
+    /// The model's parameters as its GLSL twin expects them: `BrdfParameters { vec4 a, b, c }`. None of a model that has no twin.
+    fn gpu_parameters(&self) -> [f32; 12] {
+        [0.0; 12]
+    }
 
     /// Adds everything that `evaluate` depends on to `hasher`.
     fn hash_content(&self, hasher: &mut blake3::Hasher);
@@ -57,6 +63,12 @@ macro_rules! brdf_models {
             /// Names of all models; a model's position is its id in shaders.
             pub const MODELS: &[&str] = &[$(stringify!($name)),+];
 
+            /// Names of the models whose parameters material and scene files can have.
+            pub fn models_with_parameters() -> Vec<&'static str> {
+                let models = [$((stringify!($name), $Model::HAS_PARAMETERS)),+];
+                models.into_iter().filter_map(|(name, has_parameters)| has_parameters.then_some(name)).collect()
+            }
+
             /// Name of this BRDF's model: one of [`Brdf::MODELS`].
             pub fn model(&self) -> &'static str {
                 match self { $(Brdf::$Model(_) => stringify!($name),)+ }
@@ -66,7 +78,7 @@ macro_rules! brdf_models {
                 match model {
                     $(stringify!($name) => Ok(Brdf::$Model($Model::from_parameters(parameters)?)),)+
                     _ => Err(Error::input(
-                        format!("model `{model}`"), "is not known", format!("use one of {}", Brdf::MODELS.join(", ")),
+                        format!("model `{model}`"), "is not known", format!("use one of {}", Brdf::models_with_parameters().join(", ")),
                     )),
                 }
             }
@@ -81,6 +93,7 @@ macro_rules! brdf_models {
     };
 }
 include!("models.rs");
+include!(concat!(env!("OUT_DIR"), "/brdf_twins.rs"));
 
 impl Brdf {
     /// f(w_i, w_o) in 1/sr, per linear Rec. 709 channel; 0 where a cosine is not positive.
@@ -154,9 +167,10 @@ impl Brdf {
         builtin::MATERIALS.iter().map(|(name, _)| *name)
     }
 
-    /// Id of the model in shaders: its position in models.rs.
+    /// Id of the model by which shaders evaluate it: its position in models.rs, or that of measured tables if it has no twin.
     pub fn model_index(&self) -> u32 {
-        Brdf::MODELS.iter().position(|name| *name == self.model()).expect("MODELS holds every model") as u32
+        let twin = if TWINS.contains(&self.model()) { self.model() } else { "merl" };
+        Brdf::MODELS.iter().position(|name| *name == twin).expect("MODELS holds every model") as u32
     }
 
     /// The model's parameters for its GLSL twin, `BrdfParameters { vec4 a, b, c }` in memory order.
@@ -164,11 +178,13 @@ impl Brdf {
         dispatch!(self, model => model.gpu_parameters())
     }
 
-    /// The measured table, for models that have one to upload.
-    pub fn table(&self) -> Option<&MerlTable> {
+    /// What shaders look the BRDF up in, if they do not evaluate it: the measured table, or one that is made of a model without a twin.
+    pub fn table(&self) -> Option<MerlTable> {
         match self {
-            Brdf::MerlTable(table) => Some(table),
-            _ => None,
+            Brdf::MerlTable(table) => Some(table.clone()),
+            Brdf::Custom(custom) => Some(custom.table()),
+            model if TWINS.contains(&model.model()) => None,
+            model => Some(MerlTable::of(|w_i, w_o| model.evaluate(w_i, w_o))),
         }
     }
 
@@ -215,7 +231,7 @@ fn model_of(text: &str) -> Result<(String, toml::Table)> {
     let mut table: toml::Table = text.parse().map_err(|error: toml::de::Error| {
         Error::input("TOML", error.message().replace('\n', " "), "correct the file's syntax")
     })?;
-    let models = Brdf::MODELS.join(", ");
+    let models = Brdf::models_with_parameters().join(", ");
     match table.remove("model") {
         Some(toml::Value::String(model)) => Ok((model, table)),
         Some(_) => Err(Error::input("model", "is not a string", format!("name one of {models}"))),

@@ -18,8 +18,7 @@ impl Materials {
             writeln!(out, "  {name:<24} {model}")?;
         }
         let list = |names: &[&str]| names.join(", ");
-        let models: Vec<_> = Brdf::MODELS.iter().copied().filter(|model| *model != "merl").collect();
-        writeln!(out, "Models (in a .toml or a scene file): {}", list(&models))?;
+        writeln!(out, "Models (in a .toml or a scene file): {}", list(&Brdf::models_with_parameters()))?;
         writeln!(
             out,
             "Environments (--environment; or {}): {}",

@@ -1,13 +1,12 @@
 //! The flags that say what is rendered, and on what: `render` and `view` have them in common.
-use super::{cache_folder, number};
+use super::{cache_folder, nameable, number};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::value_parser;
 use std::path::PathBuf;
-use threadlight::brdf::Brdf;
-use threadlight::environment::{self, Environment};
-use threadlight::method::{DEFAULT_SAMPLES, Method};
+use threadlight::environment;
+use threadlight::method::Method;
 use threadlight::scene::{
-    Background, EXPOSURE, GAMMA, MAX_SAMPLES, MAX_SIZE_PX, MAX_SUBPIXELS, MaterialSource, Mesh, Scene, Source, mesh,
+    Background, EXPOSURE, GAMMA, MAX_SAMPLES, MAX_SIZE_PX, MAX_SUBPIXELS, MaterialSource, Scene, Source, mesh,
 };
 
 /// What is rendered.
@@ -15,16 +14,16 @@ use threadlight::scene::{
 pub struct SceneFlags {
     /// Scene file (TOML); without one, the built-in scene: a gold sphere in a studio.
     pub scene: Option<PathBuf>,
-    #[arg(long, help = format!("Mesh in place of the scene's objects: a built-in name or {}", Mesh::FILES.names()), value_name = "NAME|FILE")]
+    #[arg(long, help = nameable::mesh("Mesh in place of the scene's objects"), value_name = "NAME|FILE")]
     pub mesh: Option<String>,
-    #[arg(long, help = format!("Material of every object: a built-in name or {}", Brdf::FILES.names()), value_name = "NAME|FILE")]
+    #[arg(long, help = nameable::material("Material of every object"), value_name = "NAME|FILE")]
     pub material: Option<String>,
-    #[arg(long, help = environment_help(), value_name = "NAME|FILE")]
+    #[arg(long, help = nameable::environment("Light from all directions"), value_name = "NAME|FILE")]
     pub environment: Option<String>,
     /// Shading method.
     #[arg(long, value_name = "NAME", value_parser = methods())]
     pub method: Option<String>,
-    #[arg(long, help = threads_help(), value_name = "N", value_parser = value_parser!(u32).range(1..=i64::from(MAX_SAMPLES)))]
+    #[arg(long, help = nameable::counts(), value_name = "N", value_parser = value_parser!(u32).range(1..=i64::from(MAX_SAMPLES)))]
     pub threads: Option<u32>,
     /// Sub-pixels per axis, 1 to 4.
     #[arg(long, value_name = "S", value_parser = value_parser!(u32).range(1..=i64::from(MAX_SUBPIXELS)))]
@@ -119,23 +118,6 @@ fn methods() -> PossibleValuesParser {
         let value = PossibleValue::new(method.name()).help(method.summary());
         method.older_name().into_iter().fold(value, PossibleValue::alias)
     }))
-}
-
-/// What `--environment` takes.
-fn environment_help() -> String {
-    format!("Light from all directions: a built-in name or {}, latitude-longitude", Environment::FILES.names())
-}
-
-/// What `--threads` takes.
-fn threads_help() -> String {
-    let kinds = Method::ALL.iter().filter_map(|method| {
-        let kind = method.threads()?;
-        Some(format!("{} 1 to {} (default {})", method.name(), kind.max_count(), kind.default_count()))
-    });
-    let kinds = kinds.collect::<Vec<_>>().join(", ");
-    format!(
-        "Sample threads per pixel: {kinds}; or samples per pixel of methods that have none, 1 to {MAX_SAMPLES} (default {DEFAULT_SAMPLES})"
-    )
 }
 
 /// `environment` or `none`.

@@ -1,6 +1,6 @@
 //! Pass 2 of the paper (section 4.2): the radiance of every listed pixel, by its partition of the sample threads.
 use super::{CameraRays, Counters, DeviceLight, FrameGraph, Identity, Tiles, View, clear};
-use crate::brdf::{Brdf, MaterialRecord};
+use crate::brdf::{Brdf, MaterialRecord, MerlTable};
 use crate::graph::{self, Access, BufferDesc, Image};
 use crate::method::Method;
 use crate::threads::{SliceTable, Threads};
@@ -46,8 +46,8 @@ impl DeviceMaterials {
         let mut models_used = 0;
         for (brdf, thread_table) in materials {
             let mut record = MaterialRecord::new(brdf);
-            if let Some(table) = brdf.table().filter(|_| evaluates_brdf) {
-                record = record.with_table_at(tables.add(device, table.texels())?);
+            if let Some(table) = evaluates_brdf.then(|| brdf.table()).flatten() {
+                record = record.with_table_at(tables.add(device, table)?);
             }
             if evaluates_brdf {
                 models_used |= 1 << record.model;
@@ -82,15 +82,15 @@ impl DeviceMaterials {
 
 /// All measured tables in one 3D image: side by side along theta_d (y) and theta_h (z), since phi_d (x) repeats.
 #[derive(Default)]
-struct TableAtlas<'a>(Vec<&'a [glam::Vec4]>);
+struct TableAtlas(Vec<MerlTable>);
 
 /// Texels of a table along phi_d, and along each of theta_d and theta_h.
 const TABLE_WIDTH: usize = crate::brdf::merl::PHI_D_BINS;
 const TABLE_SIDE: usize = crate::brdf::merl::THETA_D_BINS;
 
-impl<'a> TableAtlas<'a> {
+impl TableAtlas {
     /// Adds a table; returns its offset in y and z, in texels.
-    fn add(&mut self, device: &Device, texels: &'a [glam::Vec4]) -> Result<[usize; 2]> {
+    fn add(&mut self, device: &Device, table: MerlTable) -> Result<[usize; 2]> {
         let per_axis = device.limits().max_image_dimension3_d as usize / TABLE_SIDE;
         let index = self.0.len();
         if index >= per_axis * per_axis {
@@ -98,7 +98,7 @@ impl<'a> TableAtlas<'a> {
                 format!("has more measured materials than the {} that this device holds", per_axis * per_axis);
             return Err(Error::input("the scene", problem, "use fewer"));
         }
-        self.0.push(texels);
+        self.0.push(table);
         Ok([index % per_axis, index / per_axis].map(|place| place * TABLE_SIDE))
     }
 
@@ -115,7 +115,7 @@ impl<'a> TableAtlas<'a> {
         let mut texels = vec![glam::Vec4::ZERO; extent.iter().product()];
         for (index, table) in self.0.iter().enumerate() {
             let (y_0, z_0) = (index % per_axis * TABLE_SIDE, index / per_axis * TABLE_SIDE);
-            for (line, source) in table.chunks_exact(TABLE_WIDTH).enumerate() {
+            for (line, source) in table.texels().chunks_exact(TABLE_WIDTH).enumerate() {
                 let (y, z) = (y_0 + line % TABLE_SIDE, z_0 + line / TABLE_SIDE);
                 let start = TABLE_WIDTH * (y + extent[1] * z);
                 texels[start..start + TABLE_WIDTH].copy_from_slice(source);
@@ -124,7 +124,10 @@ impl<'a> TableAtlas<'a> {
         let bytes = if format == single {
             bytemuck::cast_slice(&texels).to_vec()
         } else {
-            let half = texels.iter().flat_map(|texel| texel.to_array().map(half::f16::from_f32)).collect::<Vec<_>>();
+            let half = texels
+                .iter()
+                .flat_map(|texel| texel.to_array().map(|value| half::f16::from_f32(value.min(65504.0))))
+                .collect::<Vec<_>>();
             bytemuck::cast_slice(&half).to_vec()
         };
         let extent = extent.map(|size| size as u32);

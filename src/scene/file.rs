@@ -105,7 +105,7 @@ impl Scene {
     /// The scene as the text of a file: paths in `folder` and below are relative to it, others are absolute.
     ///
     /// # Errors
-    /// A path that is not UTF-8.
+    /// A path that is not UTF-8, a material that a program defines.
     pub fn to_toml(&self, folder: Option<&Path>) -> Result<String> {
         let text = SceneText::new(self, folder)?;
         toml::to_string_pretty(&text).map_err(|cause| {
@@ -341,6 +341,10 @@ fn material_table(material: &MaterialSettings, folder: Option<&Path>) -> Result<
         MaterialSource::Model { model, parameters } => {
             table.extend([("model".into(), model.clone().into())]);
             table.extend(parameters.clone());
+        }
+        MaterialSource::Custom(_) => {
+            let subject = format!("material \"{}\"", material.name);
+            return Err(Error::input(subject, "is defined by a program", "choose a model or a file before saving"));
         }
     }
     Ok(table)

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use glam::{DMat3, DQuat, EulerRot, Mat4, Quat, Vec3};
 use serde::{Deserialize, Serialize};
 
-use crate::brdf::Brdf;
+use crate::brdf::{Brdf, Custom};
 use crate::environment::Environment;
 use crate::error::Result;
 
@@ -171,6 +171,9 @@ pub enum MaterialSource {
         /// The keys beside it.
         parameters: toml::Table,
     },
+    /// One that a user of the crate defines; no file can have it.
+    #[serde(skip)]
+    Custom(Custom),
 }
 
 impl MaterialSource {

@@ -30,6 +30,7 @@ impl State {
                 MaterialSource::Builtin(name) => name.clone(),
                 MaterialSource::File(path) => path.display().to_string(),
                 MaterialSource::Model { model, .. } => format!("{} ({model})", settings.name),
+                MaterialSource::Custom(custom) => custom.name().to_owned(),
             };
             let files = &Brdf::FILES;
             let tooltip = format!("The BRDF of all objects: built in, or {}.", files.names());
