@@ -1,6 +1,6 @@
 //! File formats: by which extension a file is known, what it is called, how its bytes are read.
 //!
-//! A format is one file with a constant of [`FileFormat`], and an entry in the [`FileKind`] of what it holds. Loading, errors, help
+//! A format is one file with a constant `FORMAT`, and an entry in the `file_formats!` of what it holds. Loading, errors, help
 //! texts and what can be dropped on the viewer follow.
 use std::path::Path;
 
@@ -17,6 +17,15 @@ pub struct FileFormat<T: 'static> {
     /// Reads the bytes of the file at `path`, which is only named in errors.
     pub parse: fn(path: &Path, bytes: &[u8]) -> Result<T>,
 }
+
+/// Declares the modules of formats, and `FORMATS`, the list of them: an entry each.
+macro_rules! file_formats {
+    ($T:ty: $($module:ident),+ $(,)?) => {
+        $(mod $module;)+
+        const FORMATS: &[crate::file_format::FileFormat<$T>] = &[$($module::FORMAT),+];
+    };
+}
+pub(crate) use file_formats;
 
 /// All formats of what holds a `T`.
 pub struct FileKind<T: 'static> {

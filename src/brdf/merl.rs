@@ -3,15 +3,13 @@
 //! Matusik et al., "A Data-Driven Reflectance Model" (2003). The `.binary` file: three little-endian i32 (90, 90, 180), then
 //! the red, green and blue planes of f64, index phi_d + 180 (theta_d + 90 theta_h). Angles: Rusinkiewicz (1998).
 use std::f64::consts::{FRAC_1_PI, FRAC_2_PI, FRAC_PI_2, PI};
-use std::path::Path;
 use std::sync::Arc;
 
 use glam::{DMat3, DVec2, DVec3, Vec4, dvec2, dvec3};
 use rayon::prelude::*;
 
-use super::{Brdf, Model, Parameters};
+use super::{Model, Parameters};
 use crate::error::{Error, Result};
-use crate::file_format::FileFormat;
 
 /// Bins over theta_h (square-root spaced, 0 to 90 degrees).
 pub const THETA_H_BINS: usize = 90;
@@ -26,15 +24,6 @@ const FILE_BYTES: usize = HEADER_BYTES + 3 * 8 * CELLS;
 
 /// Stored value to 1/sr, per channel (the database's own reader, BRDFRead.cpp).
 const SCALE: [f64; 3] = [1.0 / 1500.0, 1.15 / 1500.0, 1.66 / 1500.0];
-
-pub(super) const FORMAT: FileFormat<Brdf> =
-    FileFormat { extension: "binary", name: "a MERL .binary", is_of_format: |_| true, parse };
-
-fn parse(path: &Path, bytes: &[u8]) -> Result<Brdf> {
-    MerlTable::from_bytes(bytes).map(Brdf::MerlTable).map_err(|problem| {
-        Error::in_file(path, problem, "fetch or write the file again; a MERL table is 90 x 90 x 180 cells")
-    })
-}
 
 /// A measured BRDF. Cheap to clone.
 #[derive(Clone)]

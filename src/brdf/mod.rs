@@ -8,20 +8,21 @@ use std::path::Path;
 use glam::{DVec2, DVec3, dvec3};
 
 use crate::error::{Error, Result};
-use crate::file_format::{self, FileKind};
+use crate::file_format::{self, FileKind, file_formats};
 
 mod builtin;
 mod lobe;
 mod microfacet;
 mod parameters;
 mod record;
-mod toml_file;
 
 pub use custom::CustomBrdf;
 pub use lobe::{MIN_COS_THETA_D, half_vector_width, lobe_radius};
 pub use microfacet::{Distribution, fresnel_conductor, fresnel_dielectric};
 pub use parameters::{Domain, Parameter, Parameters, Spacing, as_number, channels};
 pub use record::MaterialRecord;
+
+file_formats!(Brdf: merl_file, toml_file);
 
 /// What every model offers; [`Brdf`] dispatches to it.
 pub trait Model: Sized {
@@ -113,11 +114,8 @@ impl Brdf {
     }
 
     /// The formats of material files.
-    pub const FILES: FileKind<Brdf> = FileKind {
-        what: "material",
-        formats: &[merl::FORMAT, toml_file::FORMAT],
-        builtin_names: || Brdf::builtin_names().collect(),
-    };
+    pub const FILES: FileKind<Brdf> =
+        FileKind { what: "material", formats: FORMATS, builtin_names: || Brdf::builtin_names().collect() };
 
     /// Reads a material file: see [`Self::FILES`].
     ///

@@ -1,7 +1,7 @@
 //! Reads environments from files of any format and repairs pixels that are no radiance.
 use std::path::Path;
 
-use super::{Environment, exr_file, hdr_file, procedural};
+use super::{Environment, FORMATS, procedural};
 use crate::error::{Error, Result};
 use crate::file_format::FileKind;
 
@@ -19,11 +19,8 @@ pub struct RepairCounts {
 
 impl Environment {
     /// The formats of environment files.
-    pub const FILES: FileKind<Self> = FileKind {
-        what: "environment",
-        formats: &[hdr_file::FORMAT, exr_file::FORMAT],
-        builtin_names: || procedural::builtin_names().to_vec(),
-    };
+    pub const FILES: FileKind<Self> =
+        FileKind { what: "environment", formats: FORMATS, builtin_names: || procedural::builtin_names().to_vec() };
 
     /// Reads a lat-long picture of any size: see [`Self::FILES`]. Pixels that are NaN, infinite or negative are repaired and reported as
     /// a warning.

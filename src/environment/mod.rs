@@ -6,12 +6,11 @@ use std::sync::OnceLock;
 use glam::DVec3;
 
 use crate::error::Result;
+use crate::file_format::file_formats;
 use crate::threads::Observer;
 
 mod cache;
 pub mod cube;
-mod exr_file;
-mod hdr_file;
 mod irradiance;
 mod light_map;
 mod load;
@@ -27,6 +26,8 @@ pub use procedural::builtin_names;
 pub use pyramid::Pyramid;
 pub use sources::{LightSource, MAX_SOURCES, SmallSources, SourceRecord};
 pub use vmf_pyramid::{BlurKernel, BlurStep, VmfPyramid};
+
+file_formats!(Environment: hdr_file, exr_file);
 
 /// Radiance from every direction, as a lat-long picture: linear, Rec. 709.
 ///

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use glam::{DVec3, Vec3};
 
-use super::obj_file;
+use super::FORMATS;
 use crate::error::{Error, Result};
 use crate::file_format::FileKind;
 
@@ -42,7 +42,7 @@ impl Mesh {
 
     /// The formats of mesh files.
     pub const FILES: FileKind<Self> =
-        FileKind { what: "mesh", formats: &[obj_file::FORMAT], builtin_names: || builtin_names().to_vec() };
+        FileKind { what: "mesh", formats: FORMATS, builtin_names: || builtin_names().to_vec() };
 
     /// Reads a mesh file: see [`Self::FILES`].
     ///

@@ -8,14 +8,16 @@ use serde::{Deserialize, Serialize};
 use crate::brdf::{Brdf, Custom};
 use crate::environment::Environment;
 use crate::error::Result;
+use crate::file_format::file_formats;
 
 pub mod camera;
 mod file;
 pub mod mesh;
-mod obj_file;
 
 pub use camera::Camera;
 pub use mesh::Mesh;
+
+file_formats!(Mesh: obj_file);
 
 /// The built-in material of an object that names none in a scene without materials.
 pub const DEFAULT_MATERIAL: &str = "gold";
