@@ -27,6 +27,12 @@ fn main() {
     let generated = out.join("glsl");
     write(&generated.join("brdf_models.glsl"), &brdf_switch());
 
+    let twins: Vec<_> = BRDF_MODELS.iter().filter(|name| has_twin(name)).collect();
+    write(
+        &out.join("brdf_twins.rs"),
+        &format!("/// The models that have a form in GLSL.\nconst TWINS: &[&str] = &{twins:?};\n"),
+    );
+
     let (mut table, mut recipes, mut names) = (String::new(), String::new(), Vec::new());
     for source in files(glsl) {
         let (stem, extension) = (text(source.file_stem()), text(source.extension()));
@@ -70,12 +76,12 @@ fn recipe(recipes: &mut String, source: &Path, name: &str, includes: &[&Path]) {
 /// GLSL that includes every model and picks one by its id; models that no material of a scene uses are compiled out.
 fn brdf_switch() -> String {
     let mut glsl = String::from("// Generated from src/brdf/models.rs.\n");
-    for name in BRDF_MODELS {
+    for name in BRDF_MODELS.iter().filter(|name| has_twin(name)) {
         let _ = writeln!(glsl, "#include \"brdf/{name}.glsl\"");
     }
     glsl += "layout(constant_id = 1) const uint MODELS_USED = 0xffffffffu; // bit i: some material has model i\n";
     glsl += "vec3 brdf(Material material, vec3 w_i, vec3 w_o) {\n";
-    for (id, name) in BRDF_MODELS.iter().enumerate() {
+    for (id, name) in BRDF_MODELS.iter().enumerate().filter(|(_, name)| has_twin(name)) {
         let bit = 1_u32 << id;
         let _ = writeln!(
             glsl,
@@ -83,6 +89,11 @@ fn brdf_switch() -> String {
         );
     }
     glsl + "    return vec3(0.0);\n}\n"
+}
+
+/// Whether a BRDF model has a form in GLSL.
+fn has_twin(model: &str) -> bool {
+    Path::new("glsl/brdf").join(format!("{model}.glsl")).is_file()
 }
 
 /// Compiles one shader and adds its line to the table.

@@ -2,7 +2,7 @@
 // Sorts pixels into interior, edge and background, and lists those that have to be shaded.
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_samplerless_texture_functions : require
-#include "packing.glsl"
+#include "geometry_texel.glsl"
 #include "tiles.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;

@@ -2,7 +2,7 @@
 // Pass 1 of the paper (section 4.1): the normal and material of every sub-pixel.
 #extension GL_GOOGLE_include_directive : require
 #include "geometry_cache.glsl"
-#include "packing.glsl"
+#include "geometry_texel.glsl"
 
 layout(location = 0) in vec3 eye_position;
 layout(location = 1) in vec3 world_normal;

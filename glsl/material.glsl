@@ -1,4 +1,4 @@
-// Materials as the GPU holds them. Twin of the layout: src/passes/shade.rs.
+// Materials as the GPU holds them. Twin of the layout: src/brdf/record.rs.
 #include "brdf/parameters.glsl"
 
 struct Material {

@@ -1,6 +1,6 @@
-// A texel of the geometry cache: what shading needs of a sub-pixel, in 8 bytes.
-// The view vector follows from the sub-pixel's place on the image, so it is not stored.
-// Twin: src/shading/mod.rs.
+// Unit vectors in 32 bits. Twin: src/packing.rs.
+#ifndef PACKING_GLSL
+#define PACKING_GLSL
 
 // Octahedral map of a unit vector to [-1, 1]^2 (Meyer et al. 2010); two 16-bit numbers hold it to 4e-5 rad.
 vec2 octahedral_encode(vec3 n) {
@@ -17,19 +17,4 @@ vec3 octahedral_decode(vec2 e) {
     return normalize(n);
 }
 
-// Material indices are stored plus one: zero is the background.
-uvec2 pack_geometry(vec3 normal, uint material) {
-    return uvec2(packSnorm2x16(octahedral_encode(normal)), material + 1u);
-}
-
-bool is_covered(uvec2 texel) {
-    return texel.y != 0u;
-}
-
-uint geometry_material(uvec2 texel) {
-    return texel.y - 1u;
-}
-
-vec3 geometry_normal(uvec2 texel) {
-    return octahedral_decode(unpackSnorm2x16(texel.x));
-}
+#endif

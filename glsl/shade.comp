@@ -4,7 +4,7 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_samplerless_texture_functions : require
 #include "camera.glsl"
-#include "packing.glsl"
+#include "geometry_texel.glsl"
 #include "surface.glsl"
 #include "tiles.glsl"
 

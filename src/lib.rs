@@ -42,6 +42,8 @@ pub mod brdf;
 pub mod environment;
 pub mod error;
 pub mod evaluate;
+pub mod file_format;
+pub mod geometry_texel;
 pub mod graph;
 pub mod guide;
 pub mod light;

@@ -1,35 +1,29 @@
 //! The shading methods: ways to estimate equation (1) that go through one shading interface.
 //!
-//! A method is one GLSL file in `glsl/methods/` that defines `estimate`, one CPU twin in `shading/`, and
-//! one line here in each list.
+//! A method is one GLSL file in `glsl/methods/` that defines `estimate`, its CPU twin in `shading/`, and an entry in the table
+//! `shading/methods.rs`.
 use crate::environment::Environment;
-use crate::threads;
+use crate::threads::ThreadKind;
 use crate::vulkan::{Shader, compiled};
 use crate::{Error, Result};
 
-/// A way to estimate the radiance that leaves a surface.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Method {
-    /// Threads fitted to the BRDF, lookups in a pyramid of known kernels.
-    Fitted,
-    /// The paper's threads: equations (2) to (10), box-filtered lookups.
-    Paper,
-    /// Monte Carlo, uniform over the hemisphere.
-    Uniform,
-    /// Monte Carlo, in proportion to the cosine.
-    Cosine,
-    /// Monte Carlo, in proportion to BRDF times cosine (Matusik et al. 2003).
-    Importance,
-    /// The same with filtered lookups (Colbert and Krivanek 2007): biased.
-    Filtered,
-    /// Monte Carlo, in proportion to the environment's light (Agarwal et al. 2003).
-    Environment,
-    /// Resampled importance sampling of the whole product (Talbot et al. 2005).
-    Ris,
-    /// Multiple importance sampling of lobe and light (Veach and Guibas 1995) at Sobol's points: the reference's form on the GPU.
-    Mis,
-    /// Quadrature on the CPU: the truth.
-    Reference,
+/// How many samples methods without threads draw where nobody asks for another number.
+pub const DEFAULT_SAMPLES: u32 = 100;
+
+/// What the program needs to know of a method besides its shader and its twin.
+#[derive(Clone, Copy, Debug)]
+struct Properties {
+    /// What it does, for help texts: one sentence.
+    summary: &'static str,
+    /// Its name in older scene files and scripts.
+    older_name: Option<&'static str>,
+    /// The threads that it shades by; the others draw that many samples instead.
+    threads: Option<ThreadKind>,
+    /// What its shader looks up.
+    lookups: Lookups,
+    /// `SHARES_SURFACE` in its shader.
+    shares_surface: bool,
+    is_unbiased: bool,
 }
 
 /// What a method's shader looks up besides BRDFs and threads.
@@ -47,111 +41,125 @@ pub struct Lookups {
     pub slices: bool,
 }
 
-impl Method {
-    /// All of them.
-    pub const ALL: &[Self] = &[
-        Self::Fitted,
-        Self::Paper,
-        Self::Uniform,
-        Self::Cosine,
-        Self::Importance,
-        Self::Filtered,
-        Self::Environment,
-        Self::Ris,
-        Self::Mis,
-        Self::Reference,
-    ];
-
-    /// What the command line and scene files call it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Fitted => "fitted",
-            Self::Paper => "paper",
-            Self::Uniform => "uniform",
-            Self::Cosine => "cosine",
-            Self::Importance => "importance",
-            Self::Filtered => "filtered",
-            Self::Environment => "environment",
-            Self::Ris => "ris",
-            Self::Mis => "mis",
-            Self::Reference => "reference",
-        }
+impl Properties {
+    const fn unbiased(summary: &'static str, lookups: Lookups) -> Self {
+        Self { summary, older_name: None, threads: None, lookups, shares_surface: false, is_unbiased: true }
     }
 
+    const fn biased(summary: &'static str, lookups: Lookups) -> Self {
+        Self { is_unbiased: false, ..Self::unbiased(summary, lookups) }
+    }
+}
+
+const NOTHING: Lookups = Lookups { box_filtered: false, blurred: false, map: false, aliases: false, slices: false };
+const BLURRED: Lookups = Lookups { blurred: true, ..NOTHING };
+const BOX_FILTERED: Lookups = Lookups { box_filtered: true, ..NOTHING };
+const MAP: Lookups = Lookups { map: true, ..NOTHING };
+const MAP_BY_LIGHT: Lookups = Lookups { aliases: true, ..MAP };
+
+impl Lookups {
+    /// These, and CDFs of BRDFs.
+    const fn and_slices(self) -> Self {
+        Self { slices: true, ..self }
+    }
+}
+
+/// Makes the enum and its properties from the table in shading/methods.rs.
+macro_rules! methods {
+    ($($name:ident => $Method:ident: $properties:expr,)+) => {
+        /// A way to estimate the radiance that leaves a surface; [`Method::summary`] says which.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub enum Method {
+            $(#[doc = concat!("Method `", stringify!($name), "`.")] $Method,)+
+            /// Quadrature on the CPU: the truth.
+            Reference,
+        }
+
+        impl Method {
+            /// All of them.
+            pub const ALL: &[Self] = &[$(Self::$Method,)+ Self::Reference];
+
+            /// What the command line and scene files call it.
+            pub fn name(self) -> &'static str {
+                match self {
+                    $(Self::$Method => stringify!($name),)+
+                    Self::Reference => "reference",
+                }
+            }
+
+            fn properties(self) -> Properties {
+                match self {
+                    $(Self::$Method => $properties,)+
+                    Self::Reference => Properties::biased("The integral itself, by quadrature on the CPU.", NOTHING),
+                }
+            }
+        }
+    };
+}
+include!("shading/methods.rs");
+
+impl Method {
     /// The method of that name.
     ///
     /// # Errors
     /// There is none.
     pub fn from_name(name: &str) -> Result<Self> {
-        // Names of older scene files and scripts.
-        let name = match name {
-            "resampled" => "ris",
-            "combined" => "mis",
-            name => name,
-        };
-        Self::ALL.iter().copied().find(|method| method.name() == name).ok_or_else(|| {
+        let is_called = |method: &Self| method.name() == name || method.older_name() == Some(name);
+        Self::ALL.iter().copied().find(is_called).ok_or_else(|| {
             let known: Vec<_> = Self::ALL.iter().map(|method| method.name()).collect();
             Error::input(format!("method \"{name}\""), "is not known", format!("use one of: {}", known.join(", ")))
         })
+    }
+
+    /// Its name in older scene files and scripts, if it had another.
+    pub fn older_name(self) -> Option<&'static str> {
+        self.properties().older_name
+    }
+
+    /// What it does, in a sentence.
+    pub fn summary(self) -> &'static str {
+        self.properties().summary
     }
 
     /// The variant of shade.comp that runs it.
     ///
     /// # Errors
     /// The reference runs on the CPU.
+    ///
+    /// # Panics
+    /// A method in the table has no file in `glsl/methods/`.
     pub fn shader(self) -> Result<&'static Shader> {
-        match self {
-            Self::Fitted => Ok(&compiled::SHADE_FITTED),
-            Self::Paper => Ok(&compiled::SHADE_PAPER),
-            Self::Uniform => Ok(&compiled::SHADE_UNIFORM),
-            Self::Cosine => Ok(&compiled::SHADE_COSINE),
-            Self::Importance => Ok(&compiled::SHADE_IMPORTANCE),
-            Self::Filtered => Ok(&compiled::SHADE_FILTERED),
-            Self::Environment => Ok(&compiled::SHADE_ENVIRONMENT),
-            Self::Ris => Ok(&compiled::SHADE_RIS),
-            Self::Mis => Ok(&compiled::SHADE_MIS),
-            Self::Reference => Err(Error::input("method \"reference\"", "does not run on the GPU", "use another here")),
+        if self == Self::Reference {
+            return Err(Error::input("method \"reference\"", "does not run on the GPU", "use another here"));
         }
+        let variant = |shader: &&Shader| shader.name.strip_prefix("shade_") == Some(self.name());
+        Ok(compiled::ALL.iter().find(variant).expect("a test looks for the shader of every method"))
     }
 
     /// What its shader looks up.
     pub fn lookups(self) -> Lookups {
-        let none = Lookups::default();
-        match self {
-            Self::Fitted => Lookups { blurred: true, ..none },
-            Self::Paper => Lookups { box_filtered: true, ..none },
-            Self::Uniform | Self::Cosine => Lookups { map: true, ..none },
-            Self::Importance => Lookups { map: true, slices: true, ..none },
-            Self::Filtered => Lookups { box_filtered: true, slices: true, ..none },
-            Self::Environment => Lookups { map: true, aliases: true, ..none },
-            Self::Ris | Self::Mis => Lookups { map: true, aliases: true, slices: true, ..none },
-            Self::Reference => none,
-        }
+        self.properties().lookups
     }
 
     /// The threads that it shades by; the others draw that many samples instead.
-    pub fn threads(self) -> Option<threads::ThreadKind> {
-        match self {
-            Self::Fitted => Some(threads::ThreadKind::Fitted),
-            Self::Paper => Some(threads::ThreadKind::Paper),
-            _ => None,
-        }
+    pub fn threads(self) -> Option<ThreadKind> {
+        self.properties().threads
     }
 
     /// How many threads or samples it has where none are asked for.
     pub fn default_count(self) -> u32 {
-        self.threads().map_or(100, |kind| kind.default_count() as u32)
+        self.threads().map_or(DEFAULT_SAMPLES, |kind| kind.default_count() as u32)
     }
 
     /// Whether its shader evaluates BRDFs under `environment`: fitted threads hold all that is needed, but for small bright sources.
     pub fn evaluates_brdf(self, environment: &Environment) -> bool {
-        self != Self::Fitted || !environment.small_sources().list.is_empty()
+        self.threads() != Some(ThreadKind::Fitted) || !environment.small_sources().list.is_empty()
     }
 
     /// Whether a pixel within one smooth surface is one sum at its mean normal, not a partition among its sub-pixels:
     /// SHARES_SURFACE in the shader.
     pub fn shares_surface(self) -> bool {
-        matches!(self, Self::Fitted)
+        self.properties().shares_surface
     }
 
     /// Whether a shader runs it: all but the reference.
@@ -161,13 +169,32 @@ impl Method {
 
     /// Whether the mean over seeds is equation (1), whatever the number of samples.
     pub fn is_unbiased(self) -> bool {
-        !matches!(self, Self::Fitted | Self::Paper | Self::Filtered | Self::Reference)
+        self.properties().is_unbiased
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn every_method_has_a_shader_and_every_shader_a_method() {
+        let variants = compiled::ALL.iter().filter_map(|shader| shader.name.strip_prefix("shade_"));
+        for name in variants {
+            assert!(Method::from_name(name).is_ok_and(|method| method.name() == name), "{name} is not in the table");
+        }
+        for method in Method::ALL.iter().filter(|method| method.runs_on_gpu()) {
+            assert_eq!(method.shader().unwrap().name, format!("shade_{}", method.name()));
+        }
+        assert!(Method::Reference.shader().is_err());
+    }
+
+    #[test]
+    fn older_names_are_still_read() {
+        assert_eq!(Method::from_name("resampled").unwrap(), Method::Ris);
+        assert_eq!(Method::from_name("combined").unwrap(), Method::Mis);
+        assert!(Method::from_name("resample").unwrap_err().to_string().contains("fitted, paper"));
+    }
 
     #[test]
     fn what_methods_look_up_is_what_their_shaders_declare() {

@@ -8,13 +8,14 @@ use threadlight::brdf::luminance;
 use threadlight::environment::Environment;
 use threadlight::evaluate::Display;
 use threadlight::evaluate::reference::Integrator;
+use threadlight::geometry_texel::GeometryTexel;
 use threadlight::memo::Memo;
 use threadlight::method::Method;
 use threadlight::output::write_exr;
 use threadlight::pipeline::{Renderer, Rendering, Wanted};
 use threadlight::prepare::Prepared;
 use threadlight::scene::{Background, MaterialSettings, MaterialSource, ObjectSettings, Scene, Source};
-use threadlight::shading::{self, CpuShader, Surface};
+use threadlight::shading::{CpuShader, Surface};
 
 /// The methods that draw random numbers.
 const ESTIMATORS: [Method; 7] = [
@@ -125,7 +126,7 @@ fn surfaces(prepared: &Prepared, geometry: &[[u32; 2]]) -> Vec<(usize, Surface)>
     let rays = view.camera_rays();
     let size = UVec2::new(view.width, view.height).as_vec2();
     let surface = |(index, pixel): (usize, UVec2)| {
-        let (normal, _) = shading::unpack_geometry(UVec2::from(geometry[index]))?;
+        let GeometryTexel { normal, .. } = GeometryTexel::unpack(UVec2::from(geometry[index]))?;
         let w_o = -rays.ray((pixel.as_vec2() + 0.5) / size).normalize();
         Some((index, Surface::new(normal, w_o)))
     };

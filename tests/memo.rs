@@ -114,9 +114,9 @@ fn files_count_by_content() {
 }
 
 #[test]
-fn a_mesh_file_named_as_a_builtin_is_the_file() {
+fn a_mesh_file_and_a_builtin_of_its_name_are_two() {
     let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("sphere");
+    let path = folder.path().join("sphere.obj");
     std::fs::write(&path, "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
     let mut scene = small();
     let material = scene.materials[0].name.clone();

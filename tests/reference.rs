@@ -86,7 +86,7 @@ fn the_reference_agrees_with_mitsuba() {
         let pixels: Vec<_> = pixels.filter(|&(x, y)| inside(x, y)).collect();
         assert!(pixels.len() > 50, "only {} pixels", pixels.len());
 
-        let integrator = Integrator::new(environment, 1.0, materials.iter().map(|material| &material.brdf), 1);
+        let integrator = Integrator::new(environment, 1.0, materials.iter().map(|material| &*material.brdf), 1);
         let picture = read_image(&folder.join(format!("images/{name}.exr"))).expect("a reference picture");
         let square = |&(x, y): &(usize, usize)| {
             let points = integrator.points(view, &geometry, x, y);
@@ -135,7 +135,7 @@ fn the_reference_on_the_gpu_converges_on_that_of_the_cpu() {
         scene.shading.method = "reference".to_owned();
         let prepared = ready(&scene);
         let picture = |processor, tolerance| {
-            let settings = ReferenceSettings { tolerance, processor, cache: None };
+            let settings = ReferenceSettings { tolerance, processor };
             reference(&prepared, &gpu.device, &settings, &gpu.round()).expect("a reference")
         };
         let truth = picture(Processor::Cpu, 5e-5);

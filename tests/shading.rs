@@ -3,6 +3,7 @@ mod common;
 
 use common::{EVERYTHING, Validated, analytic_materials, model, pixels, ready, sphere, texels_of};
 use glam::{UVec2, Vec3, Vec4};
+use threadlight::geometry_texel::GeometryTexel;
 use threadlight::memo::Memo;
 use threadlight::scene::{Scene, Source};
 use threadlight::shading;
@@ -65,7 +66,7 @@ fn the_shader_agrees_with_its_cpu_twin() {
                     difference <= 1e-3 * expected.truncate().max_element(),
                     "{name}: {found} at {pixel}, the twin has {expected}"
                 );
-                let here = texels.iter().filter(|texel| shading::unpack_geometry(**texel).is_some()).count();
+                let here = texels.iter().filter(|texel| GeometryTexel::unpack(**texel).is_some()).count();
                 covered += here;
                 match shading::is_interior(&texels) {
                     true => interior += 1,
@@ -93,7 +94,7 @@ fn furnace_error(gpu: &Validated, scene: &Scene) -> (f32, f64) {
     let mut worst = (0.0, 0.0);
     for pixel in pixels(&prepared) {
         let texel = texels_of(&prepared, &rendering, pixel)[0];
-        let Some((normal, _)) = shading::unpack_geometry(texel) else { continue };
+        let Some(GeometryTexel { normal, .. }) = GeometryTexel::unpack(texel) else { continue };
         let w_o = -rays.ray((pixel.as_vec2() + 0.5) / size.as_vec2()).normalize();
         let theta_o_deg = shading::Surface::new(normal, w_o).theta_o.to_degrees().min(89.0);
         let degree = theta_o_deg as usize;

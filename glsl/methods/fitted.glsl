@@ -4,43 +4,12 @@
 // Few threads fit tails of lobes worst, and under small bright sources tails matter most. So the blurred environment is without
 // these, and they are shaded by the BRDF itself.
 // Twin: src/shading/fitted.rs.
+#include "light_source.glsl"
+#include "threads/fitted.glsl"
 #include "vmf_pyramid.glsl"
 
 // A pixel within one smooth surface is one sum over all threads, seen from its middle: see shade.comp.
 const bool SHARES_SURFACE = true;
-
-// Row by row of theta_o: the weight of the cosine kernel as three floats, then thread by thread three words: direction
-// (octahedral, 2 x 16 bits), level and red weight, green and blue weight (half floats).
-layout(set = 0, binding = 7, std430) readonly buffer Threads {
-    uint threads[];
-};
-
-struct Kernel {
-    vec3 direction;
-    float level;
-    vec3 weight;
-};
-
-Kernel unpack_kernel(uint at) {
-    vec2 level_red = unpackHalf2x16(threads[at + 1]);
-    vec2 green_blue = unpackHalf2x16(threads[at + 2]);
-    return Kernel(octahedral_decode(unpackSnorm2x16(threads[at])), level_red.x, vec3(level_red.y, green_blue));
-}
-
-vec3 unpack_cosine_part(uint at) {
-    return vec3(uintBitsToFloat(threads[at]), uintBitsToFloat(threads[at + 1]), uintBitsToFloat(threads[at + 2]));
-}
-
-struct Source {
-    vec4 direction; // of its centroid, in the environment's coordinates; w: standard deviation along its longer axis, in radians
-    vec4 axis[2];   // across that, as long as its standard deviation along each
-    vec4 power;     // radiance integrated over its solid angle, over the scale of the pyramid's texels
-};
-
-layout(set = 0, binding = 14, std430) readonly buffer Sources {
-    uint source_count;
-    Source sources[];
-};
 
 // How far a source is from where the BRDF cannot be taken at a few points of it, because it is mirrored towards the eye and wider than
 // the lobe; in half standard deviations of the source. Within a half vector of lobe_width f loses a quarter, as a Gaussian does
@@ -127,9 +96,8 @@ AtSources at_sources(Surface surface, Material material, float lobe_width, vec3 
 vec3 estimate(Surface surface, Material material, uint first, uint stride) {
     // Rows stand at multiples of 90 degrees / row_count; beyond the last one it holds.
     float row = min(surface.theta_o * (float(material.row_count) / radians(90.0)), float(material.row_count - 1));
-    uint words_a_row = 3 * (material.thread_count + 1);
-    uint below = material.first_thread + uint(row) * words_a_row;
-    uint above = below + (uint(row) + 1 < material.row_count ? words_a_row : 0);
+    uint below = material.first_thread + uint(row) * words_a_row(material);
+    uint above = below + (uint(row) + 1 < material.row_count ? words_a_row(material) : 0);
     float t = fract(row);
     vec3 cosine_part = mix(unpack_cosine_part(below), unpack_cosine_part(above), t);
     vec3 sum = vec3(0.0);
@@ -144,8 +112,8 @@ vec3 estimate(Surface surface, Material material, uint first, uint stride) {
         sum = mix(at.f_cos, at.cosine * cosine_part / radians(180.0), of_kernels);
     }
     for (uint k = first; k < material.thread_count; k += stride) {
-        Kernel a = unpack_kernel(below + 3 * (k + 1));
-        Kernel b = unpack_kernel(above + 3 * (k + 1));
+        Kernel a = unpack_kernel(below, k);
+        Kernel b = unpack_kernel(above, k);
         vec3 direction = surface.frame * normalize(mix(a.direction, b.direction, t));
         float level = level_within_pixel(mix(a.level, b.level, t), surface.normal_variance);
         sum += mix(a.weight, b.weight, t) * blurred_radiance(direction, level, of_kernels);

@@ -3,14 +3,8 @@
 // or in the proportion of colours, shows as a wrong brightness or tint.
 // Twin: src/shading/paper.rs.
 #include "environment_pyramid.glsl"
-
 #include "partition.glsl"
-
-// Row by row of theta_o: the row's albedo, then thread by thread the direction in the shading frame, and the logarithm
-// to base 2 of its pdf in 1/sr. Between rows the logarithm is nearer to the pdf than a linear blend.
-layout(set = 0, binding = 7, std430) readonly buffer Threads {
-    vec4 threads[];
-};
+#include "threads/paper.glsl"
 
 // The threads of a partition: first, first + stride, ...
 struct Partition {
@@ -69,18 +63,14 @@ Rows rows_at(float theta_o, Material material) {
                 row * (radians(90.0) / float(material.row_count)));
 }
 
-uint row_start(Material material, uint row) {
-    return material.first_thread + row * (material.thread_count + 1);
-}
-
 // The threads as published: row and frame follow the view.
 vec3 threads_following_view(Surface surface, Material material, Rows rows, Partition share) {
     vec3 w_o = vec3(sin(rows.theta_o), 0.0, cos(rows.theta_o));
-    uint below = row_start(material, rows.below) + 1;
-    uint above = row_start(material, rows.above) + 1;
+    uint below = row_start(material, rows.below);
+    uint above = row_start(material, rows.above);
     WeightedSum sum = WeightedSum(vec3(0.0), vec3(0.0));
     for (uint k = share.first; k < material.thread_count; k += share.stride) {
-        vec4 between = mix(threads[below + k], threads[above + k], rows.t);
+        vec4 between = mix(unpack_thread(below, k), unpack_thread(above, k), rows.t);
         float solid_angle_sr = lookup_solid_angle(surface, material, share, between.w);
         add_term(sum, material, surface.frame, normalize(between.xyz), w_o, between.w, solid_angle_sr);
     }
@@ -92,10 +82,10 @@ vec3 threads_following_view(Surface surface, Material material, Rows rows, Parti
 vec3 threads_of_facing_view(Surface surface, Material material, Partition share) {
     mat3 frame = fixed_frame(surface.frame[2], to_environment(push.camera.right.xyz));
     vec3 w_o = surface.w_o * frame;
-    uint facing = row_start(material, 0) + 1;
+    uint facing = row_start(material, 0);
     WeightedSum sum = WeightedSum(vec3(0.0), vec3(0.0));
     for (uint k = share.first; k < material.thread_count; k += share.stride) {
-        vec4 thread = threads[facing + k];
+        vec4 thread = unpack_thread(facing, k);
         vec3 h = normalize(thread.xyz + vec3(0.0, 0.0, 1.0));
         float cos_theta_d = dot(w_o, h);
         vec3 w_i = 2.0 * cos_theta_d * h - w_o;
@@ -124,7 +114,9 @@ vec3 estimate(Surface surface, Material material, uint first, uint stride) {
     if (following < 1.0) {
         mean += (1.0 - following) * threads_of_facing_view(surface, material, share);
     }
-    vec3 albedo = mix(threads[row_start(material, rows.below)], threads[row_start(material, rows.above)], rows.t).rgb;
+    vec3 of_below = unpack_albedo(row_start(material, rows.below));
+    vec3 of_above = unpack_albedo(row_start(material, rows.above));
+    vec3 albedo = mix(of_below, of_above, rows.t);
     // The partition's part of all threads.
     float fraction = float((material.thread_count - first + stride - 1) / stride) / float(material.thread_count);
     return fraction * albedo * mean;

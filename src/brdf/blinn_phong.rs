@@ -3,7 +3,7 @@ use std::f64::consts::{FRAC_1_PI, PI};
 
 use glam::DVec3;
 
-use super::{Model, Parameters, hash_numbers};
+use super::{Model, Parameters, Spacing, hash_numbers};
 use crate::error::Result;
 
 /// Blinn's half-vector form of the Phong model.
@@ -35,10 +35,15 @@ impl Model for BlinnPhong {
     }
 
     fn from_parameters(parameters: &mut Parameters) -> Result<Self> {
+        let help = "Exponent of the lobe: the larger, the narrower.";
         let model = Self {
-            diffuse: parameters.colour("diffuse", 0.0..=1.0)?,
-            specular: parameters.colour("specular", 0.0..=1.0)?,
-            exponent: parameters.number("exponent", 0.0..=1e5)?,
+            diffuse: parameters.colour("diffuse", 0.0..=1.0, "Albedo of the diffuse part, linear Rec. 709.")?,
+            specular: parameters.colour(
+                "specular",
+                0.0..=1.0,
+                "Albedo of the lobe seen along the normal, linear Rec. 709.",
+            )?,
+            exponent: parameters.number("exponent", 0.0..=1e5, Spacing::Logarithmic, help)?,
         };
         let most = (model.diffuse + model.specular).max_element();
         if most > 1.0 + 1e-9 {

@@ -27,8 +27,10 @@ impl Model for Conductor {
     fn from_parameters(parameters: &mut Parameters) -> Result<Self> {
         let (distribution, alpha) = Distribution::from_parameters(parameters)?;
         // No material is outside: the bounds only keep the Fresnel terms far from overflow in single precision.
-        let eta = parameters.colour("eta", 1e-3..=100.0)?;
-        let k = parameters.colour("k", 0.0..=100.0)?;
+        let help = "Real part of the conductor's index of refraction, for red, green and blue.";
+        let eta = parameters.colour("eta", 1e-3..=100.0, help)?;
+        let help = "Extinction: imaginary part of the conductor's index of refraction, for red, green and blue.";
+        let k = parameters.colour("k", 0.0..=100.0, help)?;
         Ok(Self { distribution, alpha, eta, k })
     }
 

@@ -19,7 +19,7 @@ impl Model for Lambert {
     }
 
     fn from_parameters(parameters: &mut Parameters) -> Result<Self> {
-        Ok(Self { reflectance: parameters.colour("reflectance", 0.0..=1.0)? })
+        Ok(Self { reflectance: parameters.colour("reflectance", 0.0..=1.0, "Albedo, linear Rec. 709.")? })
     }
 
     fn gpu_parameters(&self) -> [f32; 12] {

@@ -3,10 +3,10 @@
 //! Matusik et al., "A Data-Driven Reflectance Model" (2003). The `.binary` file: three little-endian i32 (90, 90, 180), then
 //! the red, green and blue planes of f64, index phi_d + 180 (theta_d + 90 theta_h). Angles: Rusinkiewicz (1998).
 use std::f64::consts::{FRAC_1_PI, FRAC_2_PI, FRAC_PI_2, PI};
-use std::path::Path;
 use std::sync::Arc;
 
-use glam::{DVec2, DVec3, Vec4, dvec2, dvec3};
+use glam::{DMat3, DVec2, DVec3, Vec4, dvec2, dvec3};
+use rayon::prelude::*;
 
 use super::{Model, Parameters};
 use crate::error::{Error, Result};
@@ -40,16 +40,8 @@ impl std::fmt::Debug for MerlTable {
 }
 
 impl MerlTable {
-    /// Reads a `.binary` file. Errors: unreadable, other dimensions, wrong size, a value that is not finite, nothing
-    /// but zeros or invalid cells.
-    pub fn load(path: &Path) -> Result<Self> {
-        let bytes = std::fs::read(path).map_err(|cause| Error::unreadable(path, cause))?;
-        Self::from_bytes(&bytes).map_err(|problem| {
-            Error::in_file(path, problem, "fetch or write the file again; a MERL table is 90 x 90 x 180 cells")
-        })
-    }
-
-    /// The table in the bytes of a `.binary` file; the error is what is wrong with them.
+    /// The table in the bytes of a `.binary` file; the error is what is wrong with them: other dimensions, wrong size, a value that is
+    /// not finite, nothing but zeros or invalid cells.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, String> {
         let header = bytes.get(..HEADER_BYTES).ok_or("is too short to be a MERL table")?;
         let dims: Vec<i32> = header.as_chunks().0.iter().map(|&dim| i32::from_le_bytes(dim)).collect();
@@ -85,13 +77,35 @@ impl MerlTable {
         if texels.iter().all(|texel| texel.truncate() == glam::Vec3::ZERO) {
             return Err("holds nothing but zero or invalid cells".into());
         }
+        Ok(Self::from_texels(texels))
+    }
+
+    /// The table of the values of `f` in the middle of each cell. `f` has to be isotropic, reciprocal, finite and not negative.
+    pub fn of(f: impl Fn(DVec3, DVec3) -> DVec3 + Sync) -> Self {
+        let line = |line: usize| {
+            let (theta_h, theta_d) = (line / THETA_D_BINS, line % THETA_D_BINS);
+            let horizon = Horizon::of_bins(theta_h, theta_d);
+            let f = &f;
+            (0..PHI_D_BINS).map(move |phi_d| {
+                let (w_i, w_o) = middle_of_cell(theta_h, theta_d, phi_d);
+                if horizon.is_above(phi_d) && w_i.z > 0.0 && w_o.z > 0.0 {
+                    f(w_i, w_o).min(DVec3::splat(f64::from(f32::MAX))).as_vec3().extend(1.0)
+                } else {
+                    Vec4::ZERO
+                }
+            })
+        };
+        Self::from_texels((0..THETA_H_BINS * THETA_D_BINS).into_par_iter().flat_map_iter(line).collect())
+    }
+
+    fn from_texels(texels: Vec<Vec4>) -> Self {
         let mut hasher = blake3::Hasher::new();
         for texel in &texels {
             for value in texel.to_array() {
                 hasher.update(&value.to_le_bytes());
             }
         }
-        Ok(Self { texels: texels.into(), fingerprint: hasher.finalize() })
+        Self { texels: texels.into(), fingerprint: hasher.finalize() }
     }
 
     /// The table for a 3D texture: RGBA = (rgb valid, valid) with f in 1/sr and valid 0 or 1; x = phi_d (180), y = theta_d
@@ -99,6 +113,15 @@ impl MerlTable {
     pub fn texels(&self) -> &[Vec4] {
         &self.texels
     }
+}
+
+/// The directions w_i and w_o in the middle of a cell, with the half vector in the plane of x and z.
+fn middle_of_cell(theta_h: usize, theta_d: usize, phi_d: usize) -> (DVec3, DVec3) {
+    let x = (theta_h as f64 + 0.5) / THETA_H_BINS as f64;
+    let to_shading_frame = DMat3::from_rotation_y(FRAC_PI_2 * x * x);
+    let (sin_theta_d, cos_theta_d) = (FRAC_PI_2 * (theta_d as f64 + 0.5) / THETA_D_BINS as f64).sin_cos();
+    let across = sin_theta_d * DVec2::from_angle(PI * (phi_d as f64 + 0.5) / PHI_D_BINS as f64);
+    (to_shading_frame * across.extend(cos_theta_d), to_shading_frame * (-across).extend(cos_theta_d))
 }
 
 /// Tells which cells of one (theta_h, theta_d) have both light and view above the horizon at their centre.
@@ -223,6 +246,8 @@ impl Place {
 }
 
 impl Model for MerlTable {
+    const HAS_PARAMETERS: bool = false;
+
     /// Trilinear between bin centres, clamped in theta_h and theta_d, periodic in phi_d; invalid cells have no weight.
     fn evaluate(&self, w_i: DVec3, w_o: DVec3) -> DVec3 {
         Place::of(w_i, w_o).interpolate(&self.texels)
@@ -236,11 +261,6 @@ impl Model for MerlTable {
 
     fn from_parameters(_: &mut Parameters) -> Result<Self> {
         Err(Error::input("model `merl`", "has no parameters", "name the table with file = \"....binary\" instead"))
-    }
-
-    /// Where the table lies is known only once it is uploaded: a.x and a.y, its y and z offset in texels, are the uploader's.
-    fn gpu_parameters(&self) -> [f32; 12] {
-        [0.0; 12]
     }
 
     fn hash_content(&self, hasher: &mut blake3::Hasher) {

@@ -6,7 +6,7 @@ use std::f64::consts::FRAC_1_PI;
 
 use glam::DVec3;
 
-use super::Parameters;
+use super::{Parameters, Spacing};
 use crate::error::Result;
 
 /// Shape of the distribution of microfacet normals.
@@ -21,10 +21,11 @@ pub enum Distribution {
 impl Distribution {
     /// Reads the keys `distribution` and `alpha`.
     pub(super) fn from_parameters(parameters: &mut Parameters) -> Result<(Self, f64)> {
-        let distribution =
-            parameters.choice("distribution", &[("ggx", Distribution::Ggx), ("beckmann", Distribution::Beckmann)])?;
+        let choices = [("ggx", Distribution::Ggx), ("beckmann", Distribution::Beckmann)];
+        let distribution = parameters.choice("distribution", &choices, "Distribution of the microfacets' normals.")?;
         // Narrower than 0.001 (a lobe of 0.06 degrees) no quadrature of this project resolves it: that is a mirror.
-        let alpha = parameters.number("alpha", 1e-3..=1.0)?;
+        let help = "Roughness of the microfacets, used as it is, not squared: 0.01 is nearly a mirror.";
+        let alpha = parameters.number("alpha", 1e-3..=1.0, Spacing::Logarithmic, help)?;
         Ok((distribution, alpha))
     }
 

@@ -8,18 +8,27 @@ use std::path::Path;
 use glam::{DVec2, DVec3, dvec3};
 
 use crate::error::{Error, Result};
+use crate::file_format::{self, FileKind, file_formats};
 
 mod builtin;
 mod lobe;
 mod microfacet;
 mod parameters;
+mod record;
 
+pub use custom::CustomBrdf;
 pub use lobe::{MIN_COS_THETA_D, half_vector_width, lobe_radius};
 pub use microfacet::{Distribution, fresnel_conductor, fresnel_dielectric};
-pub use parameters::{Domain, Parameter, Parameters};
+pub use parameters::{Domain, Parameter, Parameters, Spacing, as_number, channels};
+pub use record::MaterialRecord;
+
+file_formats!(Brdf: merl_file, toml_file);
 
 /// What every model offers; [`Brdf`] dispatches to it.
 pub trait Model: Sized {
+    /// Whether material and scene files can have its parameters.
+    const HAS_PARAMETERS: bool = true;
+
     /// f(w_i, w_o) in 1/sr, linear Rec. 709, for unit vectors with both z positive.
     fn evaluate(&self, w_i: DVec3, w_o: DVec3) -> DVec3;
 
@@ -31,8 +40,10 @@ pub trait Model: Sized {
     /// Reads the model's parameters from a table; unknown keys are reported by the caller.
     fn from_parameters(parameters: &mut Parameters) -> Result<Self>;
 
-    /// The model's parameters as its GLSL twin expects them: `BrdfParameters { vec4 a, b, c }`.
-    fn gpu_parameters(&self) -> [f32; 12];
+    /// The model's parameters as its GLSL twin expects them: `BrdfParameters { vec4 a, b, c }`. None of a model that has no twin.
+    fn gpu_parameters(&self) -> [f32; 12] {
+        [0.0; 12]
+    }
 
     /// Adds everything that `evaluate` depends on to `hasher`.
     fn hash_content(&self, hasher: &mut blake3::Hasher);
@@ -53,6 +64,12 @@ macro_rules! brdf_models {
             /// Names of all models; a model's position is its id in shaders.
             pub const MODELS: &[&str] = &[$(stringify!($name)),+];
 
+            /// Names of the models whose parameters material and scene files can have.
+            pub fn models_with_parameters() -> Vec<&'static str> {
+                let models = [$((stringify!($name), $Model::HAS_PARAMETERS)),+];
+                models.into_iter().filter_map(|(name, has_parameters)| has_parameters.then_some(name)).collect()
+            }
+
             /// Name of this BRDF's model: one of [`Brdf::MODELS`].
             pub fn model(&self) -> &'static str {
                 match self { $(Brdf::$Model(_) => stringify!($name),)+ }
@@ -62,7 +79,7 @@ macro_rules! brdf_models {
                 match model {
                     $(stringify!($name) => Ok(Brdf::$Model($Model::from_parameters(parameters)?)),)+
                     _ => Err(Error::input(
-                        format!("model `{model}`"), "is not known", format!("use one of {}", Brdf::MODELS.join(", ")),
+                        format!("model `{model}`"), "is not known", format!("use one of {}", Brdf::models_with_parameters().join(", ")),
                     )),
                 }
             }
@@ -77,6 +94,7 @@ macro_rules! brdf_models {
     };
 }
 include!("models.rs");
+include!(concat!(env!("OUT_DIR"), "/brdf_twins.rs"));
 
 impl Brdf {
     /// f(w_i, w_o) in 1/sr, per linear Rec. 709 channel; 0 where a cosine is not positive.
@@ -95,16 +113,16 @@ impl Brdf {
         dispatch!(self, model => model.evaluate_all(w_i, w_o))
     }
 
-    /// Reads a material file: a MERL table (`.binary`), or a TOML file with `model = "..."` and the model's parameters.
+    /// The formats of material files.
+    pub const FILES: FileKind<Brdf> =
+        FileKind { what: "material", formats: FORMATS, builtin_names: || Brdf::builtin_names().collect() };
+
+    /// Reads a material file: see [`Self::FILES`].
+    ///
+    /// # Errors
+    /// What cannot be read or is no material.
     pub fn load(path: &Path) -> Result<Brdf> {
-        match path.extension().and_then(|extension| extension.to_str()) {
-            Some("binary") => Ok(Brdf::MerlTable(MerlTable::load(path)?)),
-            Some("toml") => {
-                let (model, parameters) = Brdf::load_model(path)?;
-                Brdf::from_parameters(&model, parameters).map_err(|error| error.within(path.display()))
-            }
-            _ => Err(Error::in_file(path, "is not a material file", "name a MERL .binary or a .toml with a model")),
-        }
+        Self::FILES.load(path)
     }
 
     /// A BRDF from `model` and its parameters as they stand in a scene file. Errors name the key; use [`Error::within`] to
@@ -128,8 +146,7 @@ impl Brdf {
 
     /// The model that a material file (`.toml`) names, and its parameters, not yet checked.
     pub fn load_model(path: &Path) -> Result<(String, toml::Table)> {
-        let text = std::fs::read_to_string(path).map_err(|cause| Error::unreadable(path, cause))?;
-        model_of(&text).map_err(|error| error.within(path.display()))
+        toml_file::parse_model(path, &file_format::read(path)?)
     }
 
     /// The model of the built-in material `name`, and its parameters.
@@ -148,9 +165,10 @@ impl Brdf {
         builtin::MATERIALS.iter().map(|(name, _)| *name)
     }
 
-    /// Id of the model in shaders: its position in models.rs.
+    /// Id of the model by which shaders evaluate it: its position in models.rs, or that of measured tables if it has no twin.
     pub fn model_index(&self) -> u32 {
-        Brdf::MODELS.iter().position(|name| *name == self.model()).expect("MODELS holds every model") as u32
+        let twin = if TWINS.contains(&self.model()) { self.model() } else { "merl" };
+        Brdf::MODELS.iter().position(|name| *name == twin).expect("MODELS holds every model") as u32
     }
 
     /// The model's parameters for its GLSL twin, `BrdfParameters { vec4 a, b, c }` in memory order.
@@ -158,11 +176,13 @@ impl Brdf {
         dispatch!(self, model => model.gpu_parameters())
     }
 
-    /// The measured table, for models that have one to upload.
-    pub fn table(&self) -> Option<&MerlTable> {
+    /// What shaders look the BRDF up in, if they do not evaluate it: the measured table, or one that is made of a model without a twin.
+    pub fn table(&self) -> Option<MerlTable> {
         match self {
-            Brdf::MerlTable(table) => Some(table),
-            _ => None,
+            Brdf::MerlTable(table) => Some(table.clone()),
+            Brdf::Custom(custom) => Some(custom.table()),
+            model if TWINS.contains(&model.model()) => None,
+            model => Some(MerlTable::of(|w_i, w_o| model.evaluate(w_i, w_o))),
         }
     }
 
@@ -209,7 +229,7 @@ fn model_of(text: &str) -> Result<(String, toml::Table)> {
     let mut table: toml::Table = text.parse().map_err(|error: toml::de::Error| {
         Error::input("TOML", error.message().replace('\n', " "), "correct the file's syntax")
     })?;
-    let models = Brdf::MODELS.join(", ");
+    let models = Brdf::models_with_parameters().join(", ");
     match table.remove("model") {
         Some(toml::Value::String(model)) => Ok((model, table)),
         Some(_) => Err(Error::input("model", "is not a string", format!("name one of {models}"))),

@@ -1,5 +1,6 @@
-// The table of BRDF models: one line each, `glsl_name => RustType`. A model `name` is src/brdf/name.rs, glsl/brdf/name.glsl
-// and its line here; its position is the id by which shaders know it. Included by src/brdf/mod.rs (enum and dispatch) and
+// The table of BRDF models: one line each, `glsl_name => RustType`. A model `name` is src/brdf/name.rs and its line here, and where
+// shaders are to evaluate it glsl/brdf/name.glsl; without that they look it up in a table. Its position is the id by which
+// shaders know it. Included by src/brdf/mod.rs (enum and dispatch) and
 // by build.rs (the shaders' switch); each defines `brdf_models!` first. (Hence no inner doc comment at the top.)
 brdf_models! {
     lambert => Lambert,
@@ -7,4 +8,5 @@ brdf_models! {
     conductor => Conductor,
     plastic => Plastic,
     merl => MerlTable,
+    custom => Custom,
 }

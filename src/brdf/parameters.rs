@@ -17,6 +17,8 @@ pub struct Parameters {
 pub struct Parameter {
     /// Its key in a scene or material file.
     pub key: String,
+    /// What it is, in a sentence.
+    pub help: &'static str,
     /// What it may be.
     pub domain: Domain,
 }
@@ -25,11 +27,20 @@ pub struct Parameter {
 #[derive(Clone, Debug, PartialEq)]
 pub enum Domain {
     /// A number of this range.
-    Number(RangeInclusive<f64>),
+    Number(RangeInclusive<f64>, Spacing),
     /// Linear Rec. 709, each channel of this range.
     Colour(RangeInclusive<f64>),
     /// One of these words.
     Choice(Vec<String>),
+}
+
+/// How steps along a slider change a number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Spacing {
+    /// By the same difference.
+    Linear,
+    /// By the same factor, for what spans orders of magnitude.
+    Logarithmic,
 }
 
 impl Parameters {
@@ -44,29 +55,30 @@ impl Parameters {
     }
 
     /// The number `key`, within `range` (NaN and infinities never are).
-    pub fn number(&mut self, key: &str, range: RangeInclusive<f64>) -> Result<f64> {
-        let value = self.take(key, "a number", Domain::Number(range.clone()))?;
+    pub fn number(
+        &mut self,
+        key: &str,
+        range: RangeInclusive<f64>,
+        spacing: Spacing,
+        help: &'static str,
+    ) -> Result<f64> {
+        let value = self.take(key, "a number", Domain::Number(range.clone(), spacing), help)?;
         in_range(key, as_number(&value), &range)
     }
 
     /// The RGB colour `key`, each channel within `range`; a single number stands for a grey.
-    pub fn colour(&mut self, key: &str, range: RangeInclusive<f64>) -> Result<DVec3> {
-        let value = self.take(key, "three numbers [r, g, b]", Domain::Colour(range.clone()))?;
-        let channels = match &value {
-            Value::Array(array) => array.iter().map(as_number).collect::<Vec<_>>(),
-            single => vec![as_number(single); 3],
-        };
-        let [r, g, b] = channels[..] else {
-            return Err(Error::input(key, format!("has {} values", channels.len()), "give three, [r, g, b]"));
-        };
+    pub fn colour(&mut self, key: &str, range: RangeInclusive<f64>, help: &'static str) -> Result<DVec3> {
+        let value = self.take(key, "three numbers [r, g, b]", Domain::Colour(range.clone()), help)?;
+        let [r, g, b] = channels(&value)
+            .map_err(|count| Error::input(key, format!("has {count} values"), "give three, [r, g, b]"))?;
         Ok(DVec3::new(in_range(key, r, &range)?, in_range(key, g, &range)?, in_range(key, b, &range)?))
     }
 
     /// The value that the string `key` stands for among `choices`.
-    pub fn choice<T: Copy>(&mut self, key: &str, choices: &[(&str, T)]) -> Result<T> {
+    pub fn choice<T: Copy>(&mut self, key: &str, choices: &[(&str, T)], help: &'static str) -> Result<T> {
         let names = choices.iter().map(|(name, _)| format!("\"{name}\"")).collect::<Vec<_>>().join(" or ");
         let words = choices.iter().map(|(name, _)| name.to_string()).collect();
-        let value = self.take(key, &names, Domain::Choice(words))?;
+        let value = self.take(key, &names, Domain::Choice(words), help)?;
         let chosen = choices.iter().find(|(name, _)| value.as_str() == Some(name));
         chosen
             .map(|(_, choice)| *choice)
@@ -83,14 +95,25 @@ impl Parameters {
         }
     }
 
-    fn take(&mut self, key: &str, what: &str, domain: Domain) -> Result<Value> {
-        self.read.push(Parameter { key: key.into(), domain });
+    fn take(&mut self, key: &str, what: &str, domain: Domain, help: &'static str) -> Result<Value> {
+        self.read.push(Parameter { key: key.into(), help, domain });
         self.table.remove(key).ok_or_else(|| Error::input(key, "is missing", format!("give {what}")))
     }
 }
 
+/// The channels of a colour; a single number stands for a grey. The error is how many values there are instead of three.
+pub fn channels(value: &Value) -> Result<[f64; 3], usize> {
+    match value {
+        Value::Array(array) => {
+            let channels: Vec<_> = array.iter().map(as_number).collect();
+            channels.try_into().map_err(|channels: Vec<_>| channels.len())
+        }
+        single => Ok([as_number(single); 3]),
+    }
+}
+
 /// NaN, which no range holds, for anything but a number.
-fn as_number(value: &Value) -> f64 {
+pub fn as_number(value: &Value) -> f64 {
     value.as_float().or(value.as_integer().map(|integer| integer as f64)).unwrap_or(f64::NAN)
 }
 

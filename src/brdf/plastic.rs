@@ -4,7 +4,7 @@ use std::f64::consts::FRAC_1_PI;
 use glam::DVec3;
 
 use super::microfacet::{Distribution, fresnel_dielectric};
-use super::{Model, Parameters, hash_numbers};
+use super::{Model, Parameters, Spacing, hash_numbers};
 use crate::error::Result;
 
 /// f = F D G / (4 cos_theta_i cos_theta_o) + diffuse / pi (1 - F(theta_i)) (1 - F(theta_o)) / (1 - mean F).
@@ -56,8 +56,9 @@ impl Model for Plastic {
 
     fn from_parameters(parameters: &mut Parameters) -> Result<Self> {
         let (distribution, alpha) = Distribution::from_parameters(parameters)?;
-        let ior = parameters.number("ior", 1.0..=5.0)?;
-        let diffuse = parameters.colour("diffuse", 0.0..=1.0)?;
+        let help = "Index of refraction of the coat, against air.";
+        let ior = parameters.number("ior", 1.0..=5.0, Spacing::Linear, help)?;
+        let diffuse = parameters.colour("diffuse", 0.0..=1.0, "Colour of the base under the coat, linear Rec. 709.")?;
         Ok(Self::new(distribution, alpha, ior, diffuse))
     }
 

@@ -364,9 +364,9 @@ fn a_model_tells_what_it_reads() {
         let (model, table) = Brdf::builtin_model(name).unwrap();
         let parameters = Brdf::parameters(&model, &table).unwrap();
         assert_eq!(parameters.len(), table.len(), "{name}");
-        for Parameter { key, domain } in &parameters {
+        for Parameter { key, domain, .. } in &parameters {
             let (outside, of) = match domain {
-                Domain::Number(range) | Domain::Colour(range) => (toml::Value::Float(2.0 * range.end() + 1.0), key),
+                Domain::Number(range, _) | Domain::Colour(range) => (toml::Value::Float(2.0 * range.end() + 1.0), key),
                 Domain::Choice(words) => (toml::Value::String(words.concat()), key),
             };
             let mut wrong = table.clone();

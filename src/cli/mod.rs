@@ -5,6 +5,7 @@ mod compare;
 mod completions;
 mod devices;
 mod materials;
+mod nameable;
 mod progress;
 mod render;
 mod scene_flags;

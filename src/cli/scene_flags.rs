@@ -1,6 +1,6 @@
 //! The flags that say what is rendered, and on what: `render` and `view` have them in common.
-use super::{cache_folder, number};
-use clap::builder::{PossibleValuesParser, TypedValueParser};
+use super::{cache_folder, nameable, number};
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::value_parser;
 use std::path::PathBuf;
 use threadlight::environment;
@@ -14,21 +14,16 @@ use threadlight::scene::{
 pub struct SceneFlags {
     /// Scene file (TOML); without one, the built-in scene: a gold sphere in a studio.
     pub scene: Option<PathBuf>,
-    /// Mesh in place of the scene's objects: a built-in name or an OBJ file.
-    #[arg(long, value_name = "NAME|FILE")]
+    #[arg(long, help = nameable::mesh("Mesh in place of the scene's objects"), value_name = "NAME|FILE")]
     pub mesh: Option<String>,
-    /// Material of every object: a built-in name, a MERL .binary, or a .toml with a model and its parameters.
-    #[arg(long, value_name = "NAME|FILE")]
+    #[arg(long, help = nameable::material("Material of every object"), value_name = "NAME|FILE")]
     pub material: Option<String>,
-    /// Light from all directions: a built-in name, a Radiance .hdr or an .exr, latitude-longitude.
-    #[arg(long, value_name = "NAME|FILE")]
+    #[arg(long, help = nameable::environment("Light from all directions"), value_name = "NAME|FILE")]
     pub environment: Option<String>,
     /// Shading method.
     #[arg(long, value_name = "NAME", value_parser = methods())]
     pub method: Option<String>,
-    /// Sample threads per pixel: fitted 1 to 128 (default 16), paper 1 to 1024 (default 100); or samples per pixel of methods that
-    /// have none, 1 to 10000 (default 100).
-    #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=i64::from(MAX_SAMPLES)))]
+    #[arg(long, help = nameable::counts(), value_name = "N", value_parser = value_parser!(u32).range(1..=i64::from(MAX_SAMPLES)))]
     pub threads: Option<u32>,
     /// Sub-pixels per axis, 1 to 4.
     #[arg(long, value_name = "S", value_parser = value_parser!(u32).range(1..=i64::from(MAX_SUBPIXELS)))]
@@ -117,9 +112,12 @@ pub fn parse_size(text: &str) -> Result<(u32, u32), String> {
     sides.ok_or_else(|| format!("use width x height in pixels, each 1 to {MAX_SIZE_PX}, such as 640x480"))
 }
 
-/// The name of a method.
+/// The name of a method; an older one is read too.
 fn methods() -> PossibleValuesParser {
-    PossibleValuesParser::new(Method::ALL.iter().map(|method| method.name()))
+    PossibleValuesParser::new(Method::ALL.iter().map(|method| {
+        let value = PossibleValue::new(method.name()).help(method.summary());
+        method.older_name().into_iter().fold(value, PossibleValue::alias)
+    }))
 }
 
 /// `environment` or `none`.

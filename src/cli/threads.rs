@@ -1,6 +1,6 @@
 //! `threadlight threads`: makes, writes and draws the sample threads of a material.
 use super::progress::TerminalProgress;
-use super::{cache_folder, stem};
+use super::{cache_folder, nameable, stem};
 use std::path::PathBuf;
 use threadlight::Error;
 use threadlight::memo::{Asked, Memo, Origin, Step};
@@ -19,7 +19,7 @@ Examples:
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES, allow_negative_numbers = true)]
 pub struct Threads {
-    /// A built-in name, a MERL .binary, or a .toml with a model and its parameters.
+    #[arg(help = nameable::material("Material"))]
     material: String,
     /// Number of threads: 1 to 128 (fitted; 16 by default) or 1 to 1024 (paper; 100 by default).
     #[arg(long, value_name = "N")]

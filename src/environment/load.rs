@@ -1,14 +1,9 @@
-//! Reads environments from Radiance HDR and OpenEXR files and repairs pixels that are no radiance.
-use std::fs::File;
-use std::io::BufReader;
+//! Reads environments from files of any format and repairs pixels that are no radiance.
 use std::path::Path;
 
-use image::codecs::hdr::HdrDecoder;
-use image::{DynamicImage, ImageDecoder};
-
-use super::{Environment, procedural};
+use super::{Environment, FORMATS, procedural};
 use crate::error::{Error, Result};
-use crate::output;
+use crate::file_format::FileKind;
 
 /// How many pixels of a file were no radiance, by the worst that was wrong with each.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -23,25 +18,21 @@ pub struct RepairCounts {
 }
 
 impl Environment {
-    /// Reads a lat-long `.hdr` or `.exr` of any size. EXR needs channels R, G, B or only Y; alpha is ignored. Pixels that are
-    /// NaN, infinite or negative are repaired and reported as a warning.
+    /// The formats of environment files.
+    pub const FILES: FileKind<Self> =
+        FileKind { what: "environment", formats: FORMATS, builtin_names: || procedural::builtin_names().to_vec() };
+
+    /// Reads a lat-long picture of any size: see [`Self::FILES`]. Pixels that are NaN, infinite or negative are repaired and reported as
+    /// a warning.
+    ///
+    /// # Errors
+    /// What cannot be read or is no picture.
     pub fn load(path: &Path) -> Result<Self> {
-        let (width, height, texels) = match path.extension().map(|extension| extension.to_ascii_lowercase()) {
-            Some(extension) if extension == "hdr" => read_hdr(path)?,
-            Some(extension) if extension == "exr" => {
-                let picture = output::read_image(path)?;
-                let texels = picture.rgba.iter().map(|&[r, g, b, _]| [r, g, b]).collect();
-                (picture.width as usize, picture.height as usize, texels)
-            }
-            _ => {
-                let names = procedural::builtin_names().join(", ");
-                return Err(Error::in_file(
-                    path,
-                    "is no known kind of environment",
-                    format!("give a Radiance .hdr, an OpenEXR .exr, or a built-in: {names}"),
-                ));
-            }
-        };
+        Self::FILES.load(path)
+    }
+
+    /// The environment in the file at `path`, of pixels that may hold anything.
+    pub(super) fn of_file(path: &Path, width: usize, height: usize, texels: Vec<[f32; 3]>) -> Result<Self> {
         if texels.is_empty() {
             return Err(Error::in_file(path, "has no pixels", "give a lat-long picture of at least 1x1"));
         }
@@ -57,22 +48,6 @@ impl Environment {
         }
         Self::new(name, width, height, texels, repaired)
     }
-}
-
-/// Width, height and pixels of a Radiance picture.
-fn read_hdr(path: &Path) -> Result<(usize, usize, Vec<[f32; 3]>)> {
-    let file = File::open(path).map_err(|cause| Error::unreadable(path, cause))?;
-    let broken = |cause: image::ImageError| {
-        let cause = cause.to_string().replace('\n', " ");
-        Error::in_file(path, format!("is not a whole Radiance HDR ({cause})"), "fetch or save it again")
-    };
-    let decoder = HdrDecoder::new(BufReader::new(file)).map_err(broken)?;
-    let (width, height) = decoder.dimensions();
-    if u64::from(width) * u64::from(height) > output::MAX_PIXELS as u64 {
-        return Err(Error::in_file(path, "says that it has more than 2^28 pixels", "make it smaller"));
-    }
-    let picture = DynamicImage::from_decoder(decoder).map_err(broken)?.into_rgb32f();
-    Ok((width as usize, height as usize, picture.pixels().map(|pixel| pixel.0).collect()))
 }
 
 /// Makes every value finite and not negative; counts the pixels by what was wrong.

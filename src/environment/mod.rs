@@ -4,6 +4,8 @@ use std::sync::OnceLock;
 
 use glam::DVec3;
 
+use crate::file_format::file_formats;
+
 pub mod cube;
 mod irradiance;
 mod light_map;
@@ -19,8 +21,10 @@ pub use light_map::{Alias, LightMap};
 pub use load::RepairCounts;
 pub use procedural::builtin_names;
 pub use pyramid::Pyramid;
-pub use sources::{LightSource, MAX_SOURCES, SmallSources};
+pub use sources::{LightSource, MAX_SOURCES, SmallSources, SourceRecord};
 pub use vmf_pyramid::{BlurKernel, BlurStep, VmfPyramid};
+
+file_formats!(Environment: hdr_file, exr_file);
 
 /// Radiance from every direction, as a lat-long picture: linear, Rec. 709.
 ///

@@ -32,7 +32,7 @@ impl Environment {
             _ => Err(Error::input(
                 format!("environment `{name}`"),
                 "is not built in",
-                format!("choose one of {}, or give a .hdr or .exr file", builtin_names().join(", ")),
+                format!("give {}", Environment::FILES.files_or_builtins()),
             )),
         }
     }

@@ -2,7 +2,7 @@
 //!
 //! The tails of a lobe matter most under these, and tails are what few kernels fit worst. So they are cut out of what kernels look up,
 //! and shaded by the BRDF itself.
-use glam::{DMat2, DVec2, DVec3, dvec2};
+use glam::{DMat2, DVec2, DVec3, Vec4, dvec2};
 
 use super::Environment;
 use crate::brdf::luminance;
@@ -58,6 +58,28 @@ impl LightSource {
     pub fn width_rad(&self) -> f64 {
         self.axes[0].length()
     }
+
+    /// The source as shaders have it, its power over `scale`.
+    pub fn record(&self, scale: f32) -> SourceRecord {
+        let Self { direction, axes, power } = *self;
+        SourceRecord {
+            direction: direction.extend(self.width_rad()).as_vec4(),
+            axes: axes.map(|axis| axis.extend(0.0).as_vec4()),
+            power: (power / f64::from(scale)).extend(0.0).as_vec4(),
+        }
+    }
+}
+
+/// `Source` in glsl/light_source.glsl.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+pub struct SourceRecord {
+    /// Of its centroid; w: standard deviation along its longer axis, in radians.
+    pub direction: Vec4,
+    /// Across that, as long as its standard deviation along each.
+    pub axes: [Vec4; 2],
+    /// Radiance integrated over its solid angle, over a scale.
+    pub power: Vec4,
 }
 
 impl SmallSources {
@@ -83,6 +105,16 @@ impl SmallSources {
         let mut pixels = vec![false; environment.texels.len()];
         found.iter().flat_map(|part| &part.pixels).for_each(|&pixel| pixels[pixel] = true);
         Self { list: found.into_iter().map(|part| part.source).collect(), pixels }
+    }
+
+    /// The words of `Sources` in glsl/light_source.glsl: the count, and the sources with their power over `scale`.
+    pub fn device_words(&self, scale: f32) -> Vec<u32> {
+        // Structures are aligned to 16 bytes.
+        let mut words = vec![self.list.len() as u32, 0, 0, 0];
+        words.extend(self.list.iter().flat_map(|source| bytemuck::cast::<_, [u32; 16]>(source.record(scale))));
+        // A buffer cannot be empty, nor its array.
+        words.resize(words.len().max(4 + 16), 0);
+        words
     }
 }
 

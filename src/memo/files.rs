@@ -1,6 +1,7 @@
 //! Files that steps read: known by their contents, not by their names.
 use super::Key;
 use crate::error::{Error, Result};
+use crate::file_format::read;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -50,16 +51,6 @@ impl Files {
     fn lock(&self) -> MutexGuard<'_, Known> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
-}
-
-fn read(path: &Path) -> Result<Vec<u8>> {
-    let unreadable = |cause| Error::unreadable(path, cause);
-    // A pipe or a device would never end.
-    let kind = std::fs::metadata(path).map_err(unreadable)?.file_type();
-    if !kind.is_file() && !kind.is_dir() {
-        return Err(Error::in_file(path, "is not a file", "name a file"));
-    }
-    std::fs::read(path).map_err(unreadable)
 }
 
 #[cfg(test)]

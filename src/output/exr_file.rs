@@ -129,8 +129,7 @@ fn sort_attributes(bytes: &mut [u8]) {
 
 /// Reads an EXR: the first layer with channels R, G and B (perhaps with a common prefix, such as `beauty.R`), or with
 /// only Y, which then stands for all three. Half, float and integer samples, any compression that the crate knows.
-pub(super) fn read(path: &Path) -> Result<Picture> {
-    let bytes = std::fs::read(path).map_err(|cause| Error::unreadable(path, cause))?;
+pub fn parse_exr(path: &Path, bytes: &[u8]) -> Result<Picture> {
     let broken = |cause: exr::error::Error| {
         Error::in_file(
             path,
@@ -138,7 +137,7 @@ pub(super) fn read(path: &Path) -> Result<Picture> {
             "save it again, with channels R, G, B",
         )
     };
-    let meta = MetaData::read_from_buffered(Cursor::new(&bytes), false).map_err(broken)?;
+    let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(broken)?;
     let area = |size: Vec2<usize>| size.0.saturating_mul(size.1);
     if meta.headers.iter().any(|header| area(header.layer_size) > MAX_PIXELS) {
         return Err(Error::in_file(path, "says that it has more than 2^28 pixels", "make it smaller"));
@@ -149,7 +148,7 @@ pub(super) fn read(path: &Path) -> Result<Picture> {
         .all_channels()
         .all_layers()
         .all_attributes()
-        .from_buffered(Cursor::new(&bytes))
+        .from_buffered(Cursor::new(bytes))
         .map_err(broken)?;
 
     let (layer, prefix, names) = image.layer_data.iter().find_map(find_colour).ok_or_else(|| {

@@ -3,12 +3,13 @@ use std::io::Write;
 use std::path::Path;
 
 use crate::error::{Error, Result};
+use crate::file_format;
 
 mod exr_file;
 mod png_file;
 
-pub(crate) use exr_file::MAX_PIXELS;
 pub use exr_file::{ExrHeader, write_exr};
+pub(crate) use exr_file::{MAX_PIXELS, parse_exr};
 pub use png_file::write_png;
 
 /// The file formats of a picture, told apart by the extension of the file's name.
@@ -50,10 +51,11 @@ pub struct Picture {
 
 /// Reads the PNG or EXR at `path`. EXR may have R, G, B or only Y, with or without A.
 pub fn read_image(path: &Path) -> Result<Picture> {
-    match Format::of(path)? {
-        Format::Png => png_file::read(path),
-        Format::Exr => exr_file::read(path),
-    }
+    let parse = match Format::of(path)? {
+        Format::Png => png_file::parse,
+        Format::Exr => parse_exr,
+    };
+    parse(path, &file_format::read(path)?)
 }
 
 /// Says at once whether a file could be written to `path`, so that a long rendering does not end in an error.

@@ -31,10 +31,9 @@ pub fn write_png(path: &Path, width: u32, height: u32, rgba8: &[u8], alpha: bool
     write_whole(path, &bytes)
 }
 
-/// Reads a PNG as display values in [0, 1].
-pub(super) fn read(path: &Path) -> Result<Picture> {
-    let bytes = std::fs::read(path).map_err(|cause| Error::unreadable(path, cause))?;
-    let decoded = image::load_from_memory_with_format(&bytes, image::ImageFormat::Png)
+/// Reads the bytes of the PNG at `path` as display values in [0, 1].
+pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Picture> {
+    let decoded = image::load_from_memory_with_format(bytes, image::ImageFormat::Png)
         .map_err(|cause| Error::in_file(path, format!("is not a whole PNG ({cause})"), "give another picture"))?;
     Ok(Picture {
         width: decoded.width(),

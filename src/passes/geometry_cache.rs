@@ -12,7 +12,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::{DAffine3, DVec3, Vec3};
 use std::sync::Arc;
 
-/// Normal in 2 x 16 bits, material index plus one: see glsl/packing.glsl.
+/// [`GeometryTexel`](crate::geometry_texel::GeometryTexel).
 const GEOMETRY_FORMAT: vk::Format = vk::Format::R32G32_UINT;
 const DEPTH_FORMAT: vk::Format = vk::Format::D32_SFLOAT;
 

@@ -1,12 +1,11 @@
 //! What shading looks up of the environment, on the device: only what its method and its materials need.
 use super::background::check_map_size;
 use crate::Result;
-use crate::environment::{Environment, LightMap, LightSource, Pyramid};
+use crate::environment::{Environment, LightMap, Pyramid};
 use crate::light::{BlurredLight, Light};
 use crate::method::Method;
 use crate::vulkan::{self, Bindings, Buffer, Device, ImageKind, ImageShape, Sampler, SamplerKind};
 use ash::vk;
-use glam::DVec3;
 use std::sync::Arc;
 
 /// What a method looks up of the environment, on the device.
@@ -71,7 +70,9 @@ impl DeviceLight {
         self.pyramid = Some(DevicePyramid::new(device, "environment pyramid", pyramid, scale)?);
         self.source_pyramid = Some(DevicePyramid::new(device, "source pyramid", source_pyramid, scale)?);
         self.irradiance = Some(DevicePyramid::new(device, "irradiance map", &blurred.irradiance, scale)?);
-        self.sources = Some(source_buffer(device, &environment.small_sources().list, scale)?);
+        let (sources, storage) = (environment.small_sources(), vk::BufferUsageFlags::STORAGE_BUFFER);
+        let words = sources.device_words(scale);
+        self.sources = Some(Buffer::with_contents(device, "light sources", storage, bytemuck::cast_slice(&words))?);
         Ok(())
     }
 
@@ -115,22 +116,6 @@ fn upload_map(device: &Arc<Device>, environment: &Environment, map: &LightMap, s
     let shape = ImageShape::plane(vk::Format::R32G32B32A32_SFLOAT, map.width as u32, map.height as u32);
     let texels: Vec<_> = map.texels.iter().map(|&[r, g, b, a]| [r / scale, g / scale, b / scale, a]).collect();
     Ok(vulkan::Image::with_texels(device, "environment map", shape, &[bytemuck::cast_slice(&texels).to_vec()])?)
-}
-
-/// Uploads `sources`, their power over `scale`: `Sources` in glsl/methods/fitted.glsl.
-fn source_buffer(device: &Arc<Device>, sources: &[LightSource], scale: f32) -> Result<Buffer> {
-    // The count, and what aligns the structures to 16 bytes.
-    let mut words = vec![sources.len() as u32, 0, 0, 0];
-    for source in sources {
-        let LightSource { direction, axes: [x, y], power } = *source;
-        let vectors = [(direction, source.width_rad()), (x, 0.0), (y, 0.0), (power / f64::from(scale), 0.0)];
-        let words_of = |(vector, w): (DVec3, f64)| vector.extend(w).as_vec4().to_array().map(f32::to_bits);
-        words.extend(vectors.into_iter().flat_map(words_of));
-    }
-    // A buffer cannot be empty, nor its array.
-    words.resize(words.len().max(4 + 16), 0);
-    let storage = vk::BufferUsageFlags::STORAGE_BUFFER;
-    Ok(Buffer::with_contents(device, "light sources", storage, bytemuck::cast_slice(&words))?)
 }
 
 impl DevicePyramid {

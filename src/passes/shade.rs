@@ -1,10 +1,10 @@
 //! Pass 2 of the paper (section 4.2): the radiance of every listed pixel, by its partition of the sample threads.
 use super::{CameraRays, Counters, DeviceLight, FrameGraph, Tiles, View, clear};
-use crate::brdf::{Brdf, half_vector_width};
+use crate::brdf::{Brdf, MaterialRecord, MerlTable};
 use crate::graph::{self, Access, BufferDesc, Image};
 use crate::memo::Keyed;
 use crate::method::Method;
-use crate::threads::{Sample, SliceTable, Threads};
+use crate::threads::{SliceTable, Threads};
 use crate::vulkan::{
     self, Bindings, Buffer, ComputePipeline, Device, Groups, ImageKind, ImageShape, Sampler, SamplerKind,
 };
@@ -12,20 +12,6 @@ use crate::{Error, Result};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 use std::sync::Arc;
-
-/// `Material` in glsl/material.glsl.
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-struct MaterialRecord {
-    parameters: [f32; 12],
-    model: u32,
-    first_thread: u32,
-    thread_count: u32,
-    row_count: u32,
-    first_slice: u32,
-    lobe_width: f32,
-    padding: [u32; 2],
-}
 
 /// Materials, their threads or CDFs, and their tables on the device.
 pub struct DeviceMaterials {
@@ -60,31 +46,23 @@ impl DeviceMaterials {
         let mut tables = TableAtlas::default();
         let mut models_used = 0;
         for (brdf, thread_table) in materials {
-            let mut parameters = brdf.gpu_parameters();
-            if let Some(table) = brdf.table().filter(|_| evaluates_brdf) {
-                // glsl/brdf/merl.glsl reads its place in the atlas from a.xy.
-                parameters[..2].copy_from_slice(&tables.add(device, table.texels())?.map(|texels| texels as f32));
+            let mut record = MaterialRecord::new(brdf);
+            if let Some(table) = evaluates_brdf.then(|| brdf.table()).flatten() {
+                record = record.with_table_at(tables.add(device, table)?);
             }
             if evaluates_brdf {
-                models_used |= 1 << brdf.model_index();
+                models_used |= 1 << record.model;
             }
             if let Some(kind) = method.threads() {
                 assert_eq!(thread_table.map(Threads::kind), Some(kind), "threads of method {}", method.name());
             }
-            let [row_count, thread_count] = thread_table.map_or([0, 0], Threads::size);
-            records.push(MaterialRecord {
-                parameters,
-                model: brdf.model_index(),
-                first_thread: (threads.len() / words_a_thread(thread_table)) as u32,
-                thread_count: thread_count as u32,
-                row_count: row_count as u32,
-                first_slice: slices.len() as u32,
-                lobe_width: half_vector_width(brdf) as f32,
-                padding: [0; 2],
-            });
             if let Some(table) = thread_table {
-                append_threads(&mut threads, table);
+                [record.row_count, record.thread_count] = table.size().map(|size| size as u32);
+                record.first_thread = (threads.len() / table.device_element_words()) as u32;
+                threads.extend(table.device_words());
             }
+            record.first_slice = slices.len() as u32;
+            records.push(record);
             if use_slices {
                 slices.extend(SliceTable::new(brdf).cdfs);
             }
@@ -103,41 +81,17 @@ impl DeviceMaterials {
     }
 }
 
-/// Words of an element of the buffer of threads, as their shader declares it: a vec4, or a word.
-fn words_a_thread(threads: Option<&Threads>) -> usize {
-    if matches!(threads, Some(Threads::Paper(_))) { 4 } else { 1 }
-}
-
-/// Appends `threads` as their shader reads them: glsl/methods/paper.glsl, glsl/methods/fitted.glsl.
-fn append_threads(words: &mut Vec<u32>, threads: &Threads) {
-    match threads {
-        Threads::Fitted(table) => {
-            for (row, cosine_part) in table.cosine_part.iter().enumerate() {
-                words.extend(cosine_part.map(f32::to_bits));
-                words.extend(table.row(row).iter().flat_map(|kernel| kernel.0));
-            }
-        }
-        Threads::Paper(table) => {
-            for (row, [red, green, blue]) in table.albedo.iter().copied().enumerate() {
-                words.extend([red, green, blue, 0.0].map(f32::to_bits));
-                let thread = |sample: &Sample| sample.direction().as_vec3().extend(sample.p.log2()).to_array();
-                words.extend(table.row(row).iter().flat_map(thread).map(f32::to_bits));
-            }
-        }
-    }
-}
-
 /// All measured tables in one 3D image: side by side along theta_d (y) and theta_h (z), since phi_d (x) repeats.
 #[derive(Default)]
-struct TableAtlas<'a>(Vec<&'a [glam::Vec4]>);
+struct TableAtlas(Vec<MerlTable>);
 
 /// Texels of a table along phi_d, and along each of theta_d and theta_h.
 const TABLE_WIDTH: usize = crate::brdf::merl::PHI_D_BINS;
 const TABLE_SIDE: usize = crate::brdf::merl::THETA_D_BINS;
 
-impl<'a> TableAtlas<'a> {
+impl TableAtlas {
     /// Adds a table; returns its offset in y and z, in texels.
-    fn add(&mut self, device: &Device, texels: &'a [glam::Vec4]) -> Result<[usize; 2]> {
+    fn add(&mut self, device: &Device, table: MerlTable) -> Result<[usize; 2]> {
         let per_axis = device.limits().max_image_dimension3_d as usize / TABLE_SIDE;
         let index = self.0.len();
         if index >= per_axis * per_axis {
@@ -145,7 +99,7 @@ impl<'a> TableAtlas<'a> {
                 format!("has more measured materials than the {} that this device holds", per_axis * per_axis);
             return Err(Error::input("the scene", problem, "use fewer"));
         }
-        self.0.push(texels);
+        self.0.push(table);
         Ok([index % per_axis, index / per_axis].map(|place| place * TABLE_SIDE))
     }
 
@@ -162,7 +116,7 @@ impl<'a> TableAtlas<'a> {
         let mut texels = vec![glam::Vec4::ZERO; extent.iter().product()];
         for (index, table) in self.0.iter().enumerate() {
             let (y_0, z_0) = (index % per_axis * TABLE_SIDE, index / per_axis * TABLE_SIDE);
-            for (line, source) in table.chunks_exact(TABLE_WIDTH).enumerate() {
+            for (line, source) in table.texels().chunks_exact(TABLE_WIDTH).enumerate() {
                 let (y, z) = (y_0 + line % TABLE_SIDE, z_0 + line / TABLE_SIDE);
                 let start = TABLE_WIDTH * (y + extent[1] * z);
                 texels[start..start + TABLE_WIDTH].copy_from_slice(source);
@@ -171,7 +125,10 @@ impl<'a> TableAtlas<'a> {
         let bytes = if format == single {
             bytemuck::cast_slice(&texels).to_vec()
         } else {
-            let half = texels.iter().flat_map(|texel| texel.to_array().map(half::f16::from_f32)).collect::<Vec<_>>();
+            let half = texels
+                .iter()
+                .flat_map(|texel| texel.to_array().map(|value| half::f16::from_f32(value.min(65504.0))))
+                .collect::<Vec<_>>();
             bytemuck::cast_slice(&half).to_vec()
         };
         let extent = extent.map(|size| size as u32);

@@ -11,6 +11,7 @@ use super::{
     MAX_SUBPIXELS, MaterialSettings, MaterialSource, ObjectSettings, Scene, ShadingSettings, Source,
 };
 use crate::error::{Error, Result};
+use crate::file_format::{self, FileFormat, FileKind, text};
 use crate::output::write_whole;
 
 /// A whole scene file.
@@ -79,10 +80,11 @@ impl Scene {
     /// Reads a scene file. Paths in it are relative to its folder. Without objects the scene is the built-in sphere; an object
     /// that names no material is of the first one, or of the default one in a scene without any.
     pub fn load(path: &Path) -> Result<Self> {
-        let text = std::fs::read_to_string(path).map_err(|cause| Error::unreadable(path, cause))?;
-        parse(&text, path.parent().unwrap_or(Path::new("")))
-            .map_err(|problem| Error::in_file(path, problem, "see the scene file in the README"))
+        parse_file(path, &file_format::read(path)?)
     }
+
+    /// The formats of scene files.
+    pub const FILES: FileKind<Self> = FileKind { what: "scene", formats: &[FORMAT], builtin_names: Vec::new };
 
     /// A scene from the text of a file whose relative paths start at `base_dir`; see [`Self::load`].
     pub fn parse(text: &str, base_dir: &Path) -> Result<Self> {
@@ -103,13 +105,21 @@ impl Scene {
     /// The scene as the text of a file: paths in `folder` and below are relative to it, others are absolute.
     ///
     /// # Errors
-    /// A path that is not UTF-8.
+    /// A path that is not UTF-8, a material that a program defines.
     pub fn to_toml(&self, folder: Option<&Path>) -> Result<String> {
         let text = SceneText::new(self, folder)?;
         toml::to_string_pretty(&text).map_err(|cause| {
             Error::input("scene", format!("cannot be written as TOML ({cause})"), "use numbers that are finite")
         })
     }
+}
+
+const FORMAT: FileFormat<Scene> =
+    FileFormat { extension: "toml", name: "a scene .toml", is_of_format: |_| true, parse: parse_file };
+
+fn parse_file(path: &Path, bytes: &[u8]) -> Result<Scene> {
+    parse(text(path, bytes)?, path.parent().unwrap_or(Path::new("")))
+        .map_err(|problem| Error::in_file(path, problem, "see the scene file in the README"))
 }
 
 /// Parses and checks a scene; an error is one line that names line and key.
@@ -331,6 +341,10 @@ fn material_table(material: &MaterialSettings, folder: Option<&Path>) -> Result<
         MaterialSource::Model { model, parameters } => {
             table.extend([("model".into(), model.clone().into())]);
             table.extend(parameters.clone());
+        }
+        MaterialSource::Custom(_) => {
+            let subject = format!("material \"{}\"", material.name);
+            return Err(Error::input(subject, "is defined by a program", "choose a model or a file before saving"));
         }
     }
     Ok(table)

@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use glam::{DMat3, DQuat, EulerRot, Mat4, Quat, Vec3};
 use serde::{Deserialize, Serialize};
 
-use crate::brdf::Brdf;
+use crate::brdf::{Brdf, Custom};
+use crate::file_format::file_formats;
 
 pub mod camera;
 mod file;
@@ -13,6 +14,8 @@ pub mod mesh;
 
 pub use camera::Camera;
 pub use mesh::Mesh;
+
+file_formats!(Mesh: obj_file);
 
 /// The built-in material of an object that names none in a scene without materials.
 pub const DEFAULT_MATERIAL: &str = "gold";
@@ -86,7 +89,7 @@ pub enum Background {
 }
 
 /// A file, or something of that name made by the program.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Source {
     /// Read from the disk.
@@ -97,6 +100,8 @@ pub enum Source {
 
 impl Source {
     /// What a flag names: one of `builtin_names`, or else a file.
+    ///
+    /// A file that is called like one of these is named by its path: `./sphere`.
     pub fn named(name: &str, builtin_names: &[&str]) -> Self {
         if builtin_names.contains(&name) { Self::Builtin(name.into()) } else { Self::File(name.into()) }
     }
@@ -105,10 +110,17 @@ impl Source {
 impl std::fmt::Display for Source {
     fn fmt(&self, formatter: &mut std::fmt::Formatter) -> std::fmt::Result {
         match self {
+            // A bare name is that of a built-in.
+            Self::File(path) if is_bare(path) => write!(formatter, "./{}", path.display()),
             Self::File(path) => path.display().fmt(formatter),
             Self::Builtin(name) => name.fmt(formatter),
         }
     }
+}
+
+/// Whether a path is a name alone, with neither a folder nor an extension.
+fn is_bare(path: &Path) -> bool {
+    path.extension().is_none() && path.parent().is_some_and(|folder| folder.as_os_str().is_empty())
 }
 
 /// `[environment]`: the light.
@@ -159,15 +171,18 @@ pub enum MaterialSource {
         /// The keys beside it.
         parameters: toml::Table,
     },
+    /// One that a user of the crate defines; no file can have it.
+    #[serde(skip)]
+    Custom(Custom),
 }
 
 impl MaterialSource {
-    /// What a flag names: built in, or a file (`./name` for one that is called like a built-in). A name that is neither, and looks like no
-    /// file, is an unknown built-in rather than a missing file.
+    /// What a flag names: built in, or a file (`./name` for one that is called like a built-in). A bare name that is neither is an unknown
+    /// built-in rather than a missing file.
     pub fn named(text: &str) -> Self {
         let path = PathBuf::from(text);
         let is_builtin = Brdf::builtin_names().any(|name| name == text);
-        if !is_builtin && (path.extension().is_some() || path.exists()) {
+        if !is_builtin && (!is_bare(&path) || path.exists()) {
             Self::File(path)
         } else {
             Self::Builtin(text.to_owned())
@@ -299,6 +314,22 @@ impl ObjectSettings {
 mod tests {
     use super::*;
     use glam::DVec3;
+
+    #[test]
+    fn a_file_called_like_a_built_in_is_never_taken_for_it() {
+        let builtin = Source::named("sphere", mesh::builtin_names());
+        assert_eq!(builtin, Source::Builtin("sphere".into()));
+        for name in ["./sphere", "sphere.obj", "meshes/sphere", "/sphere"] {
+            let file = Source::named(name, mesh::builtin_names());
+            assert_eq!((&file, file.to_string().as_str()), (&Source::File(name.into()), name));
+        }
+        // As a scene file in the folder where the program runs names it.
+        let file = Source::File("sphere".into());
+        assert_ne!(file.to_string(), builtin.to_string());
+        assert_eq!(Source::named(&file.to_string(), mesh::builtin_names()), Source::File("./sphere".into()));
+        assert_eq!(MaterialSource::named("gold"), MaterialSource::Builtin("gold".into()));
+        assert_eq!(MaterialSource::named("./gold"), MaterialSource::File("./gold".into()));
+    }
 
     #[test]
     fn an_object_is_scaled_then_turned_about_z_x_y_then_moved() {

@@ -1,12 +1,12 @@
 //! Fitted threads. Twin of glsl/methods/fitted.glsl, by functions of the same names.
 use std::f32::consts::{FRAC_PI_2, PI};
 
-use glam::{DVec3, IVec2, Vec3};
+use glam::{IVec2, Vec3, Vec4};
 
 use super::{CpuShader, Point, Surface};
 use crate::brdf::MIN_COS_THETA_D;
 use crate::environment::sources::{CLEAR, clearance};
-use crate::environment::{LightMap, LightSource};
+use crate::environment::{LightMap, SourceRecord};
 use crate::light::BlurredLight;
 use crate::threads::Threads;
 use crate::threads::fitted::kernel::FINEST_WIDTH_RAD;
@@ -76,10 +76,10 @@ fn smoothstep([from, to]: [f32; 2], x: f32) -> f32 {
 }
 
 /// Twin of `share_of_brdf`.
-fn share_of_brdf(lobe_width: f32, sources: &[LightSource], mirror: Vec3, least_width: f32) -> f32 {
-    let share = |source: &LightSource| {
-        let away = source.direction.as_vec3().distance(mirror);
-        smoothstep(CLEAR, clearance(away, (source.width_rad() as f32).max(least_width), lobe_width))
+fn share_of_brdf(lobe_width: f32, sources: &[SourceRecord], mirror: Vec3, least_width: f32) -> f32 {
+    let share = |source: &SourceRecord| {
+        let away = source.direction.truncate().distance(mirror);
+        smoothstep(CLEAR, clearance(away, source.direction.w.max(least_width), lobe_width))
     };
     sources.iter().map(share).fold(1.0, f32::min)
 }
@@ -99,7 +99,7 @@ pub(super) fn needs_subpixels(point: &Point) -> bool {
     if point.twin.light.blurred.is_none() {
         return false;
     }
-    let sources = &point.twin.prepared.environment.small_sources().list;
+    let sources = &point.twin.sources;
     let deviation = point.surface.normal_variance.sqrt();
     let w_o = point.surface.view_direction();
     let mirror = mirrored(&point.surface, w_o);
@@ -118,13 +118,13 @@ fn risen(z: f32, deviation: f32) -> [f32; 2] {
 }
 
 /// Twin of `at_sources`: powers of all sources times f cos, and times cos.
-fn at_sources(point: &Point, sources: &[LightSource], lobe_width: f32, w_o: Vec3, mirror: Vec3) -> (Vec3, Vec3) {
+fn at_sources(point: &Point, sources: &[SourceRecord], lobe_width: f32, w_o: Vec3, mirror: Vec3) -> (Vec3, Vec3) {
     let (mut f_cos, mut cosine) = (Vec3::ZERO, Vec3::ZERO);
     for source in sources {
-        let away = source.direction.as_vec3().distance(mirror);
-        let from_afar = clearance(away, source.width_rad() as f32, lobe_width) > 8.0;
+        let away = source.direction.truncate().distance(mirror);
+        let from_afar = clearance(away, source.direction.w, lobe_width) > 8.0;
         let side = if from_afar { 1 } else { 3 };
-        let deviation = source.axes.map(|axis| axis.as_vec3().dot(point.surface.frame.z_axis));
+        let deviation = source.axes.map(|axis| axis.truncate().dot(point.surface.frame.z_axis));
         let deviation = deviation[0].hypot(deviation[1]);
         for i in 0..side * side {
             let place = IVec2::new(i % side, i / side) - side / 2;
@@ -134,12 +134,12 @@ fn at_sources(point: &Point, sources: &[LightSource], lobe_width: f32, w_o: Vec3
                 (_, 0) => 4.0 / 9.0,
                 _ => 2.5 / 9.0,
             };
-            let [x, y] = source.axes.map(DVec3::as_vec3);
-            let towards = source.direction.as_vec3() + at.x * x + at.y * y;
+            let [x, y] = source.axes.map(Vec4::truncate);
+            let towards = source.direction.truncate() + at.x * x + at.y * y;
             let w_i = (point.surface.frame.transpose() * towards).normalize();
             let [cos, middle] = risen(w_i.z, deviation / side as f32);
             if cos > 0.0 {
-                let power = weight(place.x) * weight(place.y) * cos * source.power.as_vec3();
+                let power = weight(place.x) * weight(place.y) * cos * source.power.truncate();
                 let w_i = w_i.with_z(middle).normalize();
                 f_cos += power * point.brdf(w_i, w_o);
                 cosine += power;
@@ -159,7 +159,7 @@ pub(super) fn estimate(point: &Point) -> Vec3 {
     };
     let surface = &point.surface;
     let light = blurred_light(point.twin);
-    let sources = &point.twin.prepared.environment.small_sources().list;
+    let sources = &point.twin.sources;
     let row = (surface.theta_o * (threads.rows as f32 / FRAC_PI_2)).min((threads.rows - 1) as f32);
     let (below, t) = (row as usize, row.fract());
     let above = (below + 1).min(threads.rows - 1);

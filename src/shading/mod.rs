@@ -3,12 +3,12 @@
 //! It starts from the texels of the geometry cache, so that the two can be compared pixel by pixel. BRDFs are evaluated
 //! in double precision; everything else follows the shader line by line.
 use crate::Result;
-use crate::brdf::half_vector_width;
-use crate::environment::{Alias, LightMap};
+use crate::brdf::MaterialRecord;
+use crate::environment::{Alias, LightMap, SourceRecord};
+use crate::geometry_texel::GeometryTexel;
 use crate::light::Light;
 use crate::memo::Round;
 use crate::method::{Lookups, Method};
-use crate::packing::{octahedral_decode, unpack_snorm_2x16};
 use crate::passes::SMOOTH_DEG;
 use crate::prepare::{Prepared, PreparedMaterial};
 use crate::steps::light;
@@ -16,19 +16,26 @@ use crate::threads::SliceTable;
 use glam::{Mat3, UVec2, Vec2, Vec3, Vec4};
 use random::random_bits;
 
-mod cosine;
-mod environment;
-mod filtered;
-mod fitted;
-mod importance;
 mod importance_sampling;
 mod light_sampling;
 mod low_discrepancy;
-mod mis;
-mod paper;
 mod random;
-mod ris;
-mod uniform;
+
+/// Makes the modules and the dispatch from the table in methods.rs.
+macro_rules! methods {
+    ($($name:ident => $Method:ident: $properties:expr,)+) => {
+        $(mod $name;)+
+
+        /// The estimate of `method` for `point`.
+        fn estimate(method: Method, point: &Point) -> Vec3 {
+            match method {
+                $(Method::$Method => $name::estimate(point),)+
+                Method::Reference => unreachable!("a twin is made for methods that have a shader"),
+            }
+        }
+    };
+}
+include!("methods.rs");
 
 /// A point to shade: its shading frame and view angle. Twin of `Surface` in glsl/surface.glsl.
 #[derive(Clone, Copy, Debug)]
@@ -73,26 +80,19 @@ fn any_tangent(n: Vec3) -> Vec3 {
     Vec3::new(1.0 + s * n.x * n.x * a, s * n.x * n.y * a, -s * n.x)
 }
 
-/// Normal and material index of a texel of the geometry cache; `None` for the background.
-/// Twin of `geometry_normal` and `geometry_material`.
-pub fn unpack_geometry(texel: UVec2) -> Option<(Vec3, usize)> {
-    let normal = octahedral_decode(unpack_snorm_2x16(texel.x));
-    (texel.y != 0).then(|| (normal, texel.y as usize - 1))
-}
-
 /// Whether the sub-pixels of a pixel lie on one smooth surface. Twin of glsl/classify.comp.
 pub fn is_interior(texels: &[UVec2]) -> bool {
-    let Some((first_normal, first_material)) = texels.first().copied().and_then(unpack_geometry) else { return false };
+    let Some(first) = texels.first().copied().and_then(GeometryTexel::unpack) else { return false };
     texels.iter().all(|texel| {
-        unpack_geometry(*texel).is_some_and(|(normal, material)| {
-            material == first_material && normal.dot(first_normal) >= SMOOTH_DEG.to_radians().cos()
+        GeometryTexel::unpack(*texel).is_some_and(|GeometryTexel { normal, material }| {
+            material == first.material && normal.dot(first.normal) >= SMOOTH_DEG.to_radians().cos()
         })
     })
 }
 
 /// The sum of the normals of these sub-pixels. Twin of `normal_sum` in glsl/shade.comp.
 fn normal_sum(texels: &[UVec2]) -> Vec3 {
-    texels.iter().filter_map(|texel| unpack_geometry(*texel)).map(|(normal, _)| normal).sum()
+    texels.iter().filter_map(|texel| GeometryTexel::unpack(*texel)).map(|texel| texel.normal).sum()
 }
 
 /// Variance of the normal above which a pixel is a sum for each sub-pixel; why, says the shader.
@@ -108,8 +108,10 @@ pub struct CpuShader<'a> {
     aliases: Vec<Alias>,
     /// One for each material, for methods that draw by them.
     slices: Vec<SliceTable>,
-    /// `half_vector_width` of each material.
-    lobe_widths: Vec<f32>,
+    /// One for each material.
+    records: Vec<MaterialRecord>,
+    /// The small bright sources of the environment.
+    sources: Vec<SourceRecord>,
 }
 
 impl<'a> CpuShader<'a> {
@@ -133,7 +135,8 @@ impl<'a> CpuShader<'a> {
             aliases: map.as_ref().filter(|_| lookups.aliases).map(LightMap::aliases).unwrap_or_default(),
             map,
             slices: slices.unwrap_or_default(),
-            lobe_widths: materials.iter().map(|material| half_vector_width(&material.brdf) as f32).collect(),
+            records: materials.iter().map(|material| MaterialRecord::new(&material.brdf)).collect(),
+            sources: environment.small_sources().list.iter().map(|source| source.record(1.0)).collect(),
         })
     }
 
@@ -154,9 +157,9 @@ impl<'a> CpuShader<'a> {
             Surface { normal_variance, ..Surface::new(to_environment(normal), to_environment(w_o)) }
         };
         let axis = to_environment(rays.right());
-        let first_texel = texels.first().copied().and_then(unpack_geometry);
+        let first_texel = texels.first().copied().and_then(GeometryTexel::unpack);
         let middle = (interior && may_share && normal_variance < SHARED_VARIANCE).then_some(first_texel).flatten();
-        let middle = middle.map(|(_, material)| {
+        let middle = middle.map(|GeometryTexel { material, .. }| {
             let position = (pixel.as_vec2() + 0.5) / UVec2::new(view.width, view.height).as_vec2();
             let surface = surface_at(position, normals.normalize(), normal_variance);
             Point { twin: self, surface, axis, material, subpixel: pixel * view.subpixels, first: 0, stride: 1 }
@@ -169,7 +172,7 @@ impl<'a> CpuShader<'a> {
         let mut sum = Vec3::ZERO;
         let mut covered = 0;
         for (j, texel) in texels.iter().enumerate() {
-            let Some((normal, material)) = unpack_geometry(*texel) else { continue };
+            let Some(GeometryTexel { normal, material }) = GeometryTexel::unpack(*texel) else { continue };
             covered += 1;
             let subpixel = pixel * view.subpixels + UVec2::new(j as u32 % view.subpixels, j as u32 / view.subpixels);
             let surface = surface_at((subpixel.as_vec2() + 0.5) / size.as_vec2(), normal, normal_variance);
@@ -198,18 +201,7 @@ struct Point<'a> {
 
 impl Point<'_> {
     fn estimate(&self) -> Vec3 {
-        match self.twin.prepared.method {
-            Method::Fitted => fitted::estimate(self),
-            Method::Paper => paper::estimate(self),
-            Method::Uniform => uniform::estimate(self),
-            Method::Cosine => cosine::estimate(self),
-            Method::Importance => importance::estimate(self),
-            Method::Filtered => filtered::estimate(self),
-            Method::Environment => environment::estimate(self),
-            Method::Ris => ris::estimate(self),
-            Method::Mis => mis::estimate(self),
-            Method::Reference => unreachable!("a twin is made for methods that have a shader"),
-        }
+        estimate(self.twin.prepared.method, self)
     }
 
     fn material(&self) -> &PreparedMaterial {
@@ -217,7 +209,7 @@ impl Point<'_> {
     }
 
     fn lobe_width(&self) -> f32 {
-        self.twin.lobe_widths[self.material]
+        self.twin.records[self.material].lobe_width
     }
 
     fn sample_count(&self) -> u32 {

@@ -66,8 +66,7 @@ impl Paper<'_> {
     }
 
     fn thread(&self, row: usize, k: usize) -> Vec4 {
-        let sample = &self.threads.row(row)[k];
-        sample.direction().as_vec3().extend(sample.p.log2())
+        self.threads.row(row)[k].device_vector()
     }
 
     fn partition(&self) -> impl Iterator<Item = usize> + use<> {

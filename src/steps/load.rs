@@ -3,15 +3,23 @@ use crate::Result;
 use crate::brdf::Brdf;
 use crate::environment::Environment;
 use crate::error::Error;
+use crate::file_format::FileKind;
 use crate::memo::{Key, Memo, Round, Step};
 use crate::scene::{MaterialSource, Mesh, Source};
+use std::path::Path;
 
-/// The key of what `source` names.
-fn key_of(memo: &Memo, source: &Source) -> Result<Key> {
+/// The key of what `source` names, in a file of one of the formats `files`.
+fn key_of<T>(memo: &Memo, files: &FileKind<T>, source: &Source) -> Result<Key> {
     Ok(match source {
-        Source::File(path) => Key::builder("file").key(memo.file_key(path)?).build(),
+        Source::File(path) => file_key(memo, files, path)?,
         Source::Builtin(name) => Key::builder("builtin").text(name).build(),
     })
+}
+
+/// The key of a file: of its contents, and of its format, under which the same bytes are something else than under another.
+fn file_key<T>(memo: &Memo, files: &FileKind<T>, path: &Path) -> Result<Key> {
+    let format = files.format_of(path)?;
+    Ok(Key::builder("file").text(format.extension).key(memo.file_key(path)?).build())
 }
 
 /// Loads or makes a mesh, in object space.
@@ -22,12 +30,12 @@ impl Step for LoadMesh<'_> {
     const NAME: &'static str = "mesh";
 
     fn key(&self, memo: &Memo) -> Result<Key> {
-        key_of(memo, self.0)
+        key_of(memo, &Mesh::FILES, self.0)
     }
 
-    fn make(&self, _: &Round) -> Result<Mesh> {
+    fn make(&self, round: &Round) -> Result<Mesh> {
         match self.0 {
-            Source::File(path) => Mesh::load(path),
+            Source::File(path) => Mesh::FILES.parse(path, &round.memo().file_bytes(path)?),
             Source::Builtin(name) => Mesh::builtin(name),
         }
     }
@@ -42,12 +50,12 @@ impl Step for LoadEnvironment<'_> {
 
     fn key(&self, memo: &Memo) -> Result<Key> {
         // It knows its name.
-        Ok(Key::builder(&self.0.to_string()).key(key_of(memo, self.0)?).build())
+        Ok(Key::builder(&self.0.to_string()).key(key_of(memo, &Environment::FILES, self.0)?).build())
     }
 
-    fn make(&self, _: &Round) -> Result<Environment> {
+    fn make(&self, round: &Round) -> Result<Environment> {
         match self.0 {
-            Source::File(path) => Environment::load(path),
+            Source::File(path) => Environment::FILES.parse(path, &round.memo().file_bytes(path)?),
             Source::Builtin(name) => Environment::builtin(name),
         }
     }
@@ -62,28 +70,25 @@ impl Step for LoadMaterial<'_> {
 
     fn key(&self, memo: &Memo) -> Result<Key> {
         Ok(match self.0 {
-            MaterialSource::File(path) => Key::builder("file").key(memo.file_key(path)?).build(),
+            MaterialSource::File(path) => file_key(memo, &Brdf::FILES, path)?,
             // Models are made at once, so they are known by what they are.
-            source => Key::builder("model").bytes(load_material(source)?.fingerprint().as_bytes()).build(),
+            source => Key::builder("model").bytes(load(memo, source)?.fingerprint().as_bytes()).build(),
         })
     }
 
-    fn make(&self, _: &Round) -> Result<Brdf> {
-        load_material(self.0)
+    fn make(&self, round: &Round) -> Result<Brdf> {
+        load(round.memo(), self.0)
     }
 }
 
-fn load_material(source: &MaterialSource) -> Result<Brdf> {
+fn load(memo: &Memo, source: &MaterialSource) -> Result<Brdf> {
     match source {
-        MaterialSource::File(path) => Brdf::load(path),
+        MaterialSource::File(path) => Brdf::FILES.parse(path, &memo.file_bytes(path)?),
         MaterialSource::Builtin(name) => Brdf::builtin(name).ok_or_else(|| {
-            let known: Vec<_> = Brdf::builtin_names().collect();
-            Error::input(
-                format!("material \"{name}\""),
-                "is neither built in nor a file",
-                format!("name a .binary or .toml file or one of: {}", known.join(", ")),
-            )
+            let remedy = format!("give {}", Brdf::FILES.files_or_builtins());
+            Error::input(format!("material \"{name}\""), "is neither built in nor a file", remedy)
         }),
         MaterialSource::Model { model, parameters } => Brdf::from_parameters(model, parameters.clone()),
+        MaterialSource::Custom(custom) => Ok(Brdf::Custom(custom.clone())),
     }
 }

@@ -23,15 +23,14 @@
 //! red weight as half floats, level in the low half; green and blue weight as half floats, green in the low half. The level says
 //! by which von Mises-Fisher kernel the environment is to be blurred: of width 2^level / 256 radians if it is whole, by none at
 //! level -1, and otherwise by the linear blend of the two kernels of whole levels beside it.
-use std::f32::consts::FRAC_PI_2;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::fitted::kernel::{SHARPEST_LEVEL, WIDEST_LEVEL};
-use super::fitted::{FittedTable, PackedKernel, UnpackedKernel};
-use super::{Sample, ThreadKind, ThreadTable, Threads};
+use super::fitted::FittedTable;
+use super::{ThreadKind, ThreadTable, Threads};
 use crate::error::{Error, Result};
+use crate::file_format;
 use crate::output::write_whole;
 
 /// Version of the file format and of the threads in it: to be raised when either changes, since caches depend on it.
@@ -56,7 +55,7 @@ pub fn write(threads: &Threads, path: &Path) -> Result<()> {
 
 /// Reads threads back. Errors: unreadable, not a thread file, of another version, damaged.
 pub fn read(path: &Path) -> Result<Threads> {
-    let bytes = std::fs::read(path).map_err(|cause| Error::unreadable(path, cause))?;
+    let bytes = file_format::read(path)?;
     decode(&bytes).map_err(|problem| Error::in_file(path, problem, "generate it again"))
 }
 
@@ -73,16 +72,9 @@ fn encode(threads: &Threads) -> Vec<u8> {
     bytes.extend(FORMAT_VERSION.to_le_bytes());
     bytes.extend((header.len() as u32).to_le_bytes());
     bytes.extend(header);
-    let words: Vec<u32> = match threads {
-        Threads::Fitted(table) => {
-            let rows = table.cosine_part.iter().zip(&table.relative_error);
-            let rows = rows.flat_map(|([red, green, blue], error)| [*red, *green, *blue, *error]).map(f32::to_bits);
-            rows.chain(table.kernels.iter().flat_map(|kernel| kernel.0)).collect()
-        }
-        Threads::Paper(table) => {
-            let samples = table.samples.iter().flat_map(|s| [s.theta, s.phi, s.p]);
-            table.albedo.as_flattened().iter().copied().chain(samples).map(f32::to_bits).collect()
-        }
+    let words = match threads {
+        Threads::Fitted(table) => table.file_words(),
+        Threads::Paper(table) => table.file_words(),
     };
     bytes.extend(words.iter().flat_map(|word| word.to_le_bytes()));
     let digest = blake3::hash(&bytes);
@@ -109,8 +101,8 @@ fn decode(bytes: &[u8]) -> Result<Threads, String> {
     let kind = [ThreadKind::Fitted, ThreadKind::Paper].into_iter().find(|kind| kind.name() == method);
     let kind = kind.ok_or_else(|| format!("holds threads of the unknown method {method:?}"))?;
     let words_a_row = match kind {
-        ThreadKind::Fitted => 4,
-        ThreadKind::Paper => 3,
+        ThreadKind::Fitted => FittedTable::FILE_ROW_WORDS,
+        ThreadKind::Paper => ThreadTable::FILE_ROW_WORDS,
     };
     let per_row = count.checked_mul(3).and_then(|words| words.checked_add(words_a_row));
     let expected = per_row.and_then(|words| words.checked_mul(rows)?.checked_mul(4));
@@ -119,60 +111,21 @@ fn decode(bytes: &[u8]) -> Result<Threads, String> {
     }
     let words: Vec<u32> = payload.as_chunks().0.iter().map(|&word| u32::from_le_bytes(word)).collect();
     let (of_rows, of_threads) = words.split_at(words_a_row * rows);
-    match kind {
+    Ok(match kind {
         ThreadKind::Fitted => {
-            fitted_threads(of_rows, of_threads).map(|table| FittedTable { rows, count, material, ..table })
+            let table = FittedTable::from_file_words(of_rows, of_threads)?;
+            Threads::Fitted(FittedTable { rows, count, material, ..table })
         }
         ThreadKind::Paper => {
-            return paper_threads(of_rows, of_threads)
-                .map(|table| Threads::Paper(ThreadTable { rows, count, material, seed, ..table }));
+            let table = ThreadTable::from_file_words(of_rows, of_threads)?;
+            Threads::Paper(ThreadTable { rows, count, material, seed, ..table })
         }
-    }
-    .map(Threads::Fitted)
-}
-
-/// Fitted threads of such words. A foreign writer can get the checksum right and a number wrong.
-fn fitted_threads(of_rows: &[u32], of_threads: &[u32]) -> Result<FittedTable, String> {
-    let (of_rows, kernels) = (of_rows.as_chunks::<4>().0, of_threads.as_chunks().0);
-    let kernels: Vec<_> = kernels.iter().copied().map(PackedKernel).collect();
-    let cosine_part: Vec<[f32; 3]> = of_rows.iter().map(|&[r, g, b, _]| [r, g, b].map(f32::from_bits)).collect();
-    let relative_error: Vec<f32> = of_rows.iter().map(|&[.., error]| f32::from_bits(error)).collect();
-    if !cosine_part.iter().flatten().chain(&relative_error).all(|value| value.is_finite()) {
-        return Err("holds a row that is not of finite numbers".into());
-    }
-    let is_usable = |kernel: &PackedKernel| {
-        let UnpackedKernel { level, weight, .. } = kernel.unpack();
-        (SHARPEST_LEVEL as f32..=WIDEST_LEVEL as f32).contains(&level)
-            && weight.min_element() >= 0.0
-            && weight.is_finite()
-    };
-    if !kernels.iter().all(is_usable) {
-        return Err("holds a thread whose level or weight is none".into());
-    }
-    Ok(FittedTable { rows: 0, count: 0, material: String::new(), cosine_part, relative_error, kernels })
-}
-
-/// The paper's threads of such words.
-fn paper_threads(of_rows: &[u32], of_threads: &[u32]) -> Result<ThreadTable, String> {
-    let numbers = |words: &[u32]| -> Vec<[f32; 3]> {
-        words.as_chunks().0.iter().map(|words: &[u32; 3]| words.map(f32::from_bits)).collect()
-    };
-    let albedo = numbers(of_rows);
-    let samples: Vec<Sample> =
-        numbers(of_threads).into_iter().map(|[theta, phi, p]| Sample { theta, phi, p }).collect();
-    let is_usable =
-        |s: &Sample| (0.0..FRAC_PI_2).contains(&s.theta) && s.phi.is_finite() && s.p > 0.0 && s.p.is_finite();
-    if !samples.iter().all(is_usable) {
-        return Err("holds a sample below the horizon or without a pdf".into());
-    }
-    if !albedo.as_flattened().iter().all(|value| (0.0..=f32::MAX).contains(value)) {
-        return Err("holds an albedo that is none".into());
-    }
-    Ok(ThreadTable { rows: 0, count: 0, seed: 0, material: String::new(), albedo, samples })
+    })
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::{Sample, fitted::PackedKernel};
     use super::*;
 
     fn table() -> ThreadTable {

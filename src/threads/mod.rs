@@ -12,7 +12,7 @@
 //!
 use std::f64::consts::FRAC_PI_2;
 
-use glam::{DVec3, dvec3};
+use glam::DVec3;
 
 use crate::brdf::{Brdf, luminance};
 use crate::error::{Error, Result};
@@ -28,6 +28,7 @@ mod plot;
 pub mod slice;
 pub mod slice_table;
 pub mod smoothing;
+mod table;
 #[cfg(test)]
 pub(crate) mod test_materials;
 
@@ -35,6 +36,7 @@ pub use file::{FORMAT_VERSION, read, write};
 pub use fitted::FittedTable;
 pub use plot::plot;
 pub use slice_table::SliceTable;
+pub use table::{Sample, ThreadTable};
 
 /// Lowest n . s of a sample: 0.006 degrees above the horizon, a thousand times what rounding theta to single precision moves
 /// it by, and far below what any view angle of a table needs.
@@ -138,6 +140,22 @@ impl Threads {
         }
     }
 
+    /// The words of the shader's buffer of threads: see [`FittedTable::device_words`] and [`ThreadTable::device_words`].
+    pub fn device_words(&self) -> Vec<u32> {
+        match self {
+            Self::Fitted(table) => table.device_words(),
+            Self::Paper(table) => table.device_words(),
+        }
+    }
+
+    /// Words of an element of that buffer, as the shader declares it.
+    pub fn device_element_words(&self) -> usize {
+        match self {
+            Self::Fitted(_) => FittedTable::DEVICE_ELEMENT_WORDS,
+            Self::Paper(_) => ThreadTable::DEVICE_ELEMENT_WORDS,
+        }
+    }
+
     /// The same, with this name of the material.
     pub fn of_material(mut self, name: &str) -> Self {
         match &mut self {
@@ -191,78 +209,6 @@ impl ThreadSettings {
         }
         Ok(())
     }
-}
-
-/// One incident sample in the shading frame of its row.
-#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
-#[repr(C)]
-pub struct Sample {
-    /// Angle to the normal in radians, less than pi / 2.
-    pub theta: f32,
-    /// Azimuth in radians, counted from the side of w_o; -pi to pi.
-    pub phi: f32,
-    /// pdf in 1/sr, positive.
-    pub p: f32,
-}
-
-impl Sample {
-    /// The sample at unit `direction` with pdf `p`.
-    pub fn new(direction: DVec3, p: f64) -> Self {
-        let theta = direction.x.hypot(direction.y).atan2(direction.z) as f32;
-        Self { theta, phi: direction.y.atan2(direction.x) as f32, p: p as f32 }
-    }
-
-    /// Unit direction w_i.
-    pub fn direction(&self) -> DVec3 {
-        let (sin_theta, cos_theta) = f64::from(self.theta).sin_cos();
-        let (sin_phi, cos_phi) = f64::from(self.phi).sin_cos();
-        dvec3(sin_theta * cos_phi, sin_theta * sin_phi, cos_theta)
-    }
-}
-
-/// The threads of one material: `rows` x `count` samples. Row r is for theta_o = r 90 deg / rows.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ThreadTable {
-    /// Number of view angles.
-    pub rows: usize,
-    /// Number of threads.
-    pub count: usize,
-    /// The seed it was made with.
-    pub seed: u64,
-    /// Name of the material, for people.
-    pub material: String,
-    /// Directional albedo of each row, linear Rec. 709: the integral of f cos that equation (4) divides by.
-    pub albedo: Vec<[f32; 3]>,
-    /// Row by row: thread k of row r is `samples[r * count + k]`.
-    pub samples: Vec<Sample>,
-}
-
-impl ThreadTable {
-    /// View angle of `row` in radians.
-    pub fn theta_o(&self, row: usize) -> f64 {
-        theta_o(row, self.rows)
-    }
-
-    /// The samples of `row`, one per thread.
-    pub fn row(&self, row: usize) -> &[Sample] {
-        &self.samples[row * self.count..][..self.count]
-    }
-
-    /// Direction and pdf of `thread` seen from `theta_o` (radians), between rows: directions blend as unit vectors (a blend of
-    /// phi would break where it wraps), pdfs by their logarithm: half-way between rows a white furnace is 2 to 3 times nearer
-    /// to the albedo than with a linear blend. Beyond the last row that row holds.
-    pub fn interpolate(&self, theta_o: f64, thread: usize) -> (DVec3, f64) {
-        let position = (theta_o / FRAC_PI_2 * self.rows as f64).clamp(0.0, (self.rows - 1) as f64);
-        let (low, t) = (position as usize, position.fract());
-        let high = (low + 1).min(self.rows - 1);
-        interpolate(&self.row(low)[thread], &self.row(high)[thread], t)
-    }
-}
-
-/// Direction and pdf at the part `t` of the way from `a` to `b`, the same thread one row on.
-fn interpolate(a: &Sample, b: &Sample, t: f64) -> (DVec3, f64) {
-    let (p_a, p_b) = (f64::from(a.p), f64::from(b.p));
-    (a.direction().lerp(b.direction(), t).normalize(), p_a * (p_b / p_a).powf(t))
 }
 
 /// View angle of `row` of `rows` in radians.

@@ -81,6 +81,7 @@ impl Change {
                     MaterialSource::File(path) => path.display().to_string(),
                     MaterialSource::Builtin(name) => name.clone(),
                     MaterialSource::Model { model, .. } => model.clone(),
+                    MaterialSource::Custom(custom) => custom.name().to_owned(),
                 };
                 changed.use_material(&name, source.clone());
             }
@@ -152,7 +153,7 @@ pub fn model_of(material: &MaterialSettings) -> Result<(String, toml::Table)> {
         MaterialSource::File(path) if path.extension().is_some_and(|extension| extension == "toml") => {
             Brdf::load_model(path)
         }
-        MaterialSource::File(_) => Err(none()),
+        MaterialSource::File(_) | MaterialSource::Custom(_) => Err(none()),
     }
 }
 

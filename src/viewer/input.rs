@@ -33,8 +33,11 @@ use serde::{Deserialize, Serialize};
 use super::change::Change;
 use super::comparison::Other;
 use super::orbit;
+use crate::brdf::Brdf;
+use crate::environment::Environment;
 use crate::error::{Error, Result};
-use crate::scene::{MaterialSource, Source};
+use crate::file_format::{self, FileKind};
+use crate::scene::{MaterialSource, Mesh, Scene, Source};
 
 /// Something that the user does.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -148,8 +151,8 @@ impl Drag {
 /// # Errors
 /// The file cannot be read; the first line that is no event, by its number.
 pub fn read_replay(path: &Path) -> Result<Vec<(usize, Input)>> {
-    let text = std::fs::read_to_string(path).map_err(|cause| Error::unreadable(path, cause))?;
-    parse_replay(&text, path)
+    let bytes = file_format::read(path)?;
+    parse_replay(file_format::text(path, &bytes)?, path)
 }
 
 /// The events in the text of the replay file at `path`.
@@ -188,32 +191,46 @@ impl Input {
     }
 }
 
-/// The change that a dropped file asks for, by the ending of its name.
+/// The change that a dropped file asks for, by its extension and its content.
 ///
 /// # Errors
-/// An ending that says nothing.
+/// An extension of no format.
 pub fn change_of_dropped(path: &Path) -> Result<Dropped> {
-    let ending = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
-    match ending.as_str() {
-        "binary" => Ok(Dropped::Change(Change::Material(MaterialSource::File(path.into())))),
-        "hdr" | "exr" => Ok(Dropped::Change(Change::Environment(Source::File(path.into())))),
-        "obj" => Ok(Dropped::Change(Change::Mesh(Source::File(path.into())))),
-        "toml" => {
-            let text = std::fs::read_to_string(path).map_err(|cause| Error::unreadable(path, cause))?;
-            // A material file has a model at its top; a scene has nothing but sections there.
-            let is_material = text.parse::<toml::Table>().is_ok_and(|table| table.contains_key("model"));
-            Ok(if is_material {
-                Dropped::Change(Change::Material(MaterialSource::File(path.into())))
-            } else {
-                Dropped::Scene(path.into())
-            })
-        }
-        _ => {
-            let remedy =
-                "drop a material (.binary, .toml), an environment (.hdr, .exr), a mesh (.obj) or a scene (.toml)";
-            Err(Error::in_file(path, "is of no kind that can be dropped here", remedy))
-        }
+    let file = || PathBuf::from(path);
+    let candidates = [
+        candidate(&Brdf::FILES, path, Dropped::Change(Change::Material(MaterialSource::File(file())))),
+        candidate(&Environment::FILES, path, Dropped::Change(Change::Environment(Source::File(file())))),
+        candidate(&Mesh::FILES, path, Dropped::Change(Change::Mesh(Source::File(file())))),
+        candidate(&Scene::FILES, path, Dropped::Scene(file())),
+    ];
+    let mut candidates: Vec<_> = candidates.into_iter().flatten().collect();
+    // The content tells apart what has the same extension.
+    if candidates.len() > 1 {
+        let bytes = file_format::read(path)?;
+        candidates.retain(|candidate| (candidate.is_of_format)(&bytes));
     }
+    candidates.into_iter().next().map(|candidate| candidate.dropped).ok_or_else(|| {
+        let kinds = [
+            ("a material", Brdf::FILES.extensions()),
+            ("an environment", Environment::FILES.extensions()),
+            ("a mesh", Mesh::FILES.extensions()),
+            ("a scene", Scene::FILES.extensions()),
+        ];
+        let kinds = kinds.map(|(what, extensions)| format!("{what} ({extensions})")).join(", ");
+        Error::in_file(path, "is of no kind that can be dropped here", format!("drop {kinds}"))
+    })
+}
+
+/// What a dropped file may be.
+struct Candidate {
+    is_of_format: fn(&[u8]) -> bool,
+    dropped: Dropped,
+}
+
+/// `dropped`, if the file at `path` has an extension of `kind`.
+fn candidate<T>(kind: &FileKind<T>, path: &Path, dropped: Dropped) -> Option<Candidate> {
+    let is_of_format = kind.format_of(path).ok()?.is_of_format;
+    Some(Candidate { is_of_format, dropped })
 }
 
 /// What a dropped file is.

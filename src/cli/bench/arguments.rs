@@ -1,7 +1,7 @@
 //! What the measurements have in common on the command line: what to measure, on which device, and where to write it.
 use crate::cli::render::processor;
 use crate::cli::scene_flags::parse_size;
-use crate::cli::{cache_folder, number, stem};
+use crate::cli::{cache_folder, nameable, number, stem};
 use anyhow::Context;
 use clap::value_parser;
 use std::path::{Path, PathBuf};
@@ -21,11 +21,9 @@ use threadlight::{Error, Result, environment};
 /// What to measure. Where a flag is left out, the command says what is taken: see [`Defaults`].
 #[derive(clap::Args)]
 pub struct CasesArguments {
-    /// Materials: built-in names, MERL .binary files, or .toml files with a model and its parameters.
-    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    #[arg(long, help = nameable::material("Materials, each"), value_name = "LIST", value_delimiter = ',')]
     materials: Vec<String>,
-    /// Environments: built-in names, or latitude-longitude .hdr or .exr files.
-    #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "studio")]
+    #[arg(long, help = nameable::environment("Environments, each"), value_name = "LIST", value_delimiter = ',', default_value = "studio")]
     environments: Vec<String>,
     /// Shading methods.
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
@@ -33,8 +31,7 @@ pub struct CasesArguments {
     /// Numbers of threads, or of samples of the other estimators, each 1 to 1024.
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = value_parser!(u32).range(1..=MAX_COUNT as i64))]
     counts: Vec<u32>,
-    /// Scenes: built-in meshes, .obj files, or .toml scene files, whose camera and objects are used.
-    #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "sphere")]
+    #[arg(long, help = nameable::scenes("Scenes, each a mesh"), value_name = "LIST", value_delimiter = ',', default_value = "sphere")]
     scene: Vec<String>,
     /// Size of the pictures in pixels, each side 11 to 16384.
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
@@ -104,7 +101,7 @@ impl CasesArguments {
     /// The scene that `text` names: a scene file, or a mesh in the built-in scene.
     fn scene_of(&self, text: &str, size: Option<(u32, u32)>) -> Result<Scene> {
         let path = Path::new(text);
-        let mut scene = if path.extension().is_some_and(|extension| extension == "toml") {
+        let mut scene = if Scene::FILES.format_of(path).is_ok() {
             Scene::load(path)?
         } else {
             let mut scene = Scene::default();

@@ -17,12 +17,13 @@ use glam::{DMat3, DVec3, UVec2, dvec3};
 use rayon::prelude::*;
 
 use crate::evaluate::metrics::Display;
+use crate::geometry_texel::GeometryTexel;
 use crate::memo::{Origin, Round, Step};
 use crate::passes::View;
 use crate::pipeline::render_geometry;
 use crate::prepare::Prepared;
 use crate::progress::Observer;
-use crate::shading::{display_value, unpack_geometry};
+use crate::shading::display_value;
 use crate::vulkan::Device;
 use crate::{Error, Result};
 
@@ -246,7 +247,7 @@ impl Integrator<'_> {
         subpixels
             .filter_map(|(u, v)| {
                 let texel = geometry[v * width as usize + u];
-                let (normal, material) = unpack_geometry(UVec2::from_array(texel))?;
+                let GeometryTexel { normal, material } = GeometryTexel::unpack(UVec2::from_array(texel))?;
                 let w_o = -view.camera.ray(u as f64, v as f64, width, height);
                 Some(Point::new(to_environment * normal.as_dvec3().normalize(), to_environment * w_o, material))
             })

@@ -1,7 +1,8 @@
-//! Fitted threads as they are stored, uploaded and looked up: twelve bytes a thread and row.
+//! Fitted threads as they are stored, uploaded and looked up: twelve bytes a thread and row. In shaders: glsl/threads/fitted.glsl.
 use glam::{DVec3, Vec3};
 use half::f16;
 
+use super::kernel::{SHARPEST_LEVEL, WIDEST_LEVEL};
 use super::solve::{Kernel, cosine_part};
 use crate::packing::{octahedral_decode, octahedral_encode, pack_snorm_2x16, unpack_snorm_2x16};
 
@@ -30,7 +31,7 @@ impl PackedKernel {
         Self([direction, half(kernel.level) | half(red) << 16, half(green) | half(blue) << 16])
     }
 
-    /// Twin of `unpack_kernel` in glsl/methods/fitted.glsl.
+    /// Twin of `unpack_kernel`.
     pub fn unpack(self) -> UnpackedKernel {
         let half = |bits: u32| f16::from_bits(bits as u16).to_f32();
         let [direction, level_red, green_blue] = self.0;
@@ -39,6 +40,14 @@ impl PackedKernel {
             level: half(level_red),
             weight: Vec3::new(half(level_red >> 16), half(green_blue), half(green_blue >> 16)),
         }
+    }
+
+    /// Whether its level and its weight are in their ranges.
+    fn is_usable(self) -> bool {
+        let UnpackedKernel { level, weight, .. } = self.unpack();
+        (SHARPEST_LEVEL as f32..=WIDEST_LEVEL as f32).contains(&level)
+            && weight.min_element() >= 0.0
+            && weight.is_finite()
     }
 }
 
@@ -79,6 +88,43 @@ impl FittedTable {
     /// The level of the sharpest kernel.
     pub fn sharpest_level(&self) -> f32 {
         self.kernels.iter().map(|kernel| kernel.unpack().level).fold(f32::INFINITY, f32::min)
+    }
+
+    /// Words of an element of the shader's buffer: its array is of words.
+    pub(in crate::threads) const DEVICE_ELEMENT_WORDS: usize = 1;
+
+    /// The buffer of the shader. Row by row: the cosine part, then the kernels.
+    pub fn device_words(&self) -> Vec<u32> {
+        let row = |(row, cosine_part): (usize, &[f32; 3])| {
+            let kernels = self.row(row).iter().map(|kernel| kernel.0);
+            std::iter::once(cosine_part.map(f32::to_bits)).chain(kernels)
+        };
+        self.cosine_part.iter().enumerate().flat_map(row).flatten().collect()
+    }
+
+    /// Words of a row in a file, besides its threads.
+    pub(in crate::threads) const FILE_ROW_WORDS: usize = 4;
+
+    /// The words of a file: cosine part and relative error of each row, then the kernels.
+    pub(in crate::threads) fn file_words(&self) -> Vec<u32> {
+        let rows = self.cosine_part.iter().zip(&self.relative_error);
+        let rows = rows.flat_map(|([red, green, blue], error)| [*red, *green, *blue, *error]).map(f32::to_bits);
+        rows.chain(self.kernels.iter().flat_map(|kernel| kernel.0)).collect()
+    }
+
+    /// Rows and kernels of such words. A foreign writer can get the checksum right and a number wrong.
+    pub(in crate::threads) fn from_file_words(of_rows: &[u32], of_threads: &[u32]) -> Result<Self, String> {
+        let (of_rows, kernels) = (of_rows.as_chunks::<4>().0, of_threads.as_chunks().0);
+        let kernels: Vec<_> = kernels.iter().copied().map(PackedKernel).collect();
+        let cosine_part: Vec<[f32; 3]> = of_rows.iter().map(|&[r, g, b, _]| [r, g, b].map(f32::from_bits)).collect();
+        let relative_error: Vec<f32> = of_rows.iter().map(|&[.., error]| f32::from_bits(error)).collect();
+        if !cosine_part.iter().flatten().chain(&relative_error).all(|value| value.is_finite()) {
+            return Err("holds a row that is not of finite numbers".into());
+        }
+        if !kernels.iter().all(|kernel| kernel.is_usable()) {
+            return Err("holds a thread whose level or weight is none".into());
+        }
+        Ok(Self { rows: 0, count: 0, material: String::new(), cosine_part, relative_error, kernels })
     }
 
     /// Packs rows of kernels, with the albedo and the relative error of each.

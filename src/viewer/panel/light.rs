@@ -1,11 +1,11 @@
-//! Which environment, its turn and its intensity.
+//! Which environment, its turn and its intensity. Sliders as in display.rs.
 use super::{group, on_change, source};
-use crate::environment;
+use crate::environment::{self, Environment};
 use crate::scene::Source;
 use crate::viewer::change::Change;
 use crate::viewer::input::Input;
 use crate::viewer::interaction::Viewer;
-use egui::Ui;
+use egui::{SliderClamping, Ui};
 
 #[derive(Default)]
 pub struct State {
@@ -17,18 +17,28 @@ impl State {
         let settings = &viewer.session.wanted().environment;
         group(ui, "Light", |ui| {
             let (current, names) = (settings.source.to_string(), environment::builtin_names());
-            let tooltip = "Distant light from all directions: a built-in environment, or a latitude-longitude picture (.hdr, .exr).";
-            let chosen = source(ui, "environment", &current, names, &mut self.path, tooltip, "file: .hdr or .exr");
+            let files = &Environment::FILES;
+            let tooltip =
+                format!("Distant light from all directions: built in, or {}, latitude-longitude.", files.names());
+            let hint = format!("file: {}", files.extensions());
+            let chosen = source(ui, "environment", &current, names, &mut self.path, &tooltip, &hint);
             if let Some(name) = chosen {
                 inputs.push(Input::Set(Change::Environment(Source::named(&name, names))));
             }
             let mut turn = settings.rotation_deg;
-            let slider = egui::Slider::new(&mut turn, 0.0..=360.0).suffix("°").max_decimals(1).text("turn");
+            let slider = egui::Slider::new(&mut turn, 0.0..=360.0)
+                .clamping(SliderClamping::Never)
+                .suffix("°")
+                .max_decimals(1)
+                .text("turn");
             let tooltip =
                 "Turn of the environment about the vertical axis, counter-clockwise seen from above. Ctrl and drag.";
             on_change(&ui.add(slider).on_hover_text(tooltip), inputs, || Change::Rotation(turn));
             let mut intensity = settings.intensity;
-            let slider = egui::Slider::new(&mut intensity, 0.01..=100.0).logarithmic(true).text("intensity");
+            let slider = egui::Slider::new(&mut intensity, 0.01..=100.0)
+                .clamping(SliderClamping::Never)
+                .logarithmic(true)
+                .text("intensity");
             let tooltip = "Factor on the environment's radiance.";
             on_change(&ui.add(slider).on_hover_text(tooltip), inputs, || Change::Intensity(intensity));
         });

@@ -1,6 +1,6 @@
 //! Which mesh.
 use super::{group, source};
-use crate::scene::{Source, mesh};
+use crate::scene::{Mesh, Source, mesh};
 use crate::viewer::change::Change;
 use crate::viewer::input::Input;
 use crate::viewer::interaction::Viewer;
@@ -20,8 +20,10 @@ impl State {
                 objects => format!("{} objects", objects.len()),
             };
             let names = mesh::builtin_names();
-            let tooltip = "The mesh in place of all objects: built in, or a Wavefront .obj, with or without normals.";
-            let chosen = source(ui, "mesh", &current, names, &mut self.path, tooltip, "file: .obj");
+            let files = &Mesh::FILES;
+            let tooltip = format!("The mesh in place of all objects: built in, or {}.", files.names());
+            let hint = format!("file: {}", files.extensions());
+            let chosen = source(ui, "mesh", &current, names, &mut self.path, &tooltip, &hint);
             if let Some(name) = chosen {
                 inputs.push(Input::Set(Change::Mesh(Source::named(&name, names))));
             }

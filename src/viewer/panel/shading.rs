@@ -16,14 +16,14 @@ pub fn show(ui: &mut Ui, viewer: &Viewer, inputs: &mut Vec<Input>) {
             .width(160.0)
             .show_ui(ui, |ui| {
                 for other in Method::ALL.iter().filter(|method| method.runs_on_gpu()) {
-                    let label = ui.selectable_label(*other == method, other.name()).on_hover_text(described(*other));
+                    let label = ui.selectable_label(*other == method, other.name()).on_hover_text(other.summary());
                     if label.clicked() && *other != method {
                         inputs.push(Input::Set(Change::Method(other.name().to_owned())));
                     }
                 }
             })
             .response
-            .on_hover_text(described(method));
+            .on_hover_text(method.summary());
         let (what, most, tooltip) = match method.threads() {
             Some(kind) => (
                 "threads",
@@ -42,21 +42,4 @@ pub fn show(ui: &mut Ui, viewer: &Viewer, inputs: &mut Vec<Input>) {
             "Sub-pixels along each axis of a pixel: resolution of the geometry cache, and how smooth edges are.";
         on_change(&ui.add(slider).on_hover_text(tooltip), inputs, || Change::Subpixels(subpixels));
     });
-}
-
-fn described(method: Method) -> &'static str {
-    match method {
-        Method::Fitted => {
-            "Threads fitted to the BRDF: directions, kernel widths and colours whose sum answers any light as the BRDF does."
-        }
-        Method::Paper => "Sample threads as published by Kim, Kyung and Lee (2010).",
-        Method::Uniform => "Monte Carlo, uniform over the hemisphere.",
-        Method::Cosine => "Monte Carlo, by the cosine to the normal.",
-        Method::Importance => "Monte Carlo by a 2D CDF of the BRDF (Matusik et al. 2003).",
-        Method::Filtered => "The same with filtered lookups (Colbert and Krivanek 2007); biased.",
-        Method::Environment => "Monte Carlo by the light (Agarwal et al. 2003).",
-        Method::Ris => "Resampled importance sampling of the product (Talbot et al. 2005).",
-        Method::Mis => "Multiple importance sampling of lobe and light (Veach and Guibas 1995).",
-        Method::Reference => "The integral itself, by quadrature on the CPU.",
-    }
 }

@@ -1,0 +1,46 @@
+//! A material as shaders have it. Twin of the layout: glsl/material.glsl.
+use super::{Brdf, half_vector_width};
+
+/// `Material` in glsl/material.glsl.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+pub struct MaterialRecord {
+    /// What the model's GLSL twin reads: [`super::Model::gpu_parameters`].
+    pub parameters: [f32; 12],
+    /// Position of the model in models.rs.
+    pub model: u32,
+    /// Where its threads start in the buffer of threads, in elements of that.
+    pub first_thread: u32,
+    /// Number of its threads.
+    pub thread_count: u32,
+    /// Number of their view angles.
+    pub row_count: u32,
+    /// Where its CDFs start in the buffer of slices.
+    pub first_slice: u32,
+    /// [`half_vector_width`].
+    pub lobe_width: f32,
+    /// The size of a structure in the buffer is a multiple of 16 bytes.
+    pub padding: [u32; 2],
+}
+
+impl MaterialRecord {
+    /// Of `brdf`, without threads and CDFs.
+    pub fn new(brdf: &Brdf) -> Self {
+        Self {
+            parameters: brdf.gpu_parameters(),
+            model: brdf.model_index(),
+            first_thread: 0,
+            thread_count: 0,
+            row_count: 0,
+            first_slice: 0,
+            lobe_width: half_vector_width(brdf) as f32,
+            padding: [0; 2],
+        }
+    }
+
+    /// The same with its table at this y and z in the atlas of all tables, in texels: what glsl/brdf/merl.glsl reads from a.xy.
+    pub fn with_table_at(mut self, [y, z]: [usize; 2]) -> Self {
+        self.parameters[..2].copy_from_slice(&[y as f32, z as f32]);
+        self
+    }
+}

@@ -1,0 +1,25 @@
+//! Reads materials from TOML files: a model and its parameters.
+use std::path::Path;
+
+use super::{Brdf, model_of};
+use crate::error::Result;
+use crate::file_format::{FileFormat, text};
+
+pub(super) const FORMAT: FileFormat<Brdf> =
+    FileFormat { extension: "toml", name: "a .toml with a model and its parameters", is_of_format: has_model, parse };
+
+/// A material has a model at its top; a scene has nothing but sections there.
+fn has_model(bytes: &[u8]) -> bool {
+    let table = std::str::from_utf8(bytes).ok().and_then(|text| text.parse::<toml::Table>().ok());
+    table.is_some_and(|table| table.contains_key("model"))
+}
+
+fn parse(path: &Path, bytes: &[u8]) -> Result<Brdf> {
+    let (model, parameters) = parse_model(path, bytes)?;
+    Brdf::from_parameters(&model, parameters).map_err(|error| error.within(path.display()))
+}
+
+/// The model that the file names, and its parameters, not yet checked.
+pub(super) fn parse_model(path: &Path, bytes: &[u8]) -> Result<(String, toml::Table)> {
+    model_of(text(path, bytes)?).map_err(|error| error.within(path.display()))
+}

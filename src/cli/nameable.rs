@@ -1,0 +1,37 @@
+//! Help texts of what flags can name: they follow from the tables of formats and methods.
+use threadlight::brdf::Brdf;
+use threadlight::environment::Environment;
+use threadlight::method::{DEFAULT_SAMPLES, Method};
+use threadlight::scene::{MAX_SAMPLES, Mesh, Scene};
+
+/// `what` and how a material is named.
+pub fn material(what: &str) -> String {
+    format!("{what}: a built-in name, {}", Brdf::FILES.names())
+}
+
+/// `what` and how an environment is named.
+pub fn environment(what: &str) -> String {
+    format!("{what}: a built-in name, {}, latitude-longitude", Environment::FILES.names())
+}
+
+/// `what` and how a mesh is named.
+pub fn mesh(what: &str) -> String {
+    format!("{what}: a built-in name, {}", Mesh::FILES.names())
+}
+
+/// `what` and how scenes are named: by scene files or by meshes.
+pub fn scenes(what: &str) -> String {
+    format!("{}; or {}, whose camera and objects are used", mesh(what), Scene::FILES.names())
+}
+
+/// Numbers of threads, and of samples.
+pub fn counts() -> String {
+    let of_threads = |method: &Method| {
+        let kind = method.threads()?;
+        Some(format!("{} 1 to {} (default {})", method.name(), kind.max_count(), kind.default_count()))
+    };
+    let of_threads = Method::ALL.iter().filter_map(of_threads).collect::<Vec<_>>().join(", ");
+    let of_samples =
+        format!("samples per pixel of methods that have none, 1 to {MAX_SAMPLES} (default {DEFAULT_SAMPLES})");
+    format!("Sample threads per pixel: {of_threads}; or {of_samples}")
+}

@@ -1,0 +1,179 @@
+//! File formats: by which extension a file is known, what it is called, how its bytes are read.
+//!
+//! A format is one file with a constant `FORMAT`, and an entry in the `file_formats!` of what it holds. Loading, errors, help
+//! texts and what can be dropped on the viewer follow.
+use std::path::Path;
+
+use crate::error::{Error, Result};
+
+/// A format of files that hold a `T`.
+pub struct FileFormat<T: 'static> {
+    /// Extension of their names: lower case, no dot.
+    pub extension: &'static str,
+    /// What such a file is called, with its article: `a Radiance .hdr`.
+    pub name: &'static str,
+    /// Tells bytes of this format from those of other kinds of file with the same extension.
+    pub is_of_format: fn(&[u8]) -> bool,
+    /// Reads the bytes of the file at `path`, which is only named in errors.
+    pub parse: fn(path: &Path, bytes: &[u8]) -> Result<T>,
+}
+
+/// Declares the modules of formats, and `FORMATS`, the list of them: an entry each.
+macro_rules! file_formats {
+    ($T:ty: $($module:ident),+ $(,)?) => {
+        $(mod $module;)+
+        const FORMATS: &[crate::file_format::FileFormat<$T>] = &[$($module::FORMAT),+];
+    };
+}
+pub(crate) use file_formats;
+
+/// All formats of what holds a `T`.
+pub struct FileKind<T: 'static> {
+    /// What such files are: `environment`.
+    pub what: &'static str,
+    /// At least one.
+    pub formats: &'static [FileFormat<T>],
+    /// What can be named instead of a file.
+    pub builtin_names: fn() -> Vec<&'static str>,
+}
+
+impl<T> FileKind<T> {
+    /// Reads and parses the file at `path`.
+    ///
+    /// # Errors
+    /// See [`Self::read`] and the format's own.
+    pub fn load(&self, path: &Path) -> Result<T> {
+        self.parse(path, &self.read(path)?)
+    }
+
+    /// The bytes of the file at `path`.
+    ///
+    /// # Errors
+    /// An extension of no format; what [`read`] says.
+    pub fn read(&self, path: &Path) -> Result<Vec<u8>> {
+        self.format_of(path)?;
+        read(path)
+    }
+
+    /// Parses the bytes of the file at `path`, whose extension says how.
+    ///
+    /// # Errors
+    /// An extension of no format, and the format's own.
+    pub fn parse(&self, path: &Path, bytes: &[u8]) -> Result<T> {
+        (self.format_of(path)?.parse)(path, bytes)
+    }
+
+    /// The format of the file at `path`, by its extension.
+    ///
+    /// # Errors
+    /// No format has it.
+    pub fn format_of(&self, path: &Path) -> Result<&FileFormat<T>> {
+        let extension = path.extension().unwrap_or_default();
+        self.formats.iter().find(|format| extension.eq_ignore_ascii_case(format.extension)).ok_or_else(|| {
+            let problem = format!("is no known kind of {}", self.what);
+            Error::in_file(path, problem, format!("give {}", self.files_or_builtins()))
+        })
+    }
+
+    /// `a Radiance .hdr or an OpenEXR .exr`.
+    pub fn names(&self) -> String {
+        alternatives(self.formats.iter().map(|format| format.name.to_owned()))
+    }
+
+    /// `.hdr or .exr`.
+    pub fn extensions(&self) -> String {
+        alternatives(self.formats.iter().map(|format| format!(".{}", format.extension)))
+    }
+
+    /// The formats, and the names of what is built in.
+    pub fn files_or_builtins(&self) -> String {
+        let builtin = (self.builtin_names)();
+        if builtin.is_empty() {
+            self.names()
+        } else {
+            format!("{}, or a built-in: {}", self.names(), builtin.join(", "))
+        }
+    }
+}
+
+/// `a, b or c`.
+fn alternatives(words: impl Iterator<Item = String>) -> String {
+    let mut words: Vec<_> = words.collect();
+    let last = words.pop().unwrap_or_default();
+    if words.is_empty() { last } else { format!("{} or {last}", words.join(", ")) }
+}
+
+/// Largest file that is read: more than any picture of as many pixels as are read takes, uncompressed.
+const MAX_BYTES: u64 = 1 << 33;
+
+/// The bytes of the file at `path`.
+///
+/// # Errors
+/// No file, or one that cannot be read: a folder, a pipe or a device, which might have no end, and a file of more than 8 GiB.
+pub fn read(path: &Path) -> Result<Vec<u8>> {
+    let unreadable = |cause| Error::unreadable(path, cause);
+    let metadata = std::fs::metadata(path).map_err(unreadable)?;
+    if !metadata.is_file() {
+        let what = if metadata.is_dir() { "is a folder" } else { "is a pipe or a device, not a file" };
+        return Err(Error::in_file(path, what, "name a file"));
+    }
+    if metadata.len() > MAX_BYTES {
+        return Err(Error::in_file(
+            path,
+            format!("has {} bytes, more than 8 GiB", metadata.len()),
+            "give a smaller file",
+        ));
+    }
+    std::fs::read(path).map_err(unreadable)
+}
+
+/// `bytes`, of the file at `path`, as text.
+///
+/// # Errors
+/// They are not UTF-8.
+pub fn text<'a>(path: &Path, bytes: &'a [u8]) -> Result<&'a str> {
+    std::str::from_utf8(bytes)
+        .map_err(|cause| Error::in_file(path, format!("is not text in UTF-8 ({cause})"), "save it as UTF-8"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::brdf::Brdf;
+    use crate::environment::Environment;
+    use crate::scene::{Mesh, Scene};
+
+    #[test]
+    fn what_is_no_regular_file_is_an_error_at_once() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name);
+        std::fs::create_dir(path("folder")).unwrap();
+        std::fs::File::create(path("huge")).unwrap().set_len(1 << 40).unwrap();
+        let mut hostile = vec![("folder", "is a folder"), ("huge", "8 GiB"), ("absent", "cannot be read")];
+        if cfg!(unix) {
+            // Opening a pipe that nobody writes to would wait for ever.
+            assert!(std::process::Command::new("mkfifo").arg(path("pipe")).status().unwrap().success());
+            hostile.push(("pipe", "is a pipe"));
+        }
+        for (name, problem) in hostile {
+            let error = read(&path(name)).unwrap_err().to_string();
+            assert!(error.contains(name) && error.contains(problem) && !error.contains('\n'), "{error}");
+        }
+        if cfg!(unix) {
+            assert!(read(Path::new("/dev/zero")).unwrap_err().to_string().contains("a device"));
+        }
+    }
+
+    #[test]
+    fn an_extension_of_no_format_is_refused_with_those_that_are() {
+        let refused = |error: Error, words: &[&str]| {
+            let error = error.to_string();
+            assert!(words.iter().all(|word| error.contains(word)), "{error}");
+        };
+        let path = Path::new("x.jpg");
+        refused(Brdf::load(path).unwrap_err(), &["x.jpg", ".binary", ".toml", "gold"]);
+        refused(Environment::load(path).unwrap_err(), &["x.jpg", ".hdr", ".exr", "studio"]);
+        refused(Mesh::load(path).unwrap_err(), &["x.jpg", ".obj", "sphere"]);
+        refused(Scene::FILES.load(path).map(drop).unwrap_err(), &["x.jpg", ".toml"]);
+    }
+}

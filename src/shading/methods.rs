@@ -1,0 +1,27 @@
+// The table of shading methods: an entry each, `name => Variant: properties`. A method `name` is glsl/methods/name.glsl, its twin
+// src/shading/name.rs and its entry here. Included by src/method.rs (enum and properties) and by src/shading/mod.rs (modules and
+// dispatch); each defines `methods!` first. (Hence no inner doc comment at the top.)
+methods! {
+    fitted => Fitted: Properties {
+        threads: Some(ThreadKind::Fitted),
+        shares_surface: true,
+        ..Properties::biased("Threads fitted to the BRDF: directions, kernel widths and colours whose sum answers any light as the BRDF does.", BLURRED)
+    },
+    paper => Paper: Properties {
+        threads: Some(ThreadKind::Paper),
+        ..Properties::biased("Sample threads as published by Kim, Kyung and Lee (2010), box-filtered lookups.", BOX_FILTERED)
+    },
+    uniform => Uniform: Properties::unbiased("Monte Carlo, uniform over the hemisphere.", MAP),
+    cosine => Cosine: Properties::unbiased("Monte Carlo, by the cosine to the normal.", MAP),
+    importance => Importance: Properties::unbiased("Monte Carlo by a 2D CDF of BRDF times cosine (Matusik et al. 2003).", MAP.and_slices()),
+    filtered => Filtered: Properties::biased("As importance, with filtered lookups (Colbert and Krivanek 2007); biased.", BOX_FILTERED.and_slices()),
+    environment => Environment: Properties::unbiased("Monte Carlo by the environment's light (Agarwal et al. 2003).", MAP_BY_LIGHT),
+    ris => Ris: Properties {
+        older_name: Some("resampled"),
+        ..Properties::unbiased("Resampled importance sampling of the whole product (Talbot et al. 2005).", MAP_BY_LIGHT.and_slices())
+    },
+    mis => Mis: Properties {
+        older_name: Some("combined"),
+        ..Properties::unbiased("Multiple importance sampling of lobe and light (Veach and Guibas 1995) at Sobol's points: the reference's form on the GPU.", MAP_BY_LIGHT.and_slices())
+    },
+}
