@@ -1,5 +1,5 @@
 //! The method on one screen: the frame as a graph of passes, and the renderer that runs it.
-use crate::graph::{Buffer, Executable, Image};
+use crate::graph::{BufferHandle, Executable, ImageHandle};
 use crate::method::Method;
 use crate::output::ExrHeader;
 use crate::passes::*;
@@ -35,11 +35,11 @@ pub(crate) fn declare<'a>(graph: &mut FrameGraph<'a>, renderer: &'a Renderer, vi
 
 /// What a frame leaves.
 pub(crate) struct Frame {
-    pub geometry: Image,
-    pub counters: Buffer,
-    pub lookups: Buffer,
-    pub radiance: Image,
-    pub display: Image,
+    pub geometry: ImageHandle,
+    pub counters: BufferHandle,
+    pub lookups: BufferHandle,
+    pub radiance: ImageHandle,
+    pub display: ImageHandle,
 }
 
 /// A scene on a device, ready to render.

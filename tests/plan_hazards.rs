@@ -202,8 +202,8 @@ impl Frame {
                         pass.read(handle, *access);
                         continue;
                     }
-                    Mode::Write => pass.write(Buffer::from(handle), *access).into(),
-                    Mode::Modify => pass.modify(Buffer::from(handle), *access).into(),
+                    Mode::Write => pass.write(BufferHandle::from(handle), *access).into(),
+                    Mode::Modify => pass.modify(BufferHandle::from(handle), *access).into(),
                 };
                 handles[*resource].push(made);
             }

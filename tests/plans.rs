@@ -319,7 +319,7 @@ fn error_of(declare: impl FnOnce(&mut Graph<()>)) -> String {
 }
 
 /// A pass that does `uses` to one image and one buffer with contents, and writes something else.
-fn error_of_uses(uses: impl FnOnce(&mut PassBuilder<()>, Image, Buffer, Image)) -> String {
+fn error_of_uses(uses: impl FnOnce(&mut PassBuilder<()>, ImageHandle, BufferHandle, ImageHandle)) -> String {
     error_of(|graph| {
         let image = graph.import_image("image", COLOR, Some(Access::SampledFragment), None);
         let depth = graph.import_image("depth", DEPTH, Some(Access::SampledFragment), None);

@@ -1,88 +1,9 @@
 //! Declare: the graph as the passes describe it, resources by version, nothing checked yet.
 use super::access::{Access, Mode};
-use super::plan::ResourceInfo;
-use ash::vk;
+use super::resource::{
+    BufferDesc, BufferHandle, Handle, ImageDesc, ImageHandle, ResourceInfo, ResourceKind, Versioned,
+};
 use std::hash::{DefaultHasher, Hash, Hasher};
-
-/// An image of one layer, one mip level and one sample per pixel.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct ImageDesc {
-    /// Texel format.
-    pub format: vk::Format,
-    /// Width in texels, at least 1.
-    pub width: u32,
-    /// Height in texels, at least 1.
-    pub height: u32,
-}
-
-/// A buffer.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct BufferDesc {
-    /// Size in bytes, at least 1.
-    pub size_bytes: u64,
-}
-
-/// What a resource is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum ResourceKind {
-    /// An image.
-    Image(ImageDesc),
-    /// A buffer.
-    Buffer(BufferDesc),
-}
-
-/// One version of one resource of one graph: the contents between one write and the next.
-///
-/// Version 0 is what the resource holds when the frame begins: nothing for a transient one.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct Handle {
-    pub(super) resource: usize,
-    pub(super) version: u32,
-}
-
-impl Handle {
-    /// The version that a write to this one makes.
-    pub(super) fn next(self) -> Self {
-        Self { version: self.version + 1, ..self }
-    }
-}
-
-/// A version of an image.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct Image(Handle);
-
-/// A version of a buffer.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct Buffer(Handle);
-
-/// [`Image`] or [`Buffer`]: writing one gives the next version of the same type.
-pub trait Versioned: Copy + Into<Handle> + From<Handle> {}
-impl Versioned for Image {}
-impl Versioned for Buffer {}
-
-impl From<Image> for Handle {
-    fn from(image: Image) -> Self {
-        image.0
-    }
-}
-
-impl From<Buffer> for Handle {
-    fn from(buffer: Buffer) -> Self {
-        buffer.0
-    }
-}
-
-impl From<Handle> for Image {
-    fn from(handle: Handle) -> Self {
-        Self(handle)
-    }
-}
-
-impl From<Handle> for Buffer {
-    fn from(handle: Handle) -> Self {
-        Self(handle)
-    }
-}
 
 /// A frame as it is being declared. `W` is what a pass has to record: a closure in the renderer, `()` in tests.
 pub struct Graph<W> {
@@ -149,18 +70,18 @@ impl<W> Graph<W> {
     }
 
     /// A transient image: it exists inside the frame only, and its memory may be shared with others.
-    pub fn image(&mut self, name: &str, desc: ImageDesc) -> Image {
+    pub fn image(&mut self, name: &str, desc: ImageDesc) -> ImageHandle {
         self.resource(name, ResourceKind::Image(desc), None).into()
     }
 
     /// A transient buffer: it exists inside the frame only, and its memory may be shared with others.
-    pub fn buffer(&mut self, name: &str, desc: BufferDesc) -> Buffer {
+    pub fn buffer(&mut self, name: &str, desc: BufferDesc) -> BufferHandle {
         self.resource(name, ResourceKind::Buffer(desc), None).into()
     }
 
     /// An image that is worth keeping: where frames are compiled one after another with what was kept
     /// ([`Graph::compile_keeping`]), passes that would make the same contents again do not run. Elsewhere it is transient.
-    pub fn kept_image(&mut self, name: &str, desc: ImageDesc) -> Image {
+    pub fn kept_image(&mut self, name: &str, desc: ImageDesc) -> ImageHandle {
         let handle = self.resource(name, ResourceKind::Image(desc), None);
         self.resources[handle.resource].keep = true;
         handle.into()
@@ -178,7 +99,7 @@ impl<W> Graph<W> {
         desc: ImageDesc,
         before: Option<Access>,
         after: Option<Access>,
-    ) -> Image {
+    ) -> ImageHandle {
         self.resource(name, ResourceKind::Image(desc), Some(Import { before, after })).into()
     }
 
@@ -189,7 +110,7 @@ impl<W> Graph<W> {
         desc: BufferDesc,
         before: Option<Access>,
         after: Option<Access>,
-    ) -> Buffer {
+    ) -> BufferHandle {
         self.resource(name, ResourceKind::Buffer(desc), Some(Import { before, after })).into()
     }
 

@@ -1,5 +1,8 @@
 //! Execute: the plan's resources as Vulkan objects, its passes and barriers as commands.
-use super::{Barrier, Graph, Handle, Kept, MemoryRequirement, Plan, PlannedPass, ResourceInfo, ResourceKind};
+use super::declare::Graph;
+use super::kept::Kept;
+use super::plan::{Barrier, MemoryRequirement, Plan, PlannedPass};
+use super::resource::{BufferHandle, Handle, ImageHandle, ResourceInfo, ResourceKind};
 use crate::Result;
 use crate::vulkan::{self, Commands, Device, Frames, ImageShape, Memory, PassTime, Semaphores, VulkanError};
 use ash::vk;
@@ -63,7 +66,7 @@ pub struct Resources<'r> {
 
 impl Resources<'_> {
     /// The image behind `handle`, which a pass that runs has declared.
-    pub fn image(&self, handle: super::Image) -> &vulkan::Image {
+    pub fn image(&self, handle: ImageHandle) -> &vulkan::Image {
         match self.object(handle.into()) {
             Some(DeviceResource::Image(image)) => image.as_ref(),
             _ => unreachable!("a pass that runs asks for images that it declared"),
@@ -71,7 +74,7 @@ impl Resources<'_> {
     }
 
     /// The buffer behind `handle`, which a pass that runs has declared.
-    pub fn buffer(&self, handle: super::Buffer) -> &vulkan::Buffer {
+    pub fn buffer(&self, handle: BufferHandle) -> &vulkan::Buffer {
         match self.object(handle.into()) {
             Some(DeviceResource::Buffer(buffer)) => buffer,
             _ => unreachable!("a pass that runs asks for buffers that it declared"),

@@ -2,7 +2,7 @@
 use super::{CameraRays, FrameGraph, Identity, View, tiles_of};
 use crate::Result;
 use crate::environment::Environment;
-use crate::graph::{Access, Image};
+use crate::graph::{Access, ImageHandle};
 use crate::vulkan::{
     self, Bindings, ComputePipeline, Device, Groups, ImageShape, PipelineCache, Sampler, SamplerKind, compiled,
 };
@@ -70,9 +70,9 @@ pub(super) fn check_map_size(
 pub fn background<'a>(
     graph: &mut FrameGraph<'a>,
     background: &'a Background,
-    radiance: Image,
+    radiance: ImageHandle,
     view: &'a View,
-) -> Image {
+) -> ImageHandle {
     let mut pass = graph.pass("background");
     let radiance = pass.modify(radiance, Access::StorageWriteCompute);
     let push = Push {

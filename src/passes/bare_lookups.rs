@@ -3,7 +3,7 @@ use super::FrameGraph;
 use super::light::DevicePyramid;
 use crate::Result;
 use crate::environment::Environment;
-use crate::graph::{Access, Buffer, BufferDesc};
+use crate::graph::{Access, BufferDesc, BufferHandle};
 use crate::vulkan::{Bindings, ComputePipeline, Device, Groups, PipelineCache, compiled};
 use bytemuck::{Pod, Zeroable};
 use std::f64::consts::TAU;
@@ -60,7 +60,7 @@ impl BareLookups {
 }
 
 /// Looks up; leaves for each pixel the sum of what it saw, RGB in units of the pyramid's texels, and 1.
-pub fn bare_lookups<'a>(graph: &mut FrameGraph<'a>, bare: &'a BareLookups) -> Buffer {
+pub fn bare_lookups<'a>(graph: &mut FrameGraph<'a>, bare: &'a BareLookups) -> BufferHandle {
     let sums = graph.buffer("sums", BufferDesc { size_bytes: bare.sums_bytes() });
     let mut pass = graph.pass("bare_lookups");
     let sums = pass.write(sums, Access::StorageWriteCompute);

@@ -1,7 +1,7 @@
 //! Sorts pixels into interior, edge and background, and lists those to shade: nothing else is looked at again.
 use super::{FrameGraph, Identity, View, clear, tiles_of};
 use crate::Result;
-use crate::graph::{Access, Buffer, BufferDesc, Image, ImageDesc};
+use crate::graph::{Access, BufferDesc, BufferHandle, ImageDesc, ImageHandle};
 use crate::vulkan::{Bindings, ComputePipeline, Device, Groups, PipelineCache, compiled};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
@@ -74,17 +74,22 @@ impl Classify {
 #[derive(Clone, Copy)]
 pub struct Tiles {
     /// [`Counters`].
-    pub counters: Buffer,
+    pub counters: BufferHandle,
     /// The tiles that hold interior pixels, then, from the middle, those that hold edge pixels.
-    pub tiles: Buffer,
+    pub tiles: BufferHandle,
     /// For each tile of the image the places of its pixels in it: interior ones from the front, edge ones from the back.
-    pub pixels: Buffer,
+    pub pixels: BufferHandle,
     /// Linear radiance times coverage, and coverage.
-    pub radiance: Image,
+    pub radiance: ImageHandle,
 }
 
 /// Lists the pixels of `geometry` that hold surface.
-pub fn classify<'a>(graph: &mut FrameGraph<'a>, classify: &'a Classify, geometry: Image, view: &'a View) -> Tiles {
+pub fn classify<'a>(
+    graph: &mut FrameGraph<'a>,
+    classify: &'a Classify,
+    geometry: ImageHandle,
+    view: &'a View,
+) -> Tiles {
     let (width, height) = (view.width, view.height);
     let counters = graph.buffer("counters", BufferDesc { size_bytes: size_of::<Counters>() as u64 });
     let counters = clear(graph, "clear_counters", counters);

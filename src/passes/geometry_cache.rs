@@ -1,7 +1,7 @@
 //! Pass 1 of the paper (section 4.1): normal and material of what is seen, at sub-pixel resolution.
 use super::{FrameGraph, Identity, View};
 use crate::Result;
-use crate::graph::{Access, Image, ImageDesc};
+use crate::graph::{Access, ImageDesc, ImageHandle};
 use crate::scene::Mesh;
 use crate::vulkan::{
     Buffer, ColorTarget, DepthTarget, Device, GraphicsPipeline, GraphicsState, PipelineCache, compiled,
@@ -144,7 +144,7 @@ impl GeometryCache {
 }
 
 /// Draws every object into the geometry cache.
-pub fn geometry_cache<'a>(graph: &mut FrameGraph<'a>, cache: &'a GeometryCache, view: &'a View) -> Image {
+pub fn geometry_cache<'a>(graph: &mut FrameGraph<'a>, cache: &'a GeometryCache, view: &'a View) -> ImageHandle {
     let [width, height] = view.cache_size();
     let geometry = graph.kept_image("geometry", ImageDesc { format: GEOMETRY_FORMAT, width, height });
     let depth = graph.image("depth", ImageDesc { format: DEPTH_FORMAT, width, height });

@@ -1,6 +1,6 @@
 //! Puts the picture into the window.
 use super::FrameGraph;
-use crate::graph::{Access, Image};
+use crate::graph::{Access, ImageHandle};
 
 /// Where the picture is in the window, in pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,7 +19,12 @@ pub struct Area {
 const AROUND: [f32; 4] = [0.08, 0.08, 0.08, 1.0];
 
 /// Scales `display` to its `area` of `window`, an image of the swapchain; all else is grey, as all is without a picture.
-pub fn present(graph: &mut FrameGraph<'_>, display: Option<Image>, window: Image, area: Area) -> Image {
+pub fn present(
+    graph: &mut FrameGraph<'_>,
+    display: Option<ImageHandle>,
+    window: ImageHandle,
+    area: Area,
+) -> ImageHandle {
     let mut pass = graph.pass("clear_window");
     let window = pass.write(window, Access::TransferWrite);
     pass.record(Box::new(move |commands, resources| {

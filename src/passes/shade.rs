@@ -1,7 +1,7 @@
 //! Pass 2 of the paper (section 4.2): the radiance of every listed pixel, by its partition of the sample threads.
 use super::{CameraRays, Counters, DeviceLight, FrameGraph, Identity, Tiles, View, clear};
 use crate::brdf::{Brdf, half_vector_width};
-use crate::graph::{self, Access, BufferDesc, Image};
+use crate::graph::{Access, BufferDesc, BufferHandle, ImageHandle};
 use crate::method::Method;
 use crate::threads::{Sample, SliceTable, Threads};
 use crate::vulkan::{
@@ -238,16 +238,16 @@ impl Shade {
 #[derive(Clone, Copy)]
 pub struct Shaded {
     /// Linear radiance times coverage, and coverage.
-    pub radiance: Image,
+    pub radiance: ImageHandle,
     /// Number of lookups in the environment that were made: a u64.
-    pub lookups: graph::Buffer,
+    pub lookups: BufferHandle,
 }
 
 /// Shades the pixels that `tiles` lists: interior ones with one sum shared by all sub-pixels, then those at edges.
 pub fn shade<'a>(
     graph: &mut FrameGraph<'a>,
     shade: &'a Shade,
-    geometry: Image,
+    geometry: ImageHandle,
     tiles: &Tiles,
     view: &'a View,
 ) -> Shaded {

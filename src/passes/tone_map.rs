@@ -1,7 +1,7 @@
 //! Linear radiance to 8-bit display values: exposure, clamp, gamma.
 use super::{FrameGraph, Identity, View, tiles_of};
 use crate::Result;
-use crate::graph::{Access, Image, ImageDesc};
+use crate::graph::{Access, ImageDesc, ImageHandle};
 use crate::vulkan::{Bindings, ComputePipeline, Device, Groups, PipelineCache, compiled};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
@@ -33,7 +33,12 @@ impl ToneMap {
 }
 
 /// Makes the picture to look at out of `radiance`: RGBA, 8 bits each.
-pub fn tone_map<'a>(graph: &mut FrameGraph<'a>, tone_map: &'a ToneMap, radiance: Image, view: &'a View) -> Image {
+pub fn tone_map<'a>(
+    graph: &mut FrameGraph<'a>,
+    tone_map: &'a ToneMap,
+    radiance: ImageHandle,
+    view: &'a View,
+) -> ImageHandle {
     let (width, height) = (view.width, view.height);
     let display = graph.kept_image("display", ImageDesc { format: vk::Format::R8G8B8A8_UNORM, width, height });
     let mut pass = graph.pass("tone_map");

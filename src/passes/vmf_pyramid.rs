@@ -121,7 +121,7 @@ fn blur(
     let BlurStep { from_kernel, from_size, size, kernel, .. } = *step;
     let mut graph = FrameGraph::new();
     let mut import = |name: &str, buffer: &Arc<Buffer>| {
-        let desc = BufferDesc { size_bytes: buffer.size_bytes };
+        let desc = BufferDesc { size_bytes: buffer.size_bytes() };
         graph.import_buffer(name, desc, Some(Access::StorageWriteCompute), None)
     };
     let (source, target) = (import("source", from), import("vmf_map", map));
@@ -162,11 +162,11 @@ fn blur(
 /// The texels of `map`.
 fn read_back(device: &Arc<Device>, map: &Arc<Buffer>) -> Result<Vec<[f32; 3]>> {
     let mut graph = FrameGraph::new();
-    let desc = BufferDesc { size_bytes: map.size_bytes };
+    let desc = BufferDesc { size_bytes: map.size_bytes() };
     let handle = graph.import_buffer("vmf_map", desc, Some(Access::StorageWriteCompute), None);
     let mut readbacks = Readbacks::new(device, graph);
     readbacks.imports.push((handle.into(), DeviceResource::Buffer(map.clone())));
-    let target = readbacks.buffer("read_map", handle, map.size_bytes)?;
+    let target = readbacks.buffer("read_map", handle, map.size_bytes())?;
     let Readbacks { graph, imports, .. } = readbacks;
     let executable = Executable::new(device, graph, &imports)?;
     let mut frames = Frames::new(device, "vmf_pyramid", 1)?;

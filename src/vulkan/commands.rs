@@ -1,13 +1,15 @@
 //! Recording: one pass after another, with descriptors bound by the names that the GLSL gives them.
-use super::Result;
 use super::device::Device;
-use super::error::During;
-use super::frames::is_timed;
-use super::memory::{Buffer, Image, Sampler};
+use super::error::{During, Result, VulkanError};
+use super::image::{Image, Sampler};
+use super::memory::Buffer;
 use super::pipeline::{ComputePipeline, GraphicsPipeline, Pipeline};
-use super::shader::Shader;
+use super::shader::{Shader, ShaderStage};
 use ash::vk;
 use std::sync::Arc;
+
+/// Passes that a frame can time; more are recorded, but not timed.
+pub(super) const MAX_TIMED_PASSES: u32 = 64;
 
 /// What a binding refers to.
 enum Bound<'a> {
@@ -110,7 +112,7 @@ impl Commands {
             unsafe { debug.cmd_begin_debug_utils_label(self.raw, &info) };
         }
         // Both wait for all work before them, so that passes are timed one by one even where they could overlap.
-        let timed = is_timed(self.timed.len()) && self.queries.is_some();
+        let timed = self.timed.len() < MAX_TIMED_PASSES as usize && self.queries.is_some();
         let first_query = 2 * self.timed.len() as u32;
         if timed {
             self.timed.push(name.to_owned());
@@ -236,7 +238,7 @@ impl Commands {
 
     /// Copies all of `source` to the start of `target`.
     pub fn copy_buffer(&mut self, source: &Buffer, target: &Buffer) {
-        let region = [vk::BufferCopy::default().size(source.size_bytes.min(target.size_bytes))];
+        let region = [vk::BufferCopy::default().size(source.size_bytes().min(target.size_bytes()))];
         // SAFETY: both are alive and large enough.
         unsafe { self.device.raw.cmd_copy_buffer(self.raw, source.raw, target.raw, &region) };
     }
@@ -287,35 +289,6 @@ impl Commands {
         let layout = vk::ImageLayout::TRANSFER_SRC_OPTIMAL;
         // SAFETY: both are alive, the buffer was sized for the image, the caller's barriers set the layout.
         unsafe { self.device.raw.cmd_copy_image_to_buffer(self.raw, source.raw, layout, target.raw, &region) };
-    }
-
-    /// Fills every level of a new image and leaves it ready to be sampled.
-    pub(super) fn upload_image(&mut self, image: &Image, levels: &[Buffer]) {
-        let to_transfer = vk::ImageMemoryBarrier2::default()
-            .image(image.raw)
-            .subresource_range(image.shape.whole())
-            .dst_stage_mask(vk::PipelineStageFlags2::COPY)
-            .dst_access_mask(vk::AccessFlags2::TRANSFER_WRITE)
-            .new_layout(vk::ImageLayout::TRANSFER_DST_OPTIMAL);
-        self.barriers(&[to_transfer], &[], &[]);
-        for (level, texels) in (0..).zip(levels) {
-            let region = [vk::BufferImageCopy::default()
-                .image_subresource(image.shape.level(level))
-                .image_extent(image.shape.extent_at(level))];
-            let layout = vk::ImageLayout::TRANSFER_DST_OPTIMAL;
-            // SAFETY: both are alive; the staging buffer holds this level.
-            unsafe { self.device.raw.cmd_copy_buffer_to_image(self.raw, texels.raw, image.raw, layout, &region) };
-        }
-        let to_shaders = vk::ImageMemoryBarrier2::default()
-            .image(image.raw)
-            .subresource_range(image.shape.whole())
-            .src_stage_mask(vk::PipelineStageFlags2::COPY)
-            .src_access_mask(vk::AccessFlags2::TRANSFER_WRITE)
-            .dst_stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)
-            .dst_access_mask(vk::AccessFlags2::SHADER_SAMPLED_READ)
-            .old_layout(vk::ImageLayout::TRANSFER_DST_OPTIMAL)
-            .new_layout(vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL);
-        self.barriers(&[to_shaders], &[], &[]);
     }
 
     /// An image barrier over all of `image`, for the frame graph.
@@ -416,6 +389,6 @@ impl Commands {
     }
 }
 
-fn refuse(pipeline: &Pipeline, problem: String) -> super::VulkanError {
-    Shader { name: pipeline.name, stage: super::ShaderStage::Compute, spirv: &[] }.refuse(problem)
+fn refuse(pipeline: &Pipeline, problem: String) -> VulkanError {
+    Shader { name: pipeline.name, stage: ShaderStage::Compute, spirv: &[] }.refuse(problem)
 }

@@ -1,6 +1,8 @@
 //! What Vulkan refused, with the call and the object's name kept.
 use ash::vk;
 
+pub(crate) type Result<T> = std::result::Result<T, VulkanError>;
+
 /// An error of the Vulkan layer.
 #[derive(Debug, thiserror::Error)]
 pub enum VulkanError {
@@ -74,11 +76,11 @@ pub enum VulkanError {
 
 /// Attaches the call and the object's name to a bare `vk::Result`.
 pub(super) trait During<T> {
-    fn during(self, call: &'static str, object: &str) -> Result<T, VulkanError>;
+    fn during(self, call: &'static str, object: &str) -> Result<T>;
 }
 
 impl<T> During<T> for ash::prelude::VkResult<T> {
-    fn during(self, call: &'static str, object: &str) -> Result<T, VulkanError> {
+    fn during(self, call: &'static str, object: &str) -> Result<T> {
         self.map_err(|result| VulkanError::Call { call, object: object.to_owned(), result })
     }
 }

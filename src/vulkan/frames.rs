@@ -1,8 +1,8 @@
 //! Frames in flight: each has its command pool, descriptors and timestamps, and is reused when the GPU is done with it.
-use super::Result;
-use super::commands::Commands;
-use super::device::{Device, Garbage};
-use super::error::During;
+use super::commands::{Commands, MAX_TIMED_PASSES};
+use super::deletion::Garbage;
+use super::device::{Device, Semaphores};
+use super::error::{During, Result};
 use ash::vk;
 use std::sync::Arc;
 
@@ -14,28 +14,6 @@ pub struct PassTime {
     /// Milliseconds between the timestamps before and after it.
     pub gpu_ms: f64,
 }
-
-/// What a submission waits for before it starts, and signals when it has finished, besides the device's timeline.
-#[derive(Clone, Copy, Default)]
-pub struct Semaphores {
-    pub(super) wait: Option<vk::Semaphore>,
-    pub(super) signal: Option<vk::Semaphore>,
-}
-
-impl Semaphores {
-    /// The same for the first of several submissions that were to be one.
-    pub fn first(self) -> Self {
-        Self { signal: None, ..self }
-    }
-
-    /// The same for the last of several submissions that were to be one.
-    pub fn last(self) -> Self {
-        Self { wait: None, ..self }
-    }
-}
-
-/// Passes that a frame can time; more are recorded, but not timed.
-const MAX_TIMED_PASSES: u32 = 64;
 
 /// What one frame in flight owns.
 struct Slot {
@@ -227,9 +205,4 @@ impl Drop for Frames {
             }
         }
     }
-}
-
-/// Whether the `index`-th pass of a frame is timed.
-pub(super) fn is_timed(index: usize) -> bool {
-    index < MAX_TIMED_PASSES as usize
 }

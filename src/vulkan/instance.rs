@@ -1,6 +1,5 @@
 //! The Vulkan instance: loader, validation layer, and the messages it sends.
-use super::Result;
-use super::error::{During, VulkanError};
+use super::error::{During, Result, VulkanError};
 use ash::{ext, khr, vk};
 use std::ffi::{CStr, c_void};
 use std::sync::{Arc, Mutex, PoisonError};

@@ -1,7 +1,7 @@
 //! Pipelines, with every layout taken from the shaders themselves, and the cache of compiled ones on disk.
-use super::Result;
-use super::device::{Device, Garbage};
-use super::error::During;
+use super::deletion::Garbage;
+use super::device::Device;
+use super::error::{During, Result};
 use super::shader::{Binding, Interface, Shader};
 use ash::vk;
 use std::collections::BTreeMap;

@@ -1,6 +1,5 @@
 //! A compiled shader and what its SPIR-V declares: bindings by name, size of the push constants.
-use super::Result;
-use super::error::VulkanError;
+use super::error::{Result, VulkanError};
 use ash::vk;
 use spirq::prelude::{DescriptorType, ReflectConfig, Variable};
 use std::collections::BTreeMap;

@@ -1,6 +1,5 @@
 //! The surface: what a window is to Vulkan.
-use super::Result;
-use super::error::During;
+use super::error::{During, Result};
 use super::instance::Instance;
 use ash::{khr, vk};
 use raw_window_handle::{HasDisplayHandle, HasWindowHandle};

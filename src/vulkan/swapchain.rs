@@ -3,12 +3,11 @@
 //! Its images hold display values. Tone mapping has applied the gamma that the user asked for, so the format is plain UNORM:
 //! an sRGB format would encode them a second time. The colour space is the one that every window system has, in which
 //! it shows the bytes as they are.
-use super::device::Device;
-use super::error::{During, VulkanError};
-use super::frames::Semaphores;
-use super::memory::{Image, ImageShape};
+use super::device::{Device, Semaphores};
+use super::error::{During, Result, VulkanError};
+use super::frames::Frames;
+use super::image::{Image, ImageShape};
 use super::surface::Surface;
-use super::{Frames, Result};
 use ash::{khr, vk};
 use std::sync::Arc;
 

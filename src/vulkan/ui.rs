@@ -1,9 +1,8 @@
 //! Draws what egui has laid out, by egui-ash-renderer.
-use super::Result;
 use super::commands::Commands;
 use super::device::Device;
-use super::error::{During, VulkanError};
-use super::memory::Image;
+use super::error::{During, Result, VulkanError};
+use super::image::Image;
 use ash::vk;
 use egui::epaint::{ClippedPrimitive, ColorImage, ImageDelta, TextureId, textures::TexturesDelta};
 use egui_ash_renderer::{DynamicRendering, Options, Renderer, RendererError};
