@@ -1,5 +1,5 @@
 //! The method on one screen: the frame as a graph of passes, and the renderer that runs it.
-use crate::graph::{BufferHandle, Executable, ImageHandle};
+use crate::graph::{BufferHandle, Executable, FrameGraph, ImageHandle};
 use crate::method::Method;
 use crate::output::ExrHeader;
 use crate::passes::*;

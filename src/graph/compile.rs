@@ -69,7 +69,7 @@ fn plan<W>(
         let resource = resources.iter().position(|resource| resource.declared == use_.handle.resource)?;
         let outlives = resources[resource].imported || resources[resource].kept;
         let kept = use_.makes().is_some_and(|made| outlives || needed.contains(&made));
-        Some(PlannedUse { resource, access: use_.access, mode: use_.mode, kept })
+        Some(PlannedUse { resource, access: use_.access, mode: use_.mode, kept, handle: use_.handle })
     };
     let mut declared: Vec<Option<Pass<W>>> = graph.passes.into_iter().map(Some).collect();
     let passes = order.iter().zip(barriers).filter_map(|(&pass, barriers)| {

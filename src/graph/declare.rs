@@ -1,5 +1,6 @@
 //! Declare: the graph as the passes describe it, resources by version, nothing checked yet.
 use super::access::{Access, Mode};
+use super::error::GraphError;
 use super::resource::{
     BufferDesc, BufferHandle, Handle, ImageDesc, ImageHandle, ResourceInfo, ResourceKind, Versioned,
 };
@@ -10,6 +11,8 @@ pub struct Graph<W> {
     pub(super) resources: Vec<Resource>,
     pub(super) passes: Vec<Pass<W>>,
     pub(super) outputs: Vec<Handle>,
+    /// The first thing that was found wrong while it was declared.
+    pub(super) problem: Option<GraphError>,
 }
 
 /// A declared resource.
@@ -34,6 +37,8 @@ pub(super) struct Pass<W> {
     pub uses: Vec<Use>,
     /// Hash of what it depends on besides resources; none if it does not say.
     pub inputs: Option<u64>,
+    /// Whether it depends on something that is not known yet: then nothing that it makes is ever still good.
+    pub depends_on_unknown: bool,
     pub work: Option<W>,
 }
 
@@ -59,7 +64,7 @@ impl Use {
 
 impl<W> Default for Graph<W> {
     fn default() -> Self {
-        Self { resources: Vec::new(), passes: Vec::new(), outputs: Vec::new() }
+        Self { resources: Vec::new(), passes: Vec::new(), outputs: Vec::new(), problem: None }
     }
 }
 
@@ -122,8 +127,14 @@ impl<W> Graph<W> {
     /// Adds a pass; the builder says what it uses and what it records.
     pub fn pass(&mut self, name: &str) -> PassBuilder<'_, W> {
         let index = self.passes.len();
-        self.passes.push(Pass { name: name.to_owned(), uses: Vec::new(), inputs: None, work: None });
-        PassBuilder { pass: &mut self.passes[index] }
+        self.passes.push(Pass {
+            name: name.to_owned(),
+            uses: Vec::new(),
+            inputs: None,
+            depends_on_unknown: false,
+            work: None,
+        });
+        PassBuilder { pass: &mut self.passes[index], problem: &mut self.problem }
     }
 
     /// What resource number `index` must be to be used as all declared passes use it, whether they run or not.
@@ -143,6 +154,7 @@ impl<W> Graph<W> {
 /// Says what a pass uses and what it records.
 pub struct PassBuilder<'a, W> {
     pass: &'a mut Pass<W>,
+    problem: &'a mut Option<GraphError>,
 }
 
 impl<W> PassBuilder<'_, W> {
@@ -176,6 +188,21 @@ impl<W> PassBuilder<'_, W> {
         (self.pass.inputs, inputs).hash(&mut hasher);
         self.pass.inputs = Some(hasher.finish());
         self
+    }
+
+    /// Says that the pass depends on something that is not known yet.
+    pub(super) fn depends_on_unknown(&mut self) {
+        self.pass.depends_on_unknown = true;
+    }
+
+    /// Its name.
+    pub(super) fn name(&self) -> &str {
+        &self.pass.name
+    }
+
+    /// Notes what is wrong with its declaration; the graph will not compile.
+    pub(super) fn refuse(&mut self, problem: GraphError) {
+        self.problem.get_or_insert(problem);
     }
 
     /// What the pass records when it runs.

@@ -21,6 +21,12 @@ pub enum GraphError {
         "pass `{pass}` uses `{resource}` as {first:?} and as {second:?}; only reads of one version in one layout go together"
     )]
     Conflict { pass: String, resource: String, first: Access, second: Access },
+    #[error("pass `{pass}`, `{resource}` of shader {shader}: {problem}")]
+    WrongBinding { pass: String, resource: String, shader: String, problem: &'static str },
+    #[error("pass `{pass}` uses `{resource}`, which it has not declared; declare a read, a write or a modify of it")]
+    Undeclared { pass: String, resource: String },
+    #[error("pass `{pass}` draws without a colour and a depth target; declare both")]
+    NoTarget { pass: String },
     #[error("pass `{pass}` writes nothing, so it has no effect; declare what it writes or remove it")]
     NoEffect { pass: String },
     #[error("pass `{pass}` records nothing; call `record`")]
@@ -39,6 +45,8 @@ pub enum GraphError {
     OutputTransient { resource: String },
     #[error("`{resource}` has no size; all of its dimensions must be at least 1")]
     ZeroSize { resource: String },
+    #[error("`{resource}` is imported, and nothing is given for it")]
+    NotImported { resource: String },
     #[error("two {what} are named `{name}`; names must differ")]
     DuplicateName { what: &'static str, name: String },
     #[error("cycle: {}; read the newer version, or copy the older one first", steps.join(", "))]

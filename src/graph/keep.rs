@@ -16,7 +16,7 @@ pub(super) fn fingerprints<W>(graph: &Graph<W>) -> HashMap<Handle, Option<u64>> 
     let mut known: HashMap<Handle, Option<u64>> = HashMap::new();
     // A handle is had from the pass that makes it, so makers are declared before users.
     for pass in &graph.passes {
-        let of_pass = pass.inputs.as_ref().and_then(|inputs| {
+        let of_pass = pass.inputs.as_ref().filter(|_| !pass.depends_on_unknown).and_then(|inputs| {
             let mut hasher = DefaultHasher::new();
             (&pass.name, inputs).hash(&mut hasher);
             for needed in pass.uses.iter().filter_map(|use_| use_.needs()) {

@@ -7,7 +7,7 @@
 //! Results that outlive the frame (`keep`) let passes go that would only make the same again.
 //!
 //! Each stage is one file of that name and, up to the plan, a pure function of the graph: the same graph gives the same
-//! plan, without a GPU. `compile` puts them in a row. They share `resource`, `kept` and `plan`, which are data only. A plan prints itself ([`Plan`] is `Display`), which is also how it is tested.
+//! plan, without a GPU. Passes on a device are declared by `compute`, `raster` and `copies`. `compile` puts them in a row. They share `resource`, `kept` and `plan`, which are data only. A plan prints itself ([`Plan`] is `Display`), which is also how it is tested.
 //!
 //! A handle names one *version* of a resource. A pass that writes or modifies a version makes the next one, and only one
 //! pass may, so the order of writes is explicit. Whoever holds an older handle reads the older contents: that pass
@@ -16,6 +16,8 @@ mod access;
 mod alias;
 mod barriers;
 mod compile;
+mod compute;
+mod copies;
 mod cull;
 mod declare;
 mod error;
@@ -25,16 +27,23 @@ mod kept;
 mod lifetimes;
 mod order;
 mod plan;
+mod raster;
 mod resource;
+mod store;
 mod text;
 mod validate;
+mod work;
 
 pub use access::{Access, AccessInfo, Mode, is_depth};
+pub use compute::ComputePass;
 pub use declare::{Graph, PassBuilder};
 pub use error::GraphError;
-pub use execute::{DeviceResource, Executable, Resources, Store, Work};
+pub use execute::Executable;
 pub use kept::Kept;
 pub use plan::{
     Barrier, Block, Lifetime, MemoryRequirement, Placement, Plan, PlannedPass, PlannedResource, PlannedUse,
 };
+pub use raster::RasterPass;
 pub use resource::{BufferDesc, BufferHandle, Handle, ImageDesc, ImageHandle, ResourceInfo, ResourceKind, Versioned};
+pub use store::Store;
+pub use work::{DeviceResource, FrameGraph, Resources, Work};

@@ -47,6 +47,8 @@ pub struct PlannedUse {
     pub mode: Mode,
     /// Whether anything looks at what this pass leaves (for an attachment: store, or do not care). False for reads.
     pub kept: bool,
+    /// The version that it finds.
+    pub(super) handle: Handle,
 }
 
 /// A resource that a pass of the plan uses.

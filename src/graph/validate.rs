@@ -7,6 +7,7 @@ use std::collections::{HashMap, HashSet};
 
 /// Checks all passes, also those that will be culled: whether a graph is wrong does not depend on what is asked of it.
 pub(super) fn validate<W>(graph: &Graph<W>) -> Result<(), GraphError> {
+    graph.problem.clone().map_or(Ok(()), Err)?;
     distinct("resources", graph.resources.iter().map(|resource| &resource.name))?;
     distinct("passes", graph.passes.iter().map(|pass| &pass.name))?;
     graph.resources.iter().try_for_each(check_resource)?;

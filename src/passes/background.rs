@@ -1,11 +1,9 @@
 //! Puts the environment behind the surface.
-use super::{CameraRays, FrameGraph, Identity, View, tiles_of};
+use super::{CameraRays, View};
 use crate::Result;
 use crate::environment::Environment;
-use crate::graph::{Access, ImageHandle};
-use crate::vulkan::{
-    self, Bindings, ComputePipeline, Device, Groups, ImageShape, PipelineCache, Sampler, SamplerKind, compiled,
-};
+use crate::graph::{FrameGraph, ImageHandle};
+use crate::vulkan::{self, ComputePipeline, Device, ImageShape, PipelineCache, Sampler, SamplerKind, compiled};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 use half::f16;
@@ -16,7 +14,6 @@ pub struct Background {
     pipeline: ComputePipeline,
     map: vulkan::Image,
     sampler: Sampler,
-    identity: Identity,
 }
 
 #[repr(C)]
@@ -46,7 +43,6 @@ impl Background {
             pipeline: ComputePipeline::new(device, cache, &compiled::BACKGROUND, &[])?,
             map: vulkan::Image::with_texels(device, "environment map", shape, &[bytes])?,
             sampler: Sampler::new(device, "environment map", SamplerKind::WrappedLinear)?,
-            identity: Identity::new(),
         })
     }
 }
@@ -70,23 +66,16 @@ pub(super) fn check_map_size(
 pub fn background<'a>(
     graph: &mut FrameGraph<'a>,
     background: &'a Background,
-    radiance: ImageHandle,
-    view: &'a View,
+    mut radiance: ImageHandle,
+    view: &View,
 ) -> ImageHandle {
-    let mut pass = graph.pass("background");
-    let radiance = pass.modify(radiance, Access::StorageWriteCompute);
-    let push = Push {
-        camera: view.camera_rays(),
-        size_px: [view.width, view.height],
-        rotation: view.rotation(),
-        radiance_scale: view.intensity as f32,
-    };
-    pass.depends_on(&background.identity).depends_on(&bytemuck::bytes_of(&push));
-    pass.record(Box::new(move |commands, resources| {
-        let Background { pipeline, map, sampler, .. } = background;
-        let bindings =
-            Bindings::new().image("radiance", resources.image(radiance)).sampled("environment_map", map, sampler);
-        commands.dispatch(pipeline, &bindings, bytemuck::bytes_of(&push), Groups::Direct(tiles_of(view)))
-    }));
+    let size_px = [view.width, view.height];
+    let (rotation, radiance_scale) = (view.rotation(), view.intensity as f32);
+    graph
+        .compute("background", &background.pipeline)
+        .modify("radiance", &mut radiance)
+        .sampled("environment_map", &background.map, &background.sampler)
+        .push(&Push { camera: view.camera_rays(), size_px, rotation, radiance_scale })
+        .cover([view.width, view.height, 1]);
     radiance
 }

@@ -1,8 +1,8 @@
 //! Sorts pixels into interior, edge and background, and lists those to shade: nothing else is looked at again.
-use super::{FrameGraph, Identity, View, clear, tiles_of};
+use super::View;
 use crate::Result;
-use crate::graph::{Access, BufferDesc, BufferHandle, ImageDesc, ImageHandle};
-use crate::vulkan::{Bindings, ComputePipeline, Device, Groups, PipelineCache, compiled};
+use crate::graph::{BufferDesc, BufferHandle, FrameGraph, ImageDesc, ImageHandle};
+use crate::vulkan::{ComputePipeline, Device, PipelineCache, compiled};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 use std::sync::Arc;
@@ -11,9 +11,6 @@ use std::sync::Arc;
 /// parts of a mesh count as edges and cost as much as all sub-pixels shaded alone; wider, and the parts of the sum
 /// belong to visibly different normals.
 pub const SMOOTH_DEG: f32 = 10.0;
-
-/// Pixels on the side of a tile. `TILE_SIDE` in glsl/tiles.glsl.
-const TILE_SIDE: u32 = 8;
 
 /// The tiles of one class: arguments of an indirect dispatch and a count. `TileClass` in glsl/tiles.glsl.
 #[repr(C)]
@@ -49,7 +46,6 @@ impl Counters {
 /// What the pass is made of.
 pub struct Classify {
     pipeline: ComputePipeline,
-    identity: Identity,
 }
 
 #[repr(C)]
@@ -65,8 +61,8 @@ impl Classify {
     /// # Errors
     /// A driver that cannot compile it.
     pub fn new(device: &Arc<Device>, cache: &PipelineCache, subpixels: u32) -> Result<Self> {
-        let pipeline = ComputePipeline::new(device, cache, &compiled::CLASSIFY, &[("SUBPIXELS", subpixels)])?;
-        Ok(Self { pipeline, identity: Identity::new() })
+        let constants = [("SUBPIXELS", subpixels)];
+        Ok(Self { pipeline: ComputePipeline::new(device, cache, &compiled::CLASSIFY, &constants)? })
     }
 }
 
@@ -84,36 +80,26 @@ pub struct Tiles {
 }
 
 /// Lists the pixels of `geometry` that hold surface.
-pub fn classify<'a>(
-    graph: &mut FrameGraph<'a>,
-    classify: &'a Classify,
-    geometry: ImageHandle,
-    view: &'a View,
-) -> Tiles {
+pub fn classify<'a>(graph: &mut FrameGraph<'a>, classify: &'a Classify, geometry: ImageHandle, view: &View) -> Tiles {
     let (width, height) = (view.width, view.height);
-    let counters = graph.buffer("counters", BufferDesc { size_bytes: size_of::<Counters>() as u64 });
-    let counters = clear(graph, "clear_counters", counters);
-    let tile_count = u64::from(width.div_ceil(TILE_SIDE)) * u64::from(height.div_ceil(TILE_SIDE));
-    let tiles = graph.buffer("tile_list", BufferDesc { size_bytes: 2 * 4 * tile_count });
-    let pixels = graph.buffer("pixel_list", BufferDesc { size_bytes: 4 * u64::from(TILE_SIDE.pow(2)) * tile_count });
-    let radiance = graph.kept_image("radiance", ImageDesc { format: vk::Format::R32G32B32A32_SFLOAT, width, height });
-    let mut pass = graph.pass("classify");
-    pass.read(geometry, Access::SampledCompute);
-    let counters = pass.modify(counters, Access::StorageWriteCompute);
-    let tiles = pass.write(tiles, Access::StorageWriteCompute);
-    let pixels = pass.write(pixels, Access::StorageWriteCompute);
-    let radiance = pass.write(radiance, Access::StorageWriteCompute);
-    let push = Push { size_px: [width, height], cos_smooth: SMOOTH_DEG.to_radians().cos() };
-    pass.depends_on(&classify.identity).depends_on(&bytemuck::bytes_of(&push));
-    pass.record(Box::new(move |commands, resources| {
-        let bindings = Bindings::new()
-            .image("geometry", resources.image(geometry))
-            .buffer("counters", resources.buffer(counters))
-            .buffer("tile_list", resources.buffer(tiles))
-            .buffer("pixel_list", resources.buffer(pixels))
-            .image("radiance", resources.image(radiance));
-        let groups = Groups::Direct(tiles_of(view));
-        commands.dispatch(&classify.pipeline, &bindings, bytemuck::bytes_of(&push), groups)
-    }));
+    // A workgroup is a tile.
+    let [columns, rows, _] = classify.pipeline.group_size();
+    let tile_count = u64::from(width.div_ceil(columns)) * u64::from(height.div_ceil(rows));
+    let tile_pixels = u64::from(columns * rows);
+    let mut counters = graph.buffer("counters", BufferDesc { size_bytes: size_of::<Counters>() as u64 });
+    graph.clear_buffer("clear_counters", &mut counters);
+    let mut tiles = graph.buffer("tile_list", BufferDesc { size_bytes: 2 * 4 * tile_count });
+    let mut pixels = graph.buffer("pixel_list", BufferDesc { size_bytes: 4 * tile_pixels * tile_count });
+    let linear = vk::Format::R32G32B32A32_SFLOAT;
+    let mut radiance = graph.kept_image("radiance", ImageDesc { format: linear, width, height });
+    graph
+        .compute("classify", &classify.pipeline)
+        .read("geometry", geometry)
+        .modify("counters", &mut counters)
+        .write("tile_list", &mut tiles)
+        .write("pixel_list", &mut pixels)
+        .write("radiance", &mut radiance)
+        .push(&Push { size_px: [width, height], cos_smooth: SMOOTH_DEG.to_radians().cos() })
+        .cover([width, height, 1]);
     Tiles { counters, tiles, pixels, radiance }
 }

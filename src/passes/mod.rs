@@ -5,9 +5,7 @@
 mod background;
 mod bare_lookups;
 mod classify;
-mod clear;
 mod geometry_cache;
-mod identity;
 mod light;
 #[cfg(feature = "viewer")]
 mod present;
@@ -22,9 +20,7 @@ mod vmf_pyramid;
 pub use background::{Background, background};
 pub use bare_lookups::{BareLookups, bare_lookups};
 pub use classify::{Classify, Counters, SMOOTH_DEG, Tiles, classify};
-pub use clear::clear;
 pub use geometry_cache::{DeviceMesh, GeometryCache, PlacedMesh, geometry_cache};
-pub use identity::Identity;
 pub use light::DeviceLight;
 #[cfg(feature = "viewer")]
 pub use present::{Area, present};
@@ -35,13 +31,3 @@ pub use tone_map::{ToneMap, tone_map};
 pub use ui::ui;
 pub use view::{CameraRays, View};
 pub use vmf_pyramid::{filter_environment, vmf_pyramid};
-
-use crate::graph::{Graph, Work};
-
-/// The graph that these passes declare themselves in.
-pub type FrameGraph<'a> = Graph<Work<'a>>;
-
-/// Workgroups of 8 x 8 that cover an image.
-fn tiles_of(view: &View) -> [u32; 3] {
-    [view.width.div_ceil(8), view.height.div_ceil(8), 1]
-}

@@ -1,6 +1,5 @@
 //! Puts the picture into the window.
-use super::FrameGraph;
-use crate::graph::{Access, ImageHandle};
+use crate::graph::{FrameGraph, ImageHandle};
 
 /// Where the picture is in the window, in pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -22,23 +21,13 @@ const AROUND: [f32; 4] = [0.08, 0.08, 0.08, 1.0];
 pub fn present(
     graph: &mut FrameGraph<'_>,
     display: Option<ImageHandle>,
-    window: ImageHandle,
+    mut window: ImageHandle,
     area: Area,
 ) -> ImageHandle {
-    let mut pass = graph.pass("clear_window");
-    let window = pass.write(window, Access::TransferWrite);
-    pass.record(Box::new(move |commands, resources| {
-        commands.clear_image(resources.image(window), AROUND);
-        Ok(())
-    }));
-    let Some(display) = display else { return window };
-    let mut pass = graph.pass("present");
-    pass.read(display, Access::TransferRead);
-    let window = pass.modify(window, Access::TransferWrite);
-    pass.record(Box::new(move |commands, resources| {
+    graph.clear_image("clear_window", &mut window, AROUND);
+    if let Some(display) = display {
         let Area { left, top, width, height } = area;
-        commands.blit(resources.image(display), resources.image(window), [left, top, width, height]);
-        Ok(())
-    }));
+        graph.blit("present", display, &mut window, [left, top, width, height]);
+    }
     window
 }

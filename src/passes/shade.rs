@@ -1,11 +1,11 @@
 //! Pass 2 of the paper (section 4.2): the radiance of every listed pixel, by its partition of the sample threads.
-use super::{CameraRays, Counters, DeviceLight, FrameGraph, Identity, Tiles, View, clear};
+use super::{CameraRays, Counters, DeviceLight, Tiles, View};
 use crate::brdf::{Brdf, half_vector_width};
-use crate::graph::{Access, BufferDesc, BufferHandle, ImageHandle};
+use crate::graph::{BufferDesc, BufferHandle, FrameGraph, ImageHandle};
 use crate::method::Method;
 use crate::threads::{Sample, SliceTable, Threads};
 use crate::vulkan::{
-    self, Bindings, Buffer, ComputePipeline, Device, Groups, ImageKind, ImageShape, PipelineCache, Sampler, SamplerKind,
+    self, Bound, Buffer, ComputePipeline, Device, ImageKind, ImageShape, PipelineCache, Sampler, SamplerKind,
 };
 use crate::{Error, Result};
 use ash::vk;
@@ -99,6 +99,16 @@ impl DeviceMaterials {
             table_sampler: Sampler::new(device, "brdf tables", SamplerKind::WrappedLinear)?,
             models_used,
         })
+    }
+}
+
+impl DeviceMaterials {
+    /// All of it, by name in the shader; the last two as the method declares them.
+    fn bindings(&self) -> Vec<(&'static str, Bound<'_>)> {
+        let tables = Bound::Sampled(&self.tables, &self.table_sampler);
+        let optional = [("Threads", &self.threads), ("Slices", &self.slices)];
+        let optional = optional.into_iter().filter_map(|(name, buffer)| Some((name, Bound::from(buffer.as_ref()?))));
+        [("Materials", Bound::from(&self.records)), ("brdf_tables", tables)].into_iter().chain(optional).collect()
     }
 }
 
@@ -198,7 +208,6 @@ pub struct Shade {
     pub light: Arc<DeviceLight>,
     /// How many threads or samples, and which random numbers.
     pub sampling: Sampling,
-    identity: Identity,
 }
 
 #[repr(C)]
@@ -212,6 +221,21 @@ struct Push {
     radiance_scale: f32,
     sample_count: u32,
     seed: [u32; 2],
+}
+
+impl Push {
+    fn new(view: &View, sampling: &Sampling, light: &DeviceLight, kind: u32) -> Self {
+        Self {
+            camera: view.camera_rays(),
+            size_px: [view.width, view.height],
+            kind,
+            face_size: light.face_size(),
+            rotation: view.rotation(),
+            radiance_scale: view.intensity as f32 * light.radiance_scale(),
+            sample_count: sampling.count,
+            seed: [sampling.seed as u32, (sampling.seed >> 32) as u32],
+        }
+    }
 }
 
 impl Shade {
@@ -230,7 +254,7 @@ impl Shade {
     ) -> Result<Self> {
         let constants = [("SUBPIXELS", subpixels), ("MODELS_USED", materials.models_used)];
         let pipeline = Arc::new(ComputePipeline::new(device, cache, method.shader()?, &constants)?);
-        Ok(Self { pipeline, materials, light, sampling, identity: Identity::new() })
+        Ok(Self { pipeline, materials, light, sampling })
     }
 }
 
@@ -249,55 +273,23 @@ pub fn shade<'a>(
     shade: &'a Shade,
     geometry: ImageHandle,
     tiles: &Tiles,
-    view: &'a View,
+    view: &View,
 ) -> Shaded {
-    let Tiles { counters, tiles, pixels, radiance } = *tiles;
-    let lookups = graph.buffer("lookups", BufferDesc { size_bytes: size_of::<u64>() as u64 });
-    let lookups = clear(graph, "clear_lookups", lookups);
-    let mut pass = graph.pass("shade");
-    pass.read(geometry, Access::SampledCompute);
-    pass.read(counters, Access::Indirect);
-    pass.read(counters, Access::StorageReadCompute);
-    pass.read(tiles, Access::StorageReadCompute);
-    pass.read(pixels, Access::StorageReadCompute);
-    let radiance = pass.modify(radiance, Access::StorageWriteCompute);
-    let lookups = pass.modify(lookups, Access::StorageWriteCompute);
-    let Shade { pipeline, materials, light, sampling, identity } = shade;
-    let push = Push {
-        camera: view.camera_rays(),
-        size_px: [view.width, view.height],
-        kind: 0,
-        face_size: light.face_size(),
-        rotation: view.rotation(),
-        radiance_scale: view.intensity as f32 * light.radiance_scale(),
-        sample_count: sampling.count,
-        seed: [sampling.seed as u32, (sampling.seed >> 32) as u32],
-    };
-    pass.depends_on(identity).depends_on(&bytemuck::bytes_of(&push));
-    pass.record(Box::new(move |commands, resources| {
-        let counters = resources.buffer(counters);
-        let mut bindings = Bindings::new()
-            .image("geometry", resources.image(geometry))
-            .buffer("counters", counters)
-            .buffer("tile_list", resources.buffer(tiles))
-            .buffer("pixel_list", resources.buffer(pixels))
-            .image("radiance", resources.image(radiance))
-            .buffer("Materials", &materials.records)
-            .sampled("brdf_tables", &materials.tables, &materials.table_sampler)
-            .buffer("all_lookups", resources.buffer(lookups));
-        // The rest as the method declares it.
-        bindings = light.bind(bindings);
-        for (name, buffer) in [("Threads", &materials.threads), ("Slices", &materials.slices)] {
-            if let Some(buffer) = buffer {
-                bindings = bindings.buffer(name, buffer);
-            }
-        }
-        for kind in [0, 1] {
-            let push = Push { kind, ..push };
-            let groups = Groups::Indirect(counters, Counters::arguments_of(kind));
-            commands.dispatch(pipeline, &bindings, bytemuck::bytes_of(&push), groups)?;
-        }
-        Ok(())
-    }));
+    let Tiles { counters, tiles, pixels, mut radiance } = *tiles;
+    let Shade { pipeline, materials, light, sampling } = shade;
+    let mut lookups = graph.buffer("lookups", BufferDesc { size_bytes: size_of::<u64>() as u64 });
+    graph.clear_buffer("clear_lookups", &mut lookups);
+    let dispatch = |kind| (Counters::arguments_of(kind), Push::new(view, sampling, light, kind));
+    graph
+        .compute("shade", pipeline)
+        .read("geometry", geometry)
+        .read("counters", counters)
+        .read("tile_list", tiles)
+        .read("pixel_list", pixels)
+        .modify("radiance", &mut radiance)
+        .modify("all_lookups", &mut lookups)
+        .bind_all(materials.bindings())
+        .bind_all(light.bindings())
+        .indirect(counters, [0, 1].map(dispatch));
     Shaded { radiance, lookups }
 }

@@ -1,8 +1,8 @@
 //! Linear radiance to 8-bit display values: exposure, clamp, gamma.
-use super::{FrameGraph, Identity, View, tiles_of};
+use super::View;
 use crate::Result;
-use crate::graph::{Access, ImageDesc, ImageHandle};
-use crate::vulkan::{Bindings, ComputePipeline, Device, Groups, PipelineCache, compiled};
+use crate::graph::{FrameGraph, ImageDesc, ImageHandle};
+use crate::vulkan::{ComputePipeline, Device, PipelineCache, compiled};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 use std::sync::Arc;
@@ -10,7 +10,6 @@ use std::sync::Arc;
 /// What the pass is made of.
 pub struct ToneMap {
     pipeline: ComputePipeline,
-    identity: Identity,
 }
 
 #[repr(C)]
@@ -27,8 +26,7 @@ impl ToneMap {
     /// # Errors
     /// A driver that cannot compile it.
     pub fn new(device: &Arc<Device>, cache: &PipelineCache) -> Result<Self> {
-        let pipeline = ComputePipeline::new(device, cache, &compiled::TONE_MAP, &[])?;
-        Ok(Self { pipeline, identity: Identity::new() })
+        Ok(Self { pipeline: ComputePipeline::new(device, cache, &compiled::TONE_MAP, &[])? })
     }
 }
 
@@ -40,16 +38,12 @@ pub fn tone_map<'a>(
     view: &'a View,
 ) -> ImageHandle {
     let (width, height) = (view.width, view.height);
-    let display = graph.kept_image("display", ImageDesc { format: vk::Format::R8G8B8A8_UNORM, width, height });
-    let mut pass = graph.pass("tone_map");
-    pass.read(radiance, Access::StorageReadCompute);
-    let display = pass.write(display, Access::StorageWriteCompute);
-    let push = Push { size_px: [width, height], exposure: view.exposure, inverse_gamma: 1.0 / view.gamma };
-    pass.depends_on(&tone_map.identity).depends_on(&bytemuck::bytes_of(&push));
-    pass.record(Box::new(move |commands, resources| {
-        let bindings =
-            Bindings::new().image("radiance", resources.image(radiance)).image("display", resources.image(display));
-        commands.dispatch(&tone_map.pipeline, &bindings, bytemuck::bytes_of(&push), Groups::Direct(tiles_of(view)))
-    }));
+    let mut display = graph.kept_image("display", ImageDesc { format: vk::Format::R8G8B8A8_UNORM, width, height });
+    graph
+        .compute("tone_map", &tone_map.pipeline)
+        .read("radiance", radiance)
+        .write("display", &mut display)
+        .push(&Push { size_px: [width, height], exposure: view.exposure, inverse_gamma: 1.0 / view.gamma })
+        .cover([width, height, 1]);
     display
 }

@@ -1,6 +1,5 @@
 //! Draws the panel over the picture.
-use super::FrameGraph;
-use crate::graph::{Access, ImageHandle};
+use crate::graph::{Access, FrameGraph, ImageHandle};
 use crate::vulkan::{UiFrame, UiPainter};
 
 /// Draws `frame` over `window`, an image of the swapchain.
@@ -12,6 +11,6 @@ pub fn ui<'a>(
 ) -> ImageHandle {
     let mut pass = graph.pass("ui");
     let window = pass.modify(window, Access::ColorAttachment);
-    pass.record(Box::new(move |commands, resources| commands.draw_ui(painter, frame, resources.image(window))));
+    pass.record(Box::new(move |commands, resources| Ok(commands.draw_ui(painter, frame, resources.image(window)?)?)));
     window
 }

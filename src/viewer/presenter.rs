@@ -1,7 +1,7 @@
 //! The stage: draws frames into the window.
 use crate::Result;
-use crate::graph::{Access, DeviceResource, Executable, ImageDesc, Store};
-use crate::passes::{Area, Counters, FrameGraph, Readbacks, View, present, texels, ui};
+use crate::graph::{Access, DeviceResource, Executable, FrameGraph, ImageDesc, Store};
+use crate::passes::{Area, Counters, Readbacks, View, present, texels, ui};
 use crate::pipeline::{Renderer, declare};
 use crate::vulkan::{Device, Frames, PassTime, PresentMode, Presented, Surface, Swapchain, UiFrame, UiPainter};
 use egui::TexturesDelta;

@@ -64,6 +64,14 @@ pub enum VulkanError {
         /// What the allocator said.
         cause: String,
     },
+    /// An object is used for what it was not made for.
+    #[error("{object}: {problem}")]
+    Unfit {
+        /// Debug name of the object concerned.
+        object: String,
+        /// What does not fit.
+        problem: String,
+    },
     /// A shader and its caller disagree.
     #[error("shader {shader}: {problem}")]
     Shader {
@@ -72,6 +80,13 @@ pub enum VulkanError {
         /// What does not match.
         problem: String,
     },
+}
+
+impl VulkanError {
+    /// A [`VulkanError::Unfit`] about the object of this name.
+    pub(super) fn unfit(object: &str, problem: impl ToString) -> Self {
+        Self::Unfit { object: object.to_owned(), problem: problem.to_string() }
+    }
 }
 
 /// Attaches the call and the object's name to a bare `vk::Result`.

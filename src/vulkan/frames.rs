@@ -2,7 +2,7 @@
 use super::commands::{Commands, MAX_TIMED_PASSES};
 use super::deletion::Garbage;
 use super::device::{Device, Semaphores};
-use super::error::{During, Result};
+use super::error::{During, Result, VulkanError};
 use ash::vk;
 use std::sync::Arc;
 
@@ -49,7 +49,7 @@ impl Frames {
     ///
     /// # Errors
     /// What `record` returns, or a failing submission.
-    pub fn record<T>(&mut self, record: impl FnOnce(&mut Commands) -> Result<T>) -> Result<T> {
+    pub(crate) fn record<T>(&mut self, record: impl FnOnce(&mut Commands) -> Result<T>) -> Result<T> {
         self.record_between(Semaphores::default(), record)
     }
 
@@ -57,11 +57,11 @@ impl Frames {
     ///
     /// # Errors
     /// What `record` returns, or a failing submission.
-    pub fn record_between<T>(
+    pub(crate) fn record_between<T, E: From<VulkanError>>(
         &mut self,
         semaphores: Semaphores,
-        record: impl FnOnce(&mut Commands) -> Result<T>,
-    ) -> Result<T> {
+        record: impl FnOnce(&mut Commands) -> std::result::Result<T, E>,
+    ) -> std::result::Result<T, E> {
         let slot = &mut self.slots[self.next];
         self.device.wait_for(slot.finished_at)?;
         slot.begin(&self.device, &self.name)?;

@@ -2,6 +2,7 @@
 use super::deletion::Garbage;
 use super::device::Device;
 use super::error::{During, Result, VulkanError};
+use super::identity::Identity;
 use super::memory::Memory;
 use ash::vk;
 use std::sync::Arc;
@@ -48,6 +49,16 @@ impl ImageShape {
         }
     }
 
+    /// Bytes of a texel, of the formats whose texels go to buffers or come from there.
+    fn texel_bytes(&self) -> Option<u64> {
+        match self.format {
+            vk::Format::R8G8B8A8_UNORM | vk::Format::B8G8R8A8_UNORM => Some(4),
+            vk::Format::R32G32_UINT | vk::Format::R16G16B16A16_SFLOAT => Some(8),
+            vk::Format::R32G32B32A32_SFLOAT => Some(16),
+            _ => None,
+        }
+    }
+
     /// Colour or depth.
     pub(super) fn aspect(&self) -> vk::ImageAspectFlags {
         match self.format {
@@ -83,8 +94,10 @@ pub struct Image {
     pub(super) raw: vk::Image,
     pub(super) view: vk::ImageView,
     /// Size, format and kind.
-    pub shape: ImageShape,
+    pub(crate) shape: ImageShape,
+    usage: vk::ImageUsageFlags,
     name: String,
+    pub(super) identity: Identity,
     memory: Option<Arc<Memory>>,
     /// Whether it is destroyed with the swapchain that it is of, not by itself.
     of_swapchain: bool,
@@ -96,7 +109,12 @@ impl Image {
     ///
     /// # Errors
     /// A size or format that the driver refuses.
-    pub fn unbound(device: &Arc<Device>, name: &str, shape: ImageShape, usage: vk::ImageUsageFlags) -> Result<Self> {
+    pub(crate) fn unbound(
+        device: &Arc<Device>,
+        name: &str,
+        shape: ImageShape,
+        usage: vk::ImageUsageFlags,
+    ) -> Result<Self> {
         let [width, height, depth] = shape.extent;
         let (flags, kind) = match shape.kind {
             ImageKind::Plane => (vk::ImageCreateFlags::empty(), vk::ImageType::TYPE_2D),
@@ -117,20 +135,49 @@ impl Image {
         device.set_name(raw, name);
         let view = vk::ImageView::null();
         let (name, device) = (name.to_owned(), device.clone());
-        Ok(Self { raw, view, shape, name, memory: None, of_swapchain: false, device })
+        Ok(Self { raw, view, shape, usage, name, identity: Identity::new(), memory: None, of_swapchain: false, device })
     }
 
     /// An image that a swapchain owns, which has to outlive it.
     #[cfg(feature = "viewer")]
-    pub(super) fn of_swapchain(device: &Arc<Device>, name: &str, shape: ImageShape, raw: vk::Image) -> Result<Self> {
+    pub(super) fn of_swapchain(
+        device: &Arc<Device>,
+        name: &str,
+        shape: ImageShape,
+        usage: vk::ImageUsageFlags,
+        raw: vk::Image,
+    ) -> Result<Self> {
         let (view, memory, name, device) = (vk::ImageView::null(), None, name.to_owned(), device.clone());
-        let mut image = Self { raw, view, shape, name, memory, of_swapchain: true, device };
+        let identity = Identity::new();
+        let mut image = Self { raw, view, shape, usage, name, identity, memory, of_swapchain: true, device };
         image.make_view()?;
         Ok(image)
     }
 
+    /// Its debug name.
+    pub(super) fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// An error for an image that lacks some `needed` usage.
+    pub(super) fn check(&self, needed: vk::ImageUsageFlags) -> Result<()> {
+        if self.usage.contains(needed) {
+            return Ok(());
+        }
+        Err(VulkanError::unfit(&self.name, format!("it was not made to be used as {needed:?}")))
+    }
+
+    /// Bytes of `level` in a buffer, tightly packed.
+    pub(super) fn level_bytes(&self, level: u32) -> Result<u64> {
+        let unknown =
+            || VulkanError::unfit(&self.name, format!("it is of format {:?}, which is not copied", self.shape.format));
+        let vk::Extent3D { width, height, depth } = self.shape.extent_at(level);
+        let texels = u64::from(width) * u64::from(height) * u64::from(depth) * u64::from(self.shape.layers());
+        Ok(texels * self.shape.texel_bytes().ok_or_else(unknown)?)
+    }
+
     /// What memory it needs.
-    pub fn requirements(&self) -> vk::MemoryRequirements {
+    pub(crate) fn requirements(&self) -> vk::MemoryRequirements {
         // SAFETY: plain query of a live image.
         unsafe { self.device.raw.get_image_memory_requirements(self.raw) }
     }
@@ -139,10 +186,9 @@ impl Image {
     ///
     /// # Errors
     /// Memory that it has already, or that is not as it requires.
-    pub fn bind(&mut self, memory: &Arc<Memory>, offset: u64) -> Result<()> {
+    pub(crate) fn bind(&mut self, memory: &Arc<Memory>, offset: u64) -> Result<()> {
         if self.memory.is_some() {
-            let (object, cause) = (self.name.clone(), "it has memory already".to_owned());
-            return Err(VulkanError::Memory { object, cause });
+            return Err(VulkanError::unfit(&self.name, "it has memory already"));
         }
         let (raw_memory, offset) = memory.place(offset, self.requirements(), &self.name)?;
         // SAFETY: the image has no memory yet, and the range, which `memory` keeps alive, is as it requires.
@@ -187,6 +233,7 @@ pub enum SamplerKind {
 /// A sampler.
 pub struct Sampler {
     pub(super) raw: vk::Sampler,
+    pub(super) identity: Identity,
     device: Arc<Device>,
 }
 
@@ -212,7 +259,7 @@ impl Sampler {
         // SAFETY: plain creation; destroyed through the deletion queue.
         let raw = unsafe { device.raw.create_sampler(&info, None) }.during("vkCreateSampler", name)?;
         device.set_name(raw, name);
-        Ok(Self { raw, device: device.clone() })
+        Ok(Self { raw, identity: Identity::new(), device: device.clone() })
     }
 }
 

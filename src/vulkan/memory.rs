@@ -2,6 +2,7 @@
 use super::deletion::Garbage;
 use super::device::Device;
 use super::error::{During, Result, VulkanError};
+use super::identity::Identity;
 use ash::vk;
 use gpu_allocator::MemoryLocation;
 use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme};
@@ -22,7 +23,7 @@ impl Memory {
     ///
     /// # Errors
     /// No memory left.
-    pub fn new(
+    pub(crate) fn new(
         device: &Arc<Device>,
         name: &str,
         requirements: vk::MemoryRequirements,
@@ -56,7 +57,7 @@ impl Memory {
         needs: vk::MemoryRequirements,
         object: &str,
     ) -> Result<(vk::DeviceMemory, u64)> {
-        let refused = |cause: &str| VulkanError::Memory { object: object.to_owned(), cause: cause.to_owned() };
+        let refused = |problem: &str| VulkanError::unfit(object, problem);
         let allocation = self.allocation.as_ref().ok_or_else(|| refused("it was freed"))?;
         let end = offset.checked_add(needs.size);
         if end.is_none_or(|end| end > allocation.size()) || (allocation.offset() + offset) % needs.alignment.max(1) != 0
@@ -99,8 +100,9 @@ pub enum BufferUse {
 pub struct Buffer {
     pub(super) raw: vk::Buffer,
     size_bytes: u64,
-    pub(super) usage: vk::BufferUsageFlags,
-    pub(super) name: String,
+    usage: vk::BufferUsageFlags,
+    name: String,
+    pub(super) identity: Identity,
     // After `raw`, which `drop` queues first.
     memory: Option<Arc<Memory>>,
     device: Arc<Device>,
@@ -133,12 +135,18 @@ impl Buffer {
     ///
     /// # Errors
     /// A size of zero, or one that the driver refuses.
-    pub fn unbound(device: &Arc<Device>, name: &str, size_bytes: u64, usage: vk::BufferUsageFlags) -> Result<Self> {
+    pub(crate) fn unbound(
+        device: &Arc<Device>,
+        name: &str,
+        size_bytes: u64,
+        usage: vk::BufferUsageFlags,
+    ) -> Result<Self> {
         let info = vk::BufferCreateInfo::default().size(size_bytes).usage(usage);
         // SAFETY: plain creation; destroyed through the deletion queue.
         let raw = unsafe { device.raw.create_buffer(&info, None) }.during("vkCreateBuffer", name)?;
         device.set_name(raw, name);
-        Ok(Self { raw, size_bytes, usage, name: name.to_owned(), memory: None, device: device.clone() })
+        let (name, identity, device) = (name.to_owned(), Identity::new(), device.clone());
+        Ok(Self { raw, size_bytes, usage, name, identity, memory: None, device })
     }
 
     /// Its size in bytes.
@@ -146,8 +154,20 @@ impl Buffer {
         self.size_bytes
     }
 
+    /// An error for a buffer that lacks some `needed` usage, or the bytes before `end`.
+    pub(super) fn check(&self, needed: vk::BufferUsageFlags, end: u64) -> Result<()> {
+        if !self.usage.contains(needed) {
+            return Err(VulkanError::unfit(&self.name, format!("it was not made to be used as {needed:?}")));
+        }
+        if end > self.size_bytes {
+            let problem = format!("it has {} bytes, where {end} are needed", self.size_bytes);
+            return Err(VulkanError::unfit(&self.name, problem));
+        }
+        Ok(())
+    }
+
     /// What memory it needs.
-    pub fn requirements(&self) -> vk::MemoryRequirements {
+    pub(crate) fn requirements(&self) -> vk::MemoryRequirements {
         // SAFETY: plain query of a live buffer.
         unsafe { self.device.raw.get_buffer_memory_requirements(self.raw) }
     }
@@ -156,10 +176,9 @@ impl Buffer {
     ///
     /// # Errors
     /// Memory that it has already, or that is not as it requires.
-    pub fn bind(&mut self, memory: &Arc<Memory>, offset: u64) -> Result<()> {
+    pub(crate) fn bind(&mut self, memory: &Arc<Memory>, offset: u64) -> Result<()> {
         if self.memory.is_some() {
-            let (object, cause) = (self.name.clone(), "it has memory already".to_owned());
-            return Err(VulkanError::Memory { object, cause });
+            return Err(VulkanError::unfit(&self.name, "it has memory already"));
         }
         let (raw_memory, offset) = memory.place(offset, self.requirements(), &self.name)?;
         // SAFETY: the buffer has no memory yet, and the range, which `memory` keeps alive, is as it requires.

@@ -9,35 +9,42 @@
 //! ```text
 //! error, instance, surface     what was refused; loader, validation messages; windows
 //! physical_device, deletion    what there is to choose from; what waits for being destroyed
-//! device                       the chosen one: its queue and its submissions
-//! memory, image, shader        buffers; images and samplers; SPIR-V and what it declares (reflection)
-//! pipeline                     layouts from reflection, cache on disk
-//! commands, frames             one recorded pass after another; frames in flight, timestamps
-//! upload, swapchain, ui        contents of buffers and images; images of a window; what egui has laid out
+//! device, identity             the chosen one: its queue and its submissions; which object is which
+//! memory, image                buffers; images and samplers
+//! shader                       SPIR-V and what it declares (reflection)
+//! pipeline_cache, pipeline     compiled ones on disk; layouts from reflection
+//! commands, copies, frames     one recorded pass after another; frames in flight, timestamps
+//! upload, triangles, render    contents of buffers and images; meshes; drawing them
+//! swapchain, ui                images of a window; what egui has laid out
 //! ```
 
 mod commands;
+mod copies;
 mod deletion;
 mod device;
 mod error;
 mod frames;
 #[cfg(feature = "hot-reload")]
 pub mod hot_reload;
+mod identity;
 mod image;
 mod instance;
 mod memory;
 mod physical_device;
 mod pipeline;
+mod pipeline_cache;
+mod render;
 mod shader;
 #[cfg(feature = "viewer")]
 mod surface;
 #[cfg(feature = "viewer")]
 mod swapchain;
+mod triangles;
 #[cfg(feature = "viewer")]
 mod ui;
 mod upload;
 
-pub use commands::{Bindings, ColorTarget, Commands, DepthTarget, Groups};
+pub use commands::{Bound, Commands};
 pub use device::{Device, Semaphores};
 pub use error::VulkanError;
 pub use frames::{Frames, PassTime};
@@ -45,11 +52,18 @@ pub use image::{Image, ImageKind, ImageShape, Sampler, SamplerKind};
 pub use instance::{Instance, Messages};
 pub use memory::{Buffer, BufferUse, Memory};
 pub use physical_device::{DeviceDescription, DeviceKind, describe_devices};
-pub use pipeline::{ComputePipeline, GraphicsPipeline, GraphicsState, PipelineCache};
+pub use pipeline::{ComputePipeline, GraphicsPipeline};
+pub use pipeline_cache::PipelineCache;
 pub use shader::{Shader, ShaderStage, compiled};
 #[cfg(feature = "viewer")]
 pub use surface::{Surface, Window};
 #[cfg(feature = "viewer")]
 pub use swapchain::{AcquiredImage, PresentMode, Presented, Swapchain};
+pub use triangles::{Triangles, VertexAttribute};
 #[cfg(feature = "viewer")]
 pub use ui::{UiFrame, UiPainter};
+
+pub(crate) use commands::Groups;
+pub(crate) use pipeline::GraphicsState;
+pub(crate) use render::{ColorTarget, DepthTarget};
+pub(crate) use shader::{Binding, BindingAccess};

@@ -126,7 +126,7 @@ impl Swapchain {
     ///
     /// # Errors
     /// A lost device, no memory left, a window that is gone.
-    pub fn turn(&mut self, frames: &Frames, size: [u32; 2]) -> Result<Option<AcquiredImage>> {
+    pub(crate) fn turn(&mut self, frames: &Frames, size: [u32; 2]) -> Result<Option<AcquiredImage>> {
         // A surface may change again while its images are made; one that always does is not to hang the program.
         const ATTEMPTS: usize = 8;
         // Window systems that give no images back for hidden windows must not make the program hang.
@@ -162,7 +162,7 @@ impl Swapchain {
     ///
     /// # Errors
     /// A lost device.
-    pub fn present(&mut self, turn: AcquiredImage) -> Result<Presented> {
+    pub(crate) fn present(&mut self, turn: AcquiredImage) -> Result<Presented> {
         let Some(current) = &mut self.current else { return Ok(Presented::Again) };
         let wait: Vec<_> = turn.semaphores.signal.into_iter().collect();
         let (swapchains, indices) = ([current.raw], [turn.index]);
@@ -219,6 +219,7 @@ impl Swapchain {
         // One more than the least, so that drawing does not wait for the window system to give one back.
         let most = if capabilities.max_image_count == 0 { u32::MAX } else { capabilities.max_image_count };
         let old = self.current.take();
+        let usage = Self::USAGE & capabilities.supported_usage_flags;
         let opaque = vk::CompositeAlphaFlagsKHR::OPAQUE;
         let composite = if capabilities.supported_composite_alpha.contains(opaque) {
             opaque
@@ -232,7 +233,7 @@ impl Swapchain {
             .image_color_space(vk::ColorSpaceKHR::SRGB_NONLINEAR)
             .image_extent(extent)
             .image_array_layers(1)
-            .image_usage(Self::USAGE & capabilities.supported_usage_flags)
+            .image_usage(usage)
             .pre_transform(capabilities.current_transform)
             .composite_alpha(composite)
             .present_mode(self.mode.raw())
@@ -251,7 +252,7 @@ impl Swapchain {
         let mut current = Current { raw, images: Vec::new(), drawn: Vec::new(), stale: false };
         let filled = images.during("vkGetSwapchainImagesKHR", "window").and_then(|images| {
             for image in images {
-                current.images.push(Arc::new(Image::of_swapchain(&self.device, "window", shape, image)?));
+                current.images.push(Arc::new(Image::of_swapchain(&self.device, "window", shape, usage, image)?));
                 current.drawn.push(semaphore(&self.device, "image is drawn")?);
             }
             Ok(())

@@ -99,7 +99,8 @@ impl Commands {
     ///
     /// # Errors
     /// No memory left for triangles.
-    pub fn draw_ui(&mut self, painter: &UiPainter, frame: &UiFrame, target: &Image) -> Result<()> {
+    pub(crate) fn draw_ui(&mut self, painter: &UiPainter, frame: &UiFrame, target: &Image) -> Result<()> {
+        target.check(vk::ImageUsageFlags::COLOR_ATTACHMENT)?;
         let [width, height, _] = target.shape.extent;
         let extent = vk::Extent2D { width, height };
         let colors = [vk::RenderingAttachmentInfo::default()

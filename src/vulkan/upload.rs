@@ -30,10 +30,7 @@ impl Buffer {
         let usage = usage | vk::BufferUsageFlags::TRANSFER_DST;
         let buffer = Self::new(device, name, contents.len() as u64, usage, BufferUse::Device)?;
         let staging = staging(device, name, contents)?;
-        submit_and_wait(device, |commands| {
-            commands.copy_buffer(&staging, &buffer);
-            Ok(())
-        })?;
+        submit_and_wait(device, |commands| commands.copy_buffer(&staging, &buffer))?;
         Ok(buffer)
     }
 }
@@ -42,17 +39,14 @@ impl Image {
     /// An image that holds `levels` (texels of each level, layer by layer), ready to be sampled by any shader.
     ///
     /// # Errors
-    /// No memory left, or a failing submission.
+    /// No memory left, a failing submission, or levels of other sizes than `shape` says.
     pub fn with_texels(device: &Arc<Device>, name: &str, shape: ImageShape, levels: &[Vec<u8>]) -> Result<Self> {
         let usage = vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_DST;
         let mut image = Self::unbound(device, name, shape, usage)?;
         let memory = Memory::allocate(device, name, image.requirements(), MemoryLocation::GpuOnly, false)?;
         image.bind(&Arc::new(memory), 0)?;
         let staging: Vec<_> = levels.iter().map(|texels| staging(device, name, texels)).collect::<Result<_>>()?;
-        submit_and_wait(device, |commands| {
-            commands.upload_image(&image, &staging);
-            Ok(())
-        })?;
+        submit_and_wait(device, |commands| commands.upload_image(&image, &staging))?;
         Ok(image)
     }
 }
@@ -73,7 +67,13 @@ fn staging(device: &Arc<Device>, name: &str, contents: &[u8]) -> Result<Buffer> 
 
 impl Commands {
     /// Fills every level of a new image and leaves it ready to be sampled.
-    fn upload_image(&mut self, image: &Image, levels: &[Buffer]) {
+    fn upload_image(&mut self, image: &Image, levels: &[Buffer]) -> Result<()> {
+        image.check(vk::ImageUsageFlags::TRANSFER_DST | vk::ImageUsageFlags::SAMPLED)?;
+        let is_of_size = |(level, texels): (u32, &Buffer)| Ok(image.level_bytes(level)? == texels.size_bytes());
+        let fitting = (0..).zip(levels).map(is_of_size).collect::<Result<Vec<_>>>()?;
+        if fitting.len() != image.shape.levels as usize || fitting.contains(&false) {
+            return Err(VulkanError::unfit(image.name(), "its texels are not as many as it has"));
+        }
         let to_transfer = vk::ImageMemoryBarrier2::default()
             .image(image.raw)
             .subresource_range(image.shape.whole())
@@ -86,7 +86,7 @@ impl Commands {
                 .image_subresource(image.shape.level(level))
                 .image_extent(image.shape.extent_at(level))];
             let layout = vk::ImageLayout::TRANSFER_DST_OPTIMAL;
-            // SAFETY: both are alive; the staging buffer holds this level.
+            // SAFETY: both are alive until the caller has waited; the buffer was found to be as large as the level.
             unsafe { self.device.raw.cmd_copy_buffer_to_image(self.raw, texels.raw, image.raw, layout, &region) };
         }
         let to_shaders = vk::ImageMemoryBarrier2::default()
@@ -99,5 +99,6 @@ impl Commands {
             .old_layout(vk::ImageLayout::TRANSFER_DST_OPTIMAL)
             .new_layout(vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL);
         self.barriers(&[to_shaders], &[], &[]);
+        Ok(())
     }
 }
