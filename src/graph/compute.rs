@@ -66,12 +66,12 @@ impl<'a> ComputePass<'_, 'a> {
     /// The shader replaces all contents of `handle`, its binding `name`; earlier ones are lost. `handle` becomes the new version.
     pub fn write<H: Versioned>(mut self, name: &'a str, handle: &mut H) -> Self {
         if let Some(binding) = self.give(name, Given::Resource((*handle).into())) {
-            match write_problem(binding).or_else(|| {
-                let reads = binding.access == BindingAccess::ReadWrite;
-                reads.then_some("the shader may read it too; declare a modify, or make it `writeonly`")
-            }) {
-                None => *handle = self.pass.write(*handle, Access::StorageWriteCompute),
-                Some(problem) => self.refuse(name, problem),
+            match binding.access {
+                BindingAccess::WriteOnly => *handle = self.pass.write(*handle, Access::StorageWriteCompute),
+                BindingAccess::ReadOnly => self.refuse(name, ONLY_READ),
+                BindingAccess::ReadWrite => {
+                    self.refuse(name, "the shader may read it; declare a modify, or make it `writeonly`")
+                }
             }
         }
         self
@@ -81,9 +81,9 @@ impl<'a> ComputePass<'_, 'a> {
     /// `handle` becomes the new version.
     pub fn modify<H: Versioned>(mut self, name: &'a str, handle: &mut H) -> Self {
         if let Some(binding) = self.give(name, Given::Resource((*handle).into())) {
-            match write_problem(binding) {
-                None => *handle = self.pass.modify(*handle, Access::StorageWriteCompute),
-                Some(problem) => self.refuse(name, problem),
+            match binding.access {
+                BindingAccess::ReadOnly => self.refuse(name, ONLY_READ),
+                _ => *handle = self.pass.modify(*handle, Access::StorageWriteCompute),
             }
         }
         self
@@ -93,10 +93,9 @@ impl<'a> ComputePass<'_, 'a> {
     pub fn bind(mut self, name: &'a str, outside: impl Into<Bound<'a>>) -> Self {
         let outside = outside.into();
         self.pass.depends_on(&outside.identity());
-        if let Some(binding) = self.give(name, Given::Outside(outside)) {
-            if binding.access != BindingAccess::ReadOnly {
-                self.refuse(name, "the shader may write it, and only resources of the graph are written");
-            }
+        let binding = self.give(name, Given::Outside(outside));
+        if binding.is_some_and(|binding| binding.access != BindingAccess::ReadOnly) {
+            self.refuse(name, "the shader may write it, and only resources of the graph are written");
         }
         self
     }
@@ -200,6 +199,8 @@ impl<'a> ComputePass<'_, 'a> {
     }
 }
 
+const ONLY_READ: &str = "the shader only reads it; declare a read";
+
 /// How the shader reads a binding of the graph, or why it does not just do that.
 fn read_access(binding: Binding) -> std::result::Result<Access, &'static str> {
     match (binding.access, binding.kind) {
@@ -210,11 +211,6 @@ fn read_access(binding: Binding) -> std::result::Result<Access, &'static str> {
         (_, DescriptorType::COMBINED_IMAGE_SAMPLER) => Err("the shader wants a sampler with it; make it a texture"),
         _ => Ok(Access::StorageReadCompute),
     }
-}
-
-/// Why the shader does not write a binding.
-fn write_problem(binding: Binding) -> Option<&'static str> {
-    (binding.access == BindingAccess::ReadOnly).then_some("the shader only reads it; declare a read")
 }
 
 fn dispatch(
@@ -240,8 +236,9 @@ fn dispatch(
         Count::Direct(counts) => Groups::Direct(counts),
         Count::Indirect(arguments, offset) => Groups::Indirect(resources.buffer(arguments)?, offset),
     };
-    Ok(match push {
+    match push {
         Push::Known(bytes) => commands.dispatch(pipeline, &bindings, bytes, groups)?,
         Push::Later(bytes) => commands.dispatch(pipeline, &bindings, &bytes(), groups)?,
-    })
+    }
+    Ok(())
 }

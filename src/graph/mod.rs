@@ -30,6 +30,8 @@ mod plan;
 mod raster;
 mod resource;
 mod store;
+#[cfg(test)]
+mod tests;
 mod text;
 mod validate;
 mod work;

@@ -60,7 +60,8 @@ impl Memory {
         let refused = |problem: &str| VulkanError::unfit(object, problem);
         let allocation = self.allocation.as_ref().ok_or_else(|| refused("it was freed"))?;
         let end = offset.checked_add(needs.size);
-        if end.is_none_or(|end| end > allocation.size()) || (allocation.offset() + offset) % needs.alignment.max(1) != 0
+        if end.is_none_or(|end| end > allocation.size())
+            || !(allocation.offset() + offset).is_multiple_of(needs.alignment.max(1))
         {
             return Err(refused("it does not fit where it was placed"));
         }

@@ -207,6 +207,38 @@ mod tests {
     }
 
     #[test]
+    fn access_and_size_of_workgroups_are_those_of_the_glsl() {
+        use BindingAccess::{ReadOnly, ReadWrite, WriteOnly};
+        let shade = compiled::SHADE_FITTED.reflect().unwrap();
+        for (name, access) in [
+            ("geometry", ReadOnly),
+            ("counters", ReadOnly),
+            ("Materials", ReadOnly),
+            ("environment_pyramid", ReadOnly),
+            ("radiance", WriteOnly),
+            ("all_lookups", ReadWrite),
+        ] {
+            assert_eq!(shade.bindings[name].access, access, "{name}");
+        }
+        assert_eq!(shade.group_size, [64, 1, 1]);
+        let classify = compiled::CLASSIFY.reflect().unwrap();
+        assert_eq!((classify.bindings["tile_list"].access, classify.group_size), (WriteOnly, [8, 8, 1]));
+        assert_eq!(compiled::BACKGROUND.reflect().unwrap().bindings["radiance"].access, ReadWrite);
+    }
+
+    #[test]
+    fn a_size_of_workgroups_that_is_specialised_is_seen() {
+        // Header, then OpDecorate of 7 as BuiltIn WorkgroupSize, then 7 as OpSpecConstantComposite or OpConstantComposite.
+        let words =
+            |composite: u32| [&[0; 5][..], &[4 << 16 | 71, 7, 11, 25], &[6 << 16 | composite, 1, 7, 2, 3, 4]].concat();
+        for (composite, specialised) in [(51, true), (44, false)] {
+            let spirv = words(composite).iter().flat_map(|word: &u32| word.to_le_bytes()).collect::<Vec<_>>().leak();
+            let shader = Shader { spirv, name: "made up", ..compiled::TONE_MAP };
+            assert_eq!(shader.specialises_group_size(), specialised);
+        }
+    }
+
+    #[test]
     fn two_resources_on_one_binding_are_refused() {
         // Moves every binding of a shader to 0: OpDecorate (71, four words) with the decoration Binding (33).
         let mut words = compiled::TONE_MAP.words();
