@@ -40,12 +40,14 @@ pub use access::{Access, AccessInfo, Mode, is_depth};
 pub use compute::ComputePass;
 pub use declare::{Graph, PassBuilder};
 pub use error::GraphError;
-pub use execute::Executable;
 pub use kept::Kept;
 pub use plan::{
     Barrier, Block, Lifetime, MemoryRequirement, Placement, Plan, PlannedPass, PlannedResource, PlannedUse,
 };
 pub use raster::RasterPass;
 pub use resource::{BufferDesc, BufferHandle, Handle, ImageDesc, ImageHandle, ResourceInfo, ResourceKind, Versioned};
-pub use store::Store;
 pub use work::{DeviceResource, FrameGraph, Resources, Work};
+
+pub(crate) use execute::Executable;
+#[cfg(feature = "viewer")]
+pub(crate) use store::Store;

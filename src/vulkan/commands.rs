@@ -144,7 +144,7 @@ impl Commands {
                 }
             }
             Groups::Indirect(buffer, offset) => {
-                buffer.check(vk::BufferUsageFlags::INDIRECT_BUFFER, offset.saturating_add(12))?;
+                buffer.check(&self.device, vk::BufferUsageFlags::INDIRECT_BUFFER, offset.saturating_add(12))?;
                 if offset % 4 != 0 {
                     return Err(pipeline.0.refuse(format!("arguments at byte {offset}, which is no multiple of 4")));
                 }
@@ -212,7 +212,8 @@ impl Commands {
         point: vk::PipelineBindPoint,
         bindings: &[(&str, Bound)],
     ) -> Result<()> {
-        // SAFETY: the pipeline is alive.
+        self.device.check_same(&pipeline.device, pipeline.name)?;
+        // SAFETY: the pipeline is alive, and of this device.
         unsafe { self.device.raw.cmd_bind_pipeline(self.raw, point, pipeline.raw) };
         if let Some((name, _)) = bindings.iter().find(|(name, _)| !pipeline.bindings.contains_key(*name)) {
             return Err(pipeline.refuse(format!("it declares no binding {name}")));
@@ -248,11 +249,11 @@ impl Commands {
         let write =
             vk::WriteDescriptorSet::default().dst_set(set).dst_binding(declared.index).descriptor_type(declared.kind);
         let of_buffer = |buffer: &Buffer, usage| {
-            buffer.check(usage, 0)?;
+            buffer.check(&self.device, usage, 0)?;
             Ok([vk::DescriptorBufferInfo::default().buffer(buffer.raw).range(vk::WHOLE_SIZE)])
         };
         let of_image = |image: &Image, usage, layout| {
-            image.check(usage)?;
+            image.check(&self.device, usage)?;
             Ok(vk::DescriptorImageInfo::default().image_view(image.view).image_layout(layout))
         };
         let (buffers, images);
@@ -274,6 +275,7 @@ impl Commands {
                 write.image_info(&images)
             }
             (Bound::Sampled(image, sampler), D::COMBINED_IMAGE_SAMPLER) => {
+                self.device.check_same(&sampler.device, name)?;
                 images = [of_image(image, I::SAMPLED, L::SHADER_READ_ONLY_OPTIMAL)?.sampler(sampler.raw)];
                 write.image_info(&images)
             }

@@ -11,7 +11,7 @@ const TARGET: vk::ImageLayout = vk::ImageLayout::TRANSFER_DST_OPTIMAL;
 impl Commands {
     /// Sets a whole buffer to zero.
     pub(crate) fn clear_buffer(&mut self, buffer: &Buffer) -> Result<()> {
-        buffer.check(BufferUsageFlags::TRANSFER_DST, 0)?;
+        buffer.check(&self.device, BufferUsageFlags::TRANSFER_DST, 0)?;
         // SAFETY: the buffer is alive and made to be filled.
         unsafe { self.device.raw.cmd_fill_buffer(self.raw, buffer.raw, 0, vk::WHOLE_SIZE, 0) };
         Ok(())
@@ -19,8 +19,8 @@ impl Commands {
 
     /// Copies all of `source` to the start of `target`, as far as it has room.
     pub(crate) fn copy_buffer(&mut self, source: &Buffer, target: &Buffer) -> Result<()> {
-        source.check(BufferUsageFlags::TRANSFER_SRC, 0)?;
-        target.check(BufferUsageFlags::TRANSFER_DST, 0)?;
+        source.check(&self.device, BufferUsageFlags::TRANSFER_SRC, 0)?;
+        target.check(&self.device, BufferUsageFlags::TRANSFER_DST, 0)?;
         let region = [vk::BufferCopy::default().size(source.size_bytes().min(target.size_bytes()))];
         // SAFETY: both are alive, made to be copied from and to, and large enough.
         unsafe { self.device.raw.cmd_copy_buffer(self.raw, source.raw, target.raw, &region) };
@@ -30,8 +30,8 @@ impl Commands {
     /// Scales level 0 of `source` to `area` (left, top, width, height) of `target`, bilinearly where their sizes differ; formats
     /// are converted. Of what lies outside of the target nothing is drawn.
     pub(crate) fn blit(&mut self, source: &Image, target: &Image, area: [u32; 4]) -> Result<()> {
-        source.check(ImageUsageFlags::TRANSFER_SRC)?;
-        target.check(ImageUsageFlags::TRANSFER_DST)?;
+        source.check(&self.device, ImageUsageFlags::TRANSFER_SRC)?;
+        target.check(&self.device, ImageUsageFlags::TRANSFER_DST)?;
         let [left, top, width, height] = area;
         let [target_width, target_height, _] = target.shape.extent;
         let [source_width, source_height, _] = source.shape.extent;
@@ -61,7 +61,7 @@ impl Commands {
 
     /// Fills level 0 of `image` with a colour.
     pub(crate) fn clear_image(&mut self, image: &Image, color: [f32; 4]) -> Result<()> {
-        image.check(ImageUsageFlags::TRANSFER_DST)?;
+        image.check(&self.device, ImageUsageFlags::TRANSFER_DST)?;
         if image.shape.aspect() != vk::ImageAspectFlags::COLOR {
             return Err(VulkanError::unfit(image.name(), "it has depth, no colour"));
         }
@@ -73,8 +73,8 @@ impl Commands {
 
     /// Copies level 0 of `source` into `target`, tightly packed.
     pub(crate) fn copy_image_to_buffer(&mut self, source: &Image, target: &Buffer) -> Result<()> {
-        source.check(ImageUsageFlags::TRANSFER_SRC)?;
-        target.check(BufferUsageFlags::TRANSFER_DST, source.level_bytes(0)?)?;
+        source.check(&self.device, ImageUsageFlags::TRANSFER_SRC)?;
+        target.check(&self.device, BufferUsageFlags::TRANSFER_DST, source.level_bytes(0)?)?;
         let region = [vk::BufferImageCopy::default()
             .image_subresource(source.shape.level(0))
             .image_extent(source.shape.extent_at(0))];

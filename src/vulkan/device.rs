@@ -69,6 +69,7 @@ impl Device {
     /// No driver, no device of that name, or one that lacks what the renderer needs or cannot present to that window.
     #[cfg(feature = "viewer")]
     pub fn for_surface(instance: &Arc<Instance>, asked: Option<&str>, surface: &Surface) -> Result<Arc<Self>> {
+        surface.check_instance(instance)?;
         let mut candidates = candidates(instance)?;
         for candidate in &mut candidates {
             if !candidate.extensions.contains(&khr::swapchain::NAME) {
@@ -170,6 +171,11 @@ impl Device {
     /// stand between: a full-screen dispatch of 20 ms was seen to take 0.02 ms by them.
     pub fn times_passes(&self) -> bool {
         self.timestamp_valid_bits > 0 && !self.is_lavapipe
+    }
+
+    /// An error for the object `name` of `other`, if that is another device than this.
+    pub(super) fn check_same(&self, other: &Self, name: &str) -> Result<()> {
+        if std::ptr::eq(self, other) { Ok(()) } else { Err(VulkanError::unfit(name, "it is of another device")) }
     }
 
     /// Limits, as the driver states them.

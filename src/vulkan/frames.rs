@@ -67,10 +67,11 @@ impl Frames {
         slot.begin(&self.device, &self.name)?;
         let mut commands = Commands::new(&self.device, slot.commands, slot.descriptor_pool, slot.queries);
         let result = record(&mut commands)?;
-        slot.timed = commands.into_timed_passes();
+        let timed = commands.into_timed_passes();
         // SAFETY: the command buffer is in the recording state.
         unsafe { self.device.raw.end_command_buffer(slot.commands) }.during("vkEndCommandBuffer", &self.name)?;
         slot.finished_at = self.device.submit(slot.commands, &self.name, semaphores)?;
+        slot.timed = timed;
         self.next = (self.next + 1) % self.slots.len();
         Ok(result)
     }
@@ -115,7 +116,7 @@ impl Frames {
         let Some(queries) = slot.queries.filter(|_| !slot.timed.is_empty()) else { return Ok(Vec::new()) };
         let mut ticks = vec![0_u64; 2 * slot.timed.len()];
         let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;
-        // SAFETY: both timestamps of every timed pass were written by the frame that was waited for.
+        // SAFETY: the frame that was submitted last writes both timestamps of every timed pass; this waits for them.
         unsafe { self.device.raw.get_query_pool_results(queries, 0, &mut ticks, flags) }
             .during("vkGetQueryPoolResults", &self.name)?;
         // Timestamps count modulo the valid bits of the queue.

@@ -159,8 +159,9 @@ impl Image {
         &self.name
     }
 
-    /// An error for an image that lacks some `needed` usage.
-    pub(super) fn check(&self, needed: vk::ImageUsageFlags) -> Result<()> {
+    /// An error for an image that is not of `device`, or lacks some `needed` usage.
+    pub(super) fn check(&self, device: &Device, needed: vk::ImageUsageFlags) -> Result<()> {
+        device.check_same(&self.device, &self.name)?;
         if self.usage.contains(needed) {
             return Ok(());
         }
@@ -234,7 +235,7 @@ pub enum SamplerKind {
 pub struct Sampler {
     pub(super) raw: vk::Sampler,
     pub(super) identity: Identity,
-    device: Arc<Device>,
+    pub(super) device: Arc<Device>,
 }
 
 impl Sampler {

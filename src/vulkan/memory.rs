@@ -155,8 +155,9 @@ impl Buffer {
         self.size_bytes
     }
 
-    /// An error for a buffer that lacks some `needed` usage, or the bytes before `end`.
-    pub(super) fn check(&self, needed: vk::BufferUsageFlags, end: u64) -> Result<()> {
+    /// An error for a buffer that is not of `device`, lacks some `needed` usage, or the bytes before `end`.
+    pub(super) fn check(&self, device: &Device, needed: vk::BufferUsageFlags, end: u64) -> Result<()> {
+        device.check_same(&self.device, &self.name)?;
         if !self.usage.contains(needed) {
             return Err(VulkanError::unfit(&self.name, format!("it was not made to be used as {needed:?}")));
         }

@@ -19,7 +19,7 @@ pub(super) struct Pipeline {
     pub stages: vk::ShaderStageFlags,
     pub name: &'static str,
     pub identity: Identity,
-    device: Arc<Device>,
+    pub device: Arc<Device>,
 }
 
 impl Pipeline {
@@ -132,6 +132,7 @@ impl ComputePipeline {
         constants: &[(&str, u32)],
     ) -> Result<Self> {
         check_stage(shader, ShaderStage::Compute)?;
+        device.check_same(&cache.device, "pipeline cache")?;
         let interface = shader.reflect()?;
         let mut pipeline = Pipeline::new(device, shader.name, &[(shader, &interface)])?;
         let module = Module::new(device, shader)?;
@@ -211,6 +212,7 @@ impl GraphicsPipeline {
         fragment: &Shader,
         state: &GraphicsState,
     ) -> Result<Self> {
+        device.check_same(&cache.device, "pipeline cache")?;
         check_stage(vertex, ShaderStage::Vertex)?;
         check_stage(fragment, ShaderStage::Fragment)?;
         let interfaces = [vertex.reflect()?, fragment.reflect()?];

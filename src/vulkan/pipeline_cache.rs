@@ -7,11 +7,12 @@ use std::sync::Arc;
 
 /// The driver's cache of compiled pipelines, kept in a file.
 ///
-/// A missing, foreign or damaged file is only a slower start: drivers check the header of what they are given.
+/// A missing, foreign or damaged file is only a slower start. Drivers check the header of what they are given and trust the
+/// rest, so the file begins with a hash of it.
 pub struct PipelineCache {
     pub(super) raw: vk::PipelineCache,
     file: Option<PathBuf>,
-    device: Arc<Device>,
+    pub(super) device: Arc<Device>,
 }
 
 impl PipelineCache {
@@ -22,9 +23,9 @@ impl PipelineCache {
     pub fn new(device: &Arc<Device>, folder: Option<&Path>) -> Result<Self> {
         let uuid: String = device.properties.pipeline_cache_uuid.iter().map(|byte| format!("{byte:02x}")).collect();
         let file = folder.map(|folder| folder.join(format!("pipelines-{uuid}.bin")));
-        let contents = file.as_deref().and_then(|file| std::fs::read(file).ok()).unwrap_or_default();
+        let contents = file.as_deref().and_then(|file| unwrapped(std::fs::read(file).ok()?)).unwrap_or_default();
         let info = vk::PipelineCacheCreateInfo::default().initial_data(&contents);
-        // SAFETY: `contents` outlives the call; the driver validates it.
+        // SAFETY: `contents` outlives the call; it is what a driver has made, whose header tells this one whether it is its own.
         let raw = unsafe { device.raw.create_pipeline_cache(&info, None) }
             .during("vkCreatePipelineCache", "pipeline cache")?;
         Ok(Self { raw, file, device: device.clone() })
@@ -38,6 +39,7 @@ impl PipelineCache {
             Ok(contents) => contents,
             Err(result) => return tracing::warn!("vkGetPipelineCacheData failed: {result}"),
         };
+        let contents = [&blake3::hash(&contents).as_bytes()[..], &contents].concat();
         if std::fs::read(file).is_ok_and(|old| old == contents) {
             return;
         }
@@ -54,5 +56,29 @@ impl Drop for PipelineCache {
         self.save();
         // SAFETY: pipelines do not need their cache after creation, and this one is destroyed once.
         unsafe { self.device.raw.destroy_pipeline_cache(self.raw, None) };
+    }
+}
+
+/// What was written, without its hash; none if it was not written whole.
+fn unwrapped(file: Vec<u8>) -> Option<Vec<u8>> {
+    let (hash, contents) = file.split_at_checked(blake3::OUT_LEN)?;
+    (blake3::hash(contents).as_bytes()[..] == *hash).then(|| contents.to_vec())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_damaged_file_is_as_good_as_none() {
+        let contents = b"compiled".to_vec();
+        let file = [&blake3::hash(&contents).as_bytes()[..], &contents].concat();
+        assert_eq!(unwrapped(file.clone()), Some(contents));
+        for at in 0..file.len() {
+            let mut damaged = file.clone();
+            damaged[at] ^= 1;
+            assert_eq!(unwrapped(damaged), None);
+            assert_eq!(unwrapped(file[..at].to_vec()), None);
+        }
     }
 }

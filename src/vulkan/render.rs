@@ -34,7 +34,7 @@ impl Commands {
         depth: &DepthTarget,
         draws: impl Iterator<Item = (&'d Triangles, &'d [u8])>,
     ) -> Result<()> {
-        check_targets(pipeline, color.image, depth.image)?;
+        self.check_targets(pipeline, color.image, depth.image)?;
         let [width, height, _] = color.image.shape.extent;
         let area = vk::Rect2D { offset: vk::Offset2D::default(), extent: vk::Extent2D { width, height } };
         let colors = [vk::RenderingAttachmentInfo::default()
@@ -76,6 +76,7 @@ impl Commands {
     ) -> Result<()> {
         self.bind(&pipeline.layouts, vk::PipelineBindPoint::GRAPHICS, &[])?;
         for (triangles, push_constants) in draws {
+            self.device.check_same(triangles.device(), "mesh")?;
             if triangles.strides != pipeline.strides {
                 return Err(pipeline.layouts.refuse("the mesh has other attributes than the vertex shader"));
             }
@@ -91,17 +92,17 @@ impl Commands {
         }
         Ok(())
     }
-}
 
-/// An error where `pipeline` cannot draw into these.
-fn check_targets(pipeline: &GraphicsPipeline, color: &Image, depth: &Image) -> Result<()> {
-    color.check(vk::ImageUsageFlags::COLOR_ATTACHMENT)?;
-    depth.check(vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT)?;
-    if pipeline.colors != [color.shape.format] || pipeline.depth != depth.shape.format {
-        return Err(pipeline.layouts.refuse("it draws into targets of other formats"));
+    /// An error where `pipeline` cannot draw into these.
+    fn check_targets(&self, pipeline: &GraphicsPipeline, color: &Image, depth: &Image) -> Result<()> {
+        color.check(&self.device, vk::ImageUsageFlags::COLOR_ATTACHMENT)?;
+        depth.check(&self.device, vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT)?;
+        if pipeline.colors != [color.shape.format] || pipeline.depth != depth.shape.format {
+            return Err(pipeline.layouts.refuse("it draws into targets of other formats"));
+        }
+        if color.shape.extent != depth.shape.extent {
+            return Err(VulkanError::unfit(depth.name(), "it is not of the size of what is drawn with it"));
+        }
+        Ok(())
     }
-    if color.shape.extent != depth.shape.extent {
-        return Err(VulkanError::unfit(depth.name(), "it is not of the size of what is drawn with it"));
-    }
-    Ok(())
 }

@@ -100,6 +100,7 @@ impl Swapchain {
     /// # Errors
     /// A device that cannot present, or no memory left.
     pub fn new(device: &Arc<Device>, surface: Surface, mode: PresentMode, frames: usize) -> Result<Self> {
+        surface.check_instance(&device.instance)?;
         let functions = device.swapchain.clone().ok_or_else(|| VulkanError::Unsuitable {
             device: device.description().name.clone(),
             feature: "VK_KHR_swapchain".to_owned(),
@@ -276,7 +277,7 @@ impl Swapchain {
 
     fn capabilities(&self) -> Result<vk::SurfaceCapabilitiesKHR> {
         let Surface { raw, functions, .. } = &self.surface;
-        // SAFETY: the device is of the surface's instance.
+        // SAFETY: the device is of the surface's instance, as was checked when this was made.
         unsafe { functions.get_physical_device_surface_capabilities(self.device.physical, *raw) }
             .during("vkGetPhysicalDeviceSurfaceCapabilitiesKHR", "window")
     }
@@ -284,7 +285,7 @@ impl Swapchain {
     /// An error where the window cannot be given display values as they are.
     fn check_format(&self) -> Result<()> {
         let Surface { raw, functions, .. } = &self.surface;
-        // SAFETY: the device is of the surface's instance.
+        // SAFETY: the device is of the surface's instance, as was checked when this was made.
         let formats = unsafe { functions.get_physical_device_surface_formats(self.device.physical, *raw) }
             .during("vkGetPhysicalDeviceSurfaceFormatsKHR", "window")?;
         if formats.iter().any(|format| format.format == Self::FORMAT) {
@@ -299,7 +300,7 @@ impl Swapchain {
     /// `wanted` where the device has it for this window, else the one that every device has.
     fn available(&self, wanted: PresentMode) -> Result<PresentMode> {
         let Surface { raw, functions, .. } = &self.surface;
-        // SAFETY: the device is of the surface's instance.
+        // SAFETY: the device is of the surface's instance, as was checked when this was made.
         let modes = unsafe { functions.get_physical_device_surface_present_modes(self.device.physical, *raw) }
             .during("vkGetPhysicalDeviceSurfacePresentModesKHR", "window")?;
         if modes.contains(&wanted.raw()) {

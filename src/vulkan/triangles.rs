@@ -24,6 +24,7 @@ pub struct Triangles {
     pub(super) indices: Buffer,
     pub(super) index_count: u32,
     identity: Identity,
+    device: Arc<Device>,
 }
 
 impl Triangles {
@@ -47,7 +48,13 @@ impl Triangles {
             indices: upload("indices", index, bytemuck::cast_slice(indices))?,
             index_count: indices.len() as u32,
             identity: Identity::new(),
+            device: device.clone(),
         })
+    }
+
+    /// The device that they are on.
+    pub(super) fn device(&self) -> &Device {
+        &self.device
     }
 
     /// Which triangles these are.

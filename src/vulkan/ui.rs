@@ -100,7 +100,8 @@ impl Commands {
     /// # Errors
     /// No memory left for triangles.
     pub(crate) fn draw_ui(&mut self, painter: &UiPainter, frame: &UiFrame, target: &Image) -> Result<()> {
-        target.check(vk::ImageUsageFlags::COLOR_ATTACHMENT)?;
+        target.check(&self.device, vk::ImageUsageFlags::COLOR_ATTACHMENT)?;
+        self.device.check_same(&painter.device, "panel")?;
         let [width, height, _] = target.shape.extent;
         let extent = vk::Extent2D { width, height };
         let colors = [vk::RenderingAttachmentInfo::default()

@@ -68,7 +68,7 @@ fn staging(device: &Arc<Device>, name: &str, contents: &[u8]) -> Result<Buffer> 
 impl Commands {
     /// Fills every level of a new image and leaves it ready to be sampled.
     fn upload_image(&mut self, image: &Image, levels: &[Buffer]) -> Result<()> {
-        image.check(vk::ImageUsageFlags::TRANSFER_DST | vk::ImageUsageFlags::SAMPLED)?;
+        image.check(&self.device, vk::ImageUsageFlags::TRANSFER_DST | vk::ImageUsageFlags::SAMPLED)?;
         let is_of_size = |(level, texels): (u32, &Buffer)| Ok(image.level_bytes(level)? == texels.size_bytes());
         let fitting = (0..).zip(levels).map(is_of_size).collect::<Result<Vec<_>>>()?;
         if fitting.len() != image.shape.levels as usize || fitting.contains(&false) {
