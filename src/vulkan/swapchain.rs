@@ -217,10 +217,38 @@ impl Swapchain {
             return Ok(false);
         }
         self.check_format()?;
+        let usage = Self::USAGE & capabilities.supported_usage_flags;
+        let raw = self.create(&capabilities, extent, usage)?;
+        // SAFETY: plain query of the swapchain just made.
+        let images = unsafe { self.functions.get_swapchain_images(raw) };
+        let shape = ImageShape::plane(Self::FORMAT, extent.width, extent.height);
+        let mut current = Current { raw, images: Vec::new(), drawn: Vec::new(), stale: false };
+        let filled = images.during("vkGetSwapchainImagesKHR", "window").and_then(|images| {
+            for image in images {
+                current.images.push(Arc::new(Image::of_swapchain(&self.device, "window", shape, usage, image)?));
+                current.drawn.push(semaphore(&self.device, "image is drawn")?);
+            }
+            Ok(())
+        });
+        if let Err(error) = filled {
+            self.destroy(current);
+            return Err(error);
+        }
+        tracing::debug!("swapchain: {} images of {} x {}", current.images.len(), extent.width, extent.height);
+        self.current = Some(current);
+        Ok(true)
+    }
+
+    /// A swapchain in the place of the current one, which is destroyed.
+    fn create(
+        &mut self,
+        capabilities: &vk::SurfaceCapabilitiesKHR,
+        extent: vk::Extent2D,
+        usage: vk::ImageUsageFlags,
+    ) -> Result<vk::SwapchainKHR> {
         // One more than the least, so that drawing does not wait for the window system to give one back.
         let most = if capabilities.max_image_count == 0 { u32::MAX } else { capabilities.max_image_count };
         let old = self.current.take();
-        let usage = Self::USAGE & capabilities.supported_usage_flags;
         let opaque = vk::CompositeAlphaFlagsKHR::OPAQUE;
         let composite = if capabilities.supported_composite_alpha.contains(opaque) {
             opaque
@@ -247,24 +275,7 @@ impl Swapchain {
         }
         let raw = raw.during("vkCreateSwapchainKHR", "window")?;
         self.device.set_name(raw, "window");
-        // SAFETY: plain query of the swapchain just made.
-        let images = unsafe { self.functions.get_swapchain_images(raw) };
-        let shape = ImageShape::plane(Self::FORMAT, extent.width, extent.height);
-        let mut current = Current { raw, images: Vec::new(), drawn: Vec::new(), stale: false };
-        let filled = images.during("vkGetSwapchainImagesKHR", "window").and_then(|images| {
-            for image in images {
-                current.images.push(Arc::new(Image::of_swapchain(&self.device, "window", shape, usage, image)?));
-                current.drawn.push(semaphore(&self.device, "image is drawn")?);
-            }
-            Ok(())
-        });
-        if let Err(error) = filled {
-            self.destroy(current);
-            return Err(error);
-        }
-        tracing::debug!("swapchain: {} images of {} x {}", current.images.len(), extent.width, extent.height);
-        self.current = Some(current);
-        Ok(true)
+        Ok(raw)
     }
 
     /// The picture is blitted into its images, the panel is drawn over it. Only screenshots read them, and are all that a window
