@@ -37,6 +37,7 @@ impl<'a> Executable<'a> {
     ///
     /// # Errors
     /// A wrong graph, no device memory left.
+    #[cfg(feature = "viewer")]
     pub(crate) fn keeping(
         device: &Arc<Device>,
         graph: FrameGraph<'a>,

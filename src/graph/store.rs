@@ -18,6 +18,7 @@ pub struct Store {
 
 impl Store {
     /// What the frames so far have left.
+    #[cfg(feature = "viewer")]
     pub fn kept(&self) -> &Kept {
         &self.kept
     }

@@ -100,6 +100,40 @@ fn workgroups_cover_all_invocations_and_access_follows_from_the_shader() {
     assert_eq!(uses, [(Access::StorageReadCompute, Mode::Read), (Access::StorageWriteCompute, Mode::Write)]);
 }
 
+/// How many passes run to tone map by `pipeline`, as `declare` ends the pass, after frames that left `kept`; and what is kept then.
+fn passes_after<'a>(
+    kept: &Kept,
+    pipeline: &'a ComputePipeline,
+    declare: impl FnOnce(ComputePass<'_, 'a>),
+) -> (usize, Kept) {
+    let mut graph = FrameGraph::new();
+    let (source, mut target) = (graph.image("source", IMAGE), graph.kept_image("target", IMAGE));
+    let mut pass = graph.pass("fill");
+    let source = pass.write(source, Access::TransferWrite);
+    pass.depends_on(&()).record(Box::new(|_, _| Ok(())));
+    declare(graph.compute("tone_map", pipeline).read("radiance", source).write("display", &mut target));
+    graph.output(target);
+    let mut memory = |_: &ResourceInfo| MemoryRequirement { size_bytes: 1, alignment: 1, memory_type_bits: 1 };
+    let plan = graph.compile_keeping(kept, &mut memory).expect("a valid graph");
+    (plan.passes.len(), plan.kept)
+}
+
+#[test]
+fn a_pass_runs_again_if_what_it_is_given_differs_or_is_not_known_yet() {
+    let device = device();
+    let (tone_map, other) = (&pipeline(&device, &compiled::TONE_MAP), &pipeline(&device, &compiled::TONE_MAP));
+    let size = [8, 8, 1];
+    let (first, kept) = passes_after(&Kept::default(), tone_map, |pass| pass.push(&PUSH).cover(size));
+    assert_eq!(first, 2);
+    assert_eq!(passes_after(&kept, tone_map, |pass| pass.push(&PUSH).cover(size)).0, 0);
+    assert_eq!(passes_after(&kept, tone_map, |pass| pass.push(&[1_u32; 4]).cover(size)).0, 2);
+    assert_eq!(passes_after(&kept, tone_map, |pass| pass.push(&PUSH).cover([16, 8, 1])).0, 2);
+    assert_eq!(passes_after(&kept, other, |pass| pass.push(&PUSH).cover(size)).0, 2);
+    let (later, kept) = passes_after(&kept, tone_map, |pass| pass.push_later(|| PUSH).cover(size));
+    assert_eq!(later, 2);
+    assert_eq!(passes_after(&kept, tone_map, |pass| pass.push_later(|| PUSH).cover(size)).0, 2);
+}
+
 /// Copies through a planted pass, which declares to read `old` or `new`, and takes `taken` of both.
 fn planted(device: &Arc<Device>, taken: usize) -> crate::Result<()> {
     let desc = BufferDesc { size_bytes: 16 };

@@ -76,7 +76,7 @@ impl Frames {
         Ok(result)
     }
 
-    /// Blocks until the oldest frame has left the GPU, so that [`Frames::record`] will not wait.
+    /// Blocks until the oldest frame has left the GPU, so that recording the next will not wait.
     ///
     /// # Errors
     /// A lost device.

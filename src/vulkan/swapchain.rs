@@ -95,7 +95,7 @@ impl Swapchain {
     /// The format of the images.
     pub const FORMAT: vk::Format = vk::Format::B8G8R8A8_UNORM;
 
-    /// A swapchain of `surface` for so many frames in flight; it has images from the first [`Swapchain::turn`] on.
+    /// A swapchain of `surface` for so many frames in flight; it has images from the first turn on.
     ///
     /// # Errors
     /// A device that cannot present, or no memory left.
