@@ -1,7 +1,8 @@
 //! Keep: results that outlive the frame, so that passes that would only make the same again do not run.
 //!
 //! The *fingerprint* of a version says what its contents are a function of: the pass that makes it, what that pass
-//! depends on besides resources ([`super::PassBuilder::depends_on`]), and the fingerprints of all versions that it looks at.
+//! depends on besides resources ([`super::PassBuilder::depends_on`]; compute and raster passes find it in their pipeline, their
+//! push constants and what they are given), and the fingerprints of all versions that it looks at.
 //! Two versions of one fingerprint have the same contents, so a kept resource that still holds what a frame would make of it
 //! is as good as made.
 use super::declare::{Graph, Resource};

@@ -121,6 +121,7 @@ impl Image {
             ImageKind::Volume => (vk::ImageCreateFlags::empty(), vk::ImageType::TYPE_3D),
             ImageKind::Cube => (vk::ImageCreateFlags::CUBE_COMPATIBLE, vk::ImageType::TYPE_2D),
         };
+        check_shape(device, name, shape, kind, usage, flags)?;
         let info = vk::ImageCreateInfo::default()
             .flags(flags)
             .image_type(kind)
@@ -130,7 +131,7 @@ impl Image {
             .array_layers(shape.layers())
             .samples(vk::SampleCountFlags::TYPE_1)
             .usage(usage);
-        // SAFETY: plain creation; destroyed through the deletion queue.
+        // SAFETY: the device was found to have such images; destroyed through the deletion queue.
         let raw = unsafe { device.raw.create_image(&info, None) }.during("vkCreateImage", name)?;
         device.set_name(raw, name);
         let view = vk::ImageView::null();
@@ -211,6 +212,34 @@ impl Image {
         self.device.set_name(self.view, &self.name);
         Ok(())
     }
+}
+
+/// An error for an image that the device cannot have.
+fn check_shape(
+    device: &Device,
+    name: &str,
+    shape: ImageShape,
+    kind: vk::ImageType,
+    usage: vk::ImageUsageFlags,
+    flags: vk::ImageCreateFlags,
+) -> Result<()> {
+    let refused = || VulkanError::unfit(name, format!("this device has no image of {shape:?} for {usage:?}"));
+    if usage.is_empty() {
+        return Err(refused());
+    }
+    let (instance, physical, tiling) = (&device.instance.raw, device.physical, vk::ImageTiling::OPTIMAL);
+    // SAFETY: plain query about this instance's physical device.
+    let limits = unsafe {
+        instance.get_physical_device_image_format_properties(physical, shape.format, kind, tiling, usage, flags)
+    }
+    .during("vkGetPhysicalDeviceImageFormatProperties", name)?;
+    let [width, height, depth] = shape.extent;
+    let most = [limits.max_extent.width, limits.max_extent.height, limits.max_extent.depth];
+    let has_extent = shape.extent.iter().zip(most).all(|(size, most)| (1..=most).contains(size));
+    let levels = width.max(height).max(depth).max(1).ilog2() + 1;
+    let has_levels = (1..=levels.min(limits.max_mip_levels)).contains(&shape.levels);
+    let has_layers = shape.layers() <= limits.max_array_layers && (shape.kind != ImageKind::Cube || width == height);
+    if has_extent && has_levels && has_layers { Ok(()) } else { Err(refused()) }
 }
 
 impl Drop for Image {

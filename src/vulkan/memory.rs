@@ -110,6 +110,17 @@ pub struct Buffer {
 }
 
 impl Buffer {
+    /// What buffers can be used as: all that Vulkan has without further extensions.
+    const USAGES: vk::BufferUsageFlags = vk::BufferUsageFlags::from_raw(
+        vk::BufferUsageFlags::TRANSFER_SRC.as_raw()
+            | vk::BufferUsageFlags::TRANSFER_DST.as_raw()
+            | vk::BufferUsageFlags::UNIFORM_BUFFER.as_raw()
+            | vk::BufferUsageFlags::STORAGE_BUFFER.as_raw()
+            | vk::BufferUsageFlags::INDEX_BUFFER.as_raw()
+            | vk::BufferUsageFlags::VERTEX_BUFFER.as_raw()
+            | vk::BufferUsageFlags::INDIRECT_BUFFER.as_raw(),
+    );
+
     /// A buffer with memory of its own; its contents are undefined.
     ///
     /// # Errors
@@ -142,8 +153,11 @@ impl Buffer {
         size_bytes: u64,
         usage: vk::BufferUsageFlags,
     ) -> Result<Self> {
+        if size_bytes == 0 || usage.is_empty() || !Self::USAGES.contains(usage) {
+            return Err(VulkanError::unfit(name, format!("no buffer has {size_bytes} bytes for {usage:?}")));
+        }
         let info = vk::BufferCreateInfo::default().size(size_bytes).usage(usage);
-        // SAFETY: plain creation; destroyed through the deletion queue.
+        // SAFETY: size and usage are valid on every device; destroyed through the deletion queue.
         let raw = unsafe { device.raw.create_buffer(&info, None) }.during("vkCreateBuffer", name)?;
         device.set_name(raw, name);
         let (name, identity, device) = (name.to_owned(), Identity::new(), device.clone());
