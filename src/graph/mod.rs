@@ -7,7 +7,10 @@
 //! Results that outlive the frame (`keep`) let passes go that would only make the same again.
 //!
 //! Each stage is one file of that name and, up to the plan, a pure function of the graph: the same graph gives the same
-//! plan, without a GPU. Passes on a device are declared by `compute`, `raster` and `copies`. `compile` puts them in a row. They share `resource`, `kept` and `plan`, which are data only. A plan prints itself ([`Plan`] is `Display`), which is also how it is tested.
+//! plan, without a GPU. `compile` puts them in a row. They share `resource`, `kept` and `plan`, which are data only. A plan
+//! prints itself ([`Plan`] is `Display`), which is also how it is tested.
+//!
+//! Passes on a device are declared by `compute`, `raster` and `copies`, so that what a shader says is not said again.
 //!
 //! A handle names one *version* of a resource. A pass that writes or modifies a version makes the next one, and only one
 //! pass may, so the order of writes is explicit. Whoever holds an older handle reads the older contents: that pass
