@@ -5,7 +5,7 @@
 #include "geometry_texel.glsl"
 #include "tiles.glsl"
 
-layout(local_size_x = 8, local_size_y = 8) in;
+layout(local_size_x = TILE_SIDE, local_size_y = TILE_SIDE) in;
 
 layout(constant_id = 0) const uint SUBPIXELS = 2; // per axis
 

@@ -8,7 +8,7 @@
 #include "surface.glsl"
 #include "tiles.glsl"
 
-layout(local_size_x = 64) in;
+layout(local_size_x = TILE_PIXELS) in;
 
 layout(constant_id = 0) const uint SUBPIXELS = 2; // per axis
 

@@ -132,7 +132,7 @@ impl Method {
         if self == Self::Reference {
             return Err(Error::input("method \"reference\"", "does not run on the GPU", "use another here"));
         }
-        let variant = |shader: &&Shader| shader.name.strip_prefix("shade_") == Some(self.name());
+        let variant = |shader: &&Shader| shader.name().strip_prefix("shade_") == Some(self.name());
         Ok(compiled::ALL.iter().find(variant).expect("a test looks for the shader of every method"))
     }
 
@@ -179,12 +179,12 @@ mod tests {
 
     #[test]
     fn every_method_has_a_shader_and_every_shader_a_method() {
-        let variants = compiled::ALL.iter().filter_map(|shader| shader.name.strip_prefix("shade_"));
+        let variants = compiled::ALL.iter().filter_map(|shader| shader.name().strip_prefix("shade_"));
         for name in variants {
             assert!(Method::from_name(name).is_ok_and(|method| method.name() == name), "{name} is not in the table");
         }
         for method in Method::ALL.iter().filter(|method| method.runs_on_gpu()) {
-            assert_eq!(method.shader().unwrap().name, format!("shade_{}", method.name()));
+            assert_eq!(method.shader().unwrap().name(), format!("shade_{}", method.name()));
         }
         assert!(Method::Reference.shader().is_err());
     }

@@ -1,5 +1,5 @@
 //! The method on one screen: the frame as a graph of passes, and the renderer that runs it.
-use crate::graph::{Buffer, Executable, Image};
+use crate::graph::{BufferHandle, Executable, FrameGraph, ImageHandle};
 use crate::memo::{Held, Keyed, Round};
 use crate::output::ExrHeader;
 use crate::passes::*;
@@ -38,11 +38,11 @@ pub(crate) fn declare<'a>(graph: &mut FrameGraph<'a>, renderer: &'a Renderer, vi
 
 /// What a frame leaves.
 pub(crate) struct Frame {
-    pub geometry: Image,
-    pub counters: Buffer,
-    pub lookups: Buffer,
-    pub radiance: Image,
-    pub display: Image,
+    pub geometry: ImageHandle,
+    pub counters: BufferHandle,
+    pub lookups: BufferHandle,
+    pub radiance: ImageHandle,
+    pub display: ImageHandle,
 }
 
 /// A scene on a device, ready to render. Cheap to clone.

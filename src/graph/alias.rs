@@ -1,52 +1,7 @@
 //! Alias: transient resources that are never alive together share memory.
-use super::plan::{PlannedResource, ResourceInfo};
+use super::plan::{Block, MemoryRequirement, Placement, PlannedResource};
+use super::resource::ResourceInfo;
 use std::cmp::Reverse;
-
-/// What Vulkan asks for a resource (`VkMemoryRequirements`).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct MemoryRequirement {
-    /// Bytes of memory.
-    pub size_bytes: u64,
-    /// Its offset in a block must be a multiple of this.
-    pub alignment: u64,
-    /// Memory types that will do, one bit each.
-    pub memory_type_bits: u32,
-}
-
-/// One allocation of device memory, shared by resources of one kind: images and buffers are kept apart, so that
-/// `bufferImageGranularity` never matters.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Block {
-    /// Bytes of memory.
-    pub size_bytes: u64,
-    /// The strictest alignment of the resources in it.
-    pub alignment: u64,
-    /// Memory types that will do for all resources in it.
-    pub memory_type_bits: u32,
-}
-
-/// Where a resource lies.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Placement {
-    /// Index of the block.
-    pub block: usize,
-    /// First byte within the block.
-    pub offset_bytes: u64,
-    /// Bytes that the resource occupies.
-    pub size_bytes: u64,
-}
-
-impl Placement {
-    /// Whether some byte belongs to both.
-    pub fn overlaps(self, other: Self) -> bool {
-        self.block == other.block && self.offset_bytes < other.end_bytes() && other.offset_bytes < self.end_bytes()
-    }
-
-    /// First byte after it.
-    fn end_bytes(self) -> u64 {
-        self.offset_bytes + self.size_bytes
-    }
-}
 
 /// Places the largest resource first, each at the lowest offset that is free during its lifetime, in the block that
 /// grows least by it; in a block of its own where that costs less. So the blocks are never larger than the resources

@@ -29,44 +29,12 @@
 //! What the barriers do not promise: anything between queues, between two plans whose memory overlaps, or to the CPU
 //! beyond making writes available to it (it still has to wait for the frame's fence).
 use super::access::Access;
-use super::declare::{Graph, Handle, ResourceKind};
-use super::keep::{Held, Kept};
-use super::plan::PlannedResource;
+use super::declare::Graph;
+use super::kept::{Held, Kept};
+use super::plan::{Barrier, PlannedResource};
+use super::resource::{Handle, ResourceKind};
 use ash::vk::{AccessFlags2, ImageLayout, PipelineStageFlags2};
 use std::collections::HashMap;
-
-/// One dependency, in the terms of `VkMemoryBarrier2` and `VkImageMemoryBarrier2` over a whole resource.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Barrier {
-    /// Index of the resource in the plan.
-    pub resource: usize,
-    /// Stages that must have finished.
-    pub src_stage: PipelineStageFlags2,
-    /// Writes of these stages that must be made available; empty where execution is all that is waited for.
-    pub src_access: AccessFlags2,
-    /// Stages that wait.
-    pub dst_stage: PipelineStageFlags2,
-    /// Accesses of these stages that memory is made visible to.
-    pub dst_access: AccessFlags2,
-    /// Layout before; `UNDEFINED` where the contents are not kept, and for buffers.
-    pub old_layout: ImageLayout,
-    /// Layout after; `UNDEFINED` for buffers. No transition if it is the old one.
-    pub new_layout: ImageLayout,
-    /// Empty but for the first use of transient memory, where these are the resources whose last accesses it waits for: all
-    /// that share bytes with it, in order, itself included.
-    pub takes_over: Vec<usize>,
-}
-
-impl Barrier {
-    /// Whether the source is (also) accesses made through other resources in the same memory.
-    ///
-    /// An image or buffer barrier covers accesses through that image or buffer only, so this one must be recorded as a
-    /// global memory barrier. An image then gets its layout by a barrier of its own in a later command, from `dst_stage`
-    /// to `dst_stage`, which forms a chain with the first.
-    pub fn is_aliasing(&self) -> bool {
-        self.takes_over.iter().any(|&other| other != self.resource)
-    }
-}
 
 /// Everything that writes memory, in all of [`Access`]; `MEMORY_WRITE` stands for an unknown past.
 const WRITES: AccessFlags2 = AccessFlags2::from_raw(

@@ -1,5 +1,6 @@
 //! Cull: passes that no output needs, or whose results are still good, do not run.
-use super::declare::{Graph, Handle, Pass};
+use super::declare::{Graph, Pass};
+use super::resource::Handle;
 use std::collections::BTreeSet;
 
 /// Which passes run, and why the others do not.

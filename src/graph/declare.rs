@@ -1,94 +1,18 @@
 //! Declare: the graph as the passes describe it, resources by version, nothing checked yet.
 use super::access::{Access, Mode};
-use super::plan::ResourceInfo;
-use ash::vk;
+use super::error::GraphError;
+use super::resource::{
+    BufferDesc, BufferHandle, Handle, ImageDesc, ImageHandle, ResourceInfo, ResourceKind, Versioned,
+};
 use std::hash::{DefaultHasher, Hash, Hasher};
-
-/// An image of one layer, one mip level and one sample per pixel.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct ImageDesc {
-    /// Texel format.
-    pub format: vk::Format,
-    /// Width in texels, at least 1.
-    pub width: u32,
-    /// Height in texels, at least 1.
-    pub height: u32,
-}
-
-/// A buffer.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct BufferDesc {
-    /// Size in bytes, at least 1.
-    pub size_bytes: u64,
-}
-
-/// What a resource is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum ResourceKind {
-    /// An image.
-    Image(ImageDesc),
-    /// A buffer.
-    Buffer(BufferDesc),
-}
-
-/// One version of one resource of one graph: the contents between one write and the next.
-///
-/// Version 0 is what the resource holds when the frame begins: nothing for a transient one.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct Handle {
-    pub(super) resource: usize,
-    pub(super) version: u32,
-}
-
-impl Handle {
-    /// The version that a write to this one makes.
-    pub(super) fn next(self) -> Self {
-        Self { version: self.version + 1, ..self }
-    }
-}
-
-/// A version of an image.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct Image(Handle);
-
-/// A version of a buffer.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct Buffer(Handle);
-
-/// [`Image`] or [`Buffer`]: writing one gives the next version of the same type.
-pub trait Versioned: Copy + Into<Handle> + From<Handle> {}
-impl Versioned for Image {}
-impl Versioned for Buffer {}
-
-impl From<Image> for Handle {
-    fn from(image: Image) -> Self {
-        image.0
-    }
-}
-
-impl From<Buffer> for Handle {
-    fn from(buffer: Buffer) -> Self {
-        buffer.0
-    }
-}
-
-impl From<Handle> for Image {
-    fn from(handle: Handle) -> Self {
-        Self(handle)
-    }
-}
-
-impl From<Handle> for Buffer {
-    fn from(handle: Handle) -> Self {
-        Self(handle)
-    }
-}
 
 /// A frame as it is being declared. `W` is what a pass has to record: a closure in the renderer, `()` in tests.
 pub struct Graph<W> {
     pub(super) resources: Vec<Resource>,
     pub(super) passes: Vec<Pass<W>>,
     pub(super) outputs: Vec<Handle>,
+    /// The first thing that was found wrong while it was declared.
+    pub(super) problem: Option<GraphError>,
 }
 
 /// A declared resource.
@@ -113,6 +37,8 @@ pub(super) struct Pass<W> {
     pub uses: Vec<Use>,
     /// Hash of what it depends on besides resources; none if it does not say.
     pub inputs: Option<u64>,
+    /// Whether it depends on something that is not known yet: then nothing that it makes is ever still good.
+    pub depends_on_unknown: bool,
     pub work: Option<W>,
 }
 
@@ -138,7 +64,7 @@ impl Use {
 
 impl<W> Default for Graph<W> {
     fn default() -> Self {
-        Self { resources: Vec::new(), passes: Vec::new(), outputs: Vec::new() }
+        Self { resources: Vec::new(), passes: Vec::new(), outputs: Vec::new(), problem: None }
     }
 }
 
@@ -149,18 +75,18 @@ impl<W> Graph<W> {
     }
 
     /// A transient image: it exists inside the frame only, and its memory may be shared with others.
-    pub fn image(&mut self, name: &str, desc: ImageDesc) -> Image {
+    pub fn image(&mut self, name: &str, desc: ImageDesc) -> ImageHandle {
         self.resource(name, ResourceKind::Image(desc), None).into()
     }
 
     /// A transient buffer: it exists inside the frame only, and its memory may be shared with others.
-    pub fn buffer(&mut self, name: &str, desc: BufferDesc) -> Buffer {
+    pub fn buffer(&mut self, name: &str, desc: BufferDesc) -> BufferHandle {
         self.resource(name, ResourceKind::Buffer(desc), None).into()
     }
 
     /// An image that is worth keeping: where frames are compiled one after another with what was kept
     /// ([`Graph::compile_keeping`]), passes that would make the same contents again do not run. Elsewhere it is transient.
-    pub fn kept_image(&mut self, name: &str, desc: ImageDesc) -> Image {
+    pub fn kept_image(&mut self, name: &str, desc: ImageDesc) -> ImageHandle {
         let handle = self.resource(name, ResourceKind::Image(desc), None);
         self.resources[handle.resource].keep = true;
         handle.into()
@@ -178,7 +104,7 @@ impl<W> Graph<W> {
         desc: ImageDesc,
         before: Option<Access>,
         after: Option<Access>,
-    ) -> Image {
+    ) -> ImageHandle {
         self.resource(name, ResourceKind::Image(desc), Some(Import { before, after })).into()
     }
 
@@ -189,7 +115,7 @@ impl<W> Graph<W> {
         desc: BufferDesc,
         before: Option<Access>,
         after: Option<Access>,
-    ) -> Buffer {
+    ) -> BufferHandle {
         self.resource(name, ResourceKind::Buffer(desc), Some(Import { before, after })).into()
     }
 
@@ -201,8 +127,14 @@ impl<W> Graph<W> {
     /// Adds a pass; the builder says what it uses and what it records.
     pub fn pass(&mut self, name: &str) -> PassBuilder<'_, W> {
         let index = self.passes.len();
-        self.passes.push(Pass { name: name.to_owned(), uses: Vec::new(), inputs: None, work: None });
-        PassBuilder { pass: &mut self.passes[index] }
+        self.passes.push(Pass {
+            name: name.to_owned(),
+            uses: Vec::new(),
+            inputs: None,
+            depends_on_unknown: false,
+            work: None,
+        });
+        PassBuilder { pass: &mut self.passes[index], problem: &mut self.problem }
     }
 
     /// What resource number `index` must be to be used as all declared passes use it, whether they run or not.
@@ -222,6 +154,7 @@ impl<W> Graph<W> {
 /// Says what a pass uses and what it records.
 pub struct PassBuilder<'a, W> {
     pass: &'a mut Pass<W>,
+    problem: &'a mut Option<GraphError>,
 }
 
 impl<W> PassBuilder<'_, W> {
@@ -255,6 +188,21 @@ impl<W> PassBuilder<'_, W> {
         (self.pass.inputs, inputs).hash(&mut hasher);
         self.pass.inputs = Some(hasher.finish());
         self
+    }
+
+    /// Says that the pass depends on something that is not known yet.
+    pub(super) fn depends_on_unknown(&mut self) {
+        self.pass.depends_on_unknown = true;
+    }
+
+    /// Its name.
+    pub(super) fn name(&self) -> &str {
+        &self.pass.name
+    }
+
+    /// Notes what is wrong with its declaration; the graph will not compile.
+    pub(super) fn refuse(&mut self, problem: GraphError) {
+        self.problem.get_or_insert(problem);
     }
 
     /// What the pass records when it runs.

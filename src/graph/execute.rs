@@ -1,94 +1,23 @@
 //! Execute: the plan's resources as Vulkan objects, its passes and barriers as commands.
-use super::{Barrier, Graph, Handle, Kept, MemoryRequirement, Plan, PlannedPass, ResourceInfo, ResourceKind};
+use super::error::GraphError;
+use super::plan::{Barrier, MemoryRequirement, Plan, PlannedPass};
+use super::resource::{Handle, ResourceInfo, ResourceKind};
+use super::store::{Made, Store, bind, make};
+use super::work::{DeviceResource, FrameGraph, Resources, Work};
 use crate::Result;
-use crate::vulkan::{self, Commands, Device, Frames, ImageShape, Memory, PassTime, Semaphores, VulkanError};
+use crate::vulkan::{Commands, Device, Frames, Memory, PassTime, Semaphores};
 use ash::vk;
 use std::collections::HashMap;
 use std::sync::Arc;
 use std::time::Instant;
-
-/// What a pass records when it runs.
-pub type Work<'a> = Box<dyn Fn(&mut Commands, &Resources<'_>) -> std::result::Result<(), VulkanError> + 'a>;
-
-/// The Vulkan object behind a resource of the plan.
-#[derive(Clone)]
-pub enum DeviceResource {
-    /// Behind an image.
-    Image(Arc<vulkan::Image>),
-    /// Behind a buffer.
-    Buffer(Arc<vulkan::Buffer>),
-}
-
-/// The objects that outlive frames, and what they hold.
-#[derive(Default)]
-pub struct Store {
-    kept: Kept,
-    objects: HashMap<String, (ResourceInfo, DeviceResource)>,
-}
-
-impl Store {
-    /// What the frames so far have left.
-    pub fn kept(&self) -> &Kept {
-        &self.kept
-    }
-
-    /// The object that is kept as `info`, made if there is none.
-    fn object(
-        &mut self,
-        device: &Arc<Device>,
-        info: &ResourceInfo,
-    ) -> std::result::Result<DeviceResource, VulkanError> {
-        if let Some((_, object)) = self.objects.get(&info.name).filter(|(known, _)| known == info) {
-            return Ok(object.clone());
-        }
-        let (object, needs) = make(device, info)?;
-        let requirements = vk::MemoryRequirements {
-            size: needs.size_bytes,
-            alignment: needs.alignment,
-            memory_type_bits: needs.memory_type_bits,
-        };
-        let memory = Memory::new(device, &info.name, requirements, !info.is_image())?;
-        let object = bind(object, &memory, 0)?;
-        self.objects.insert(info.name.clone(), (info.clone(), object.clone()));
-        Ok(object)
-    }
-}
-
-/// The objects behind the handles of a graph.
-pub struct Resources<'r> {
-    objects: &'r [DeviceResource],
-    /// For each object, the index of its resource in the graph as it was declared.
-    declared: &'r [usize],
-}
-
-impl Resources<'_> {
-    /// The image behind `handle`, which a pass that runs has declared.
-    pub fn image(&self, handle: super::Image) -> &vulkan::Image {
-        match self.object(handle.into()) {
-            Some(DeviceResource::Image(image)) => image.as_ref(),
-            _ => unreachable!("a pass that runs asks for images that it declared"),
-        }
-    }
-
-    /// The buffer behind `handle`, which a pass that runs has declared.
-    pub fn buffer(&self, handle: super::Buffer) -> &vulkan::Buffer {
-        match self.object(handle.into()) {
-            Some(DeviceResource::Buffer(buffer)) => buffer,
-            _ => unreachable!("a pass that runs asks for buffers that it declared"),
-        }
-    }
-
-    fn object(&self, handle: Handle) -> Option<&DeviceResource> {
-        self.objects.get(self.declared.iter().position(|declared| *declared == handle.resource)?)
-    }
-}
 
 /// A compiled frame with its resources: executed as often as wanted.
 pub struct Executable<'a> {
     /// What it does.
     pub plan: Plan<Work<'a>>,
     objects: Vec<DeviceResource>,
-    declared: Vec<usize>,
+    /// Names of all resources of the graph.
+    names: Vec<String>,
 }
 
 impl<'a> Executable<'a> {
@@ -96,7 +25,11 @@ impl<'a> Executable<'a> {
     ///
     /// # Errors
     /// A wrong graph, no device memory left.
-    pub fn new(device: &Arc<Device>, graph: Graph<Work<'a>>, imports: &[(Handle, DeviceResource)]) -> Result<Self> {
+    pub(crate) fn new(
+        device: &Arc<Device>,
+        graph: FrameGraph<'a>,
+        imports: &[(Handle, DeviceResource)],
+    ) -> Result<Self> {
         Self::compile(device, graph, imports, None)
     }
 
@@ -104,9 +37,10 @@ impl<'a> Executable<'a> {
     ///
     /// # Errors
     /// A wrong graph, no device memory left.
-    pub fn keeping(
+    #[cfg(feature = "viewer")]
+    pub(crate) fn keeping(
         device: &Arc<Device>,
-        graph: Graph<Work<'a>>,
+        graph: FrameGraph<'a>,
         imports: &[(Handle, DeviceResource)],
         store: &mut Store,
     ) -> Result<Self> {
@@ -115,30 +49,12 @@ impl<'a> Executable<'a> {
 
     fn compile(
         device: &Arc<Device>,
-        graph: Graph<Work<'a>>,
+        graph: FrameGraph<'a>,
         imports: &[(Handle, DeviceResource)],
         mut store: Option<&mut Store>,
     ) -> Result<Self> {
-        // Vulkan tells what memory an object needs only once the object exists.
-        let mut made = HashMap::new();
-        let mut failure = None;
-        let mut memory = |info: &ResourceInfo| match make(device, info) {
-            Ok((object, requirement)) => {
-                made.insert(info.name.clone(), object);
-                requirement
-            }
-            Err(error) => {
-                failure.get_or_insert(error);
-                MemoryRequirement { size_bytes: 1, alignment: 1, memory_type_bits: !0 }
-            }
-        };
-        let plan = match &store {
-            Some(store) => graph.compile_keeping(&store.kept, &mut memory)?,
-            None => graph.compile(&mut memory)?,
-        };
-        if let Some(error) = failure {
-            return Err(error.into());
-        }
+        let names = graph.resources.iter().map(|resource| resource.name.clone()).collect();
+        let (plan, mut made) = plan(device, graph, store.as_deref())?;
         let memory = memory_of(device, &plan)?;
         let mut objects = Vec::new();
         for (index, resource) in plan.resources.iter().enumerate() {
@@ -147,8 +63,8 @@ impl<'a> Executable<'a> {
                 (_, _, Some(store)) if resource.kept => store.object(device, &resource.info)?,
                 _ => {
                     let import = imports.iter().find(|(handle, _)| plan.find(*handle) == Some(index));
-                    let (_, object) = import.expect("whoever imports a resource brings it");
-                    object.clone()
+                    let missing = || GraphError::NotImported { resource: resource.info.name.clone() };
+                    import.ok_or_else(missing)?.1.clone()
                 }
             };
             objects.push(object);
@@ -156,8 +72,7 @@ impl<'a> Executable<'a> {
         if let Some(store) = store {
             store.kept = plan.kept.clone();
         }
-        let declared = plan.resources.iter().map(|resource| resource.declared).collect();
-        Ok(Self { plan, objects, declared })
+        Ok(Self { plan, objects, names })
     }
 
     /// Records and submits one frame.
@@ -179,8 +94,7 @@ impl<'a> Executable<'a> {
             }
             self.record_barriers(commands, &self.plan.final_barriers);
             Ok(())
-        })?;
-        Ok(())
+        })
     }
 
     /// Runs one frame until the GPU is done with it; gives the time of each pass, by timestamps where those of `device` tell
@@ -211,7 +125,7 @@ impl<'a> Executable<'a> {
             frames.wait()?;
             times.push(PassTime { name: pass.name.clone(), gpu_ms: start.elapsed().as_secs_f64() * 1e3 });
         }
-        frames.record_between(semaphores.last(), |commands| {
+        frames.record_between(semaphores.last(), |commands| -> Result<()> {
             self.record_barriers(commands, &self.plan.final_barriers);
             Ok(())
         })?;
@@ -219,13 +133,9 @@ impl<'a> Executable<'a> {
         Ok(times)
     }
 
-    fn record_pass(
-        &self,
-        commands: &mut Commands,
-        pass: &PlannedPass<Work<'a>>,
-    ) -> std::result::Result<(), VulkanError> {
+    fn record_pass(&self, commands: &mut Commands, pass: &PlannedPass<Work<'a>>) -> Result<()> {
         self.record_barriers(commands, &pass.barriers);
-        let resources = Resources { objects: &self.objects, declared: &self.declared };
+        let resources = Resources { pass, objects: &self.objects, names: &self.names };
         commands.timed_pass(&pass.name, |commands| (pass.work)(commands, &resources))
     }
 
@@ -274,43 +184,30 @@ fn memory_barrier(barrier: &Barrier) -> vk::MemoryBarrier2<'static> {
         .dst_access_mask(barrier.dst_access)
 }
 
-/// An object that has no memory yet.
-enum Made {
-    Image(vulkan::Image),
-    Buffer(vulkan::Buffer),
-}
-
-/// Gives `made` its memory.
-fn bind(made: Made, memory: &Arc<Memory>, offset: u64) -> std::result::Result<DeviceResource, VulkanError> {
-    Ok(match made {
-        Made::Image(mut image) => {
-            image.bind(memory, offset)?;
-            DeviceResource::Image(Arc::new(image))
+/// The plan of `graph`, and its transient resources, without memory, by name.
+fn plan<'a>(
+    device: &Arc<Device>,
+    graph: FrameGraph<'a>,
+    store: Option<&Store>,
+) -> Result<(Plan<Work<'a>>, HashMap<String, Made>)> {
+    // Vulkan tells what memory an object needs only once the object exists.
+    let mut made = HashMap::new();
+    let mut failure = None;
+    let mut memory = |info: &ResourceInfo| match make(device, info) {
+        Ok((object, requirement)) => {
+            made.insert(info.name.clone(), object);
+            requirement
         }
-        Made::Buffer(mut buffer) => {
-            buffer.bind(memory, offset)?;
-            DeviceResource::Buffer(Arc::new(buffer))
-        }
-    })
-}
-
-/// A resource without memory, and what memory it needs.
-fn make(device: &Arc<Device>, info: &ResourceInfo) -> std::result::Result<(Made, MemoryRequirement), VulkanError> {
-    let (object, needs) = match info.kind {
-        ResourceKind::Image(desc) => {
-            let shape = ImageShape::plane(desc.format, desc.width, desc.height);
-            let image = vulkan::Image::unbound(device, &info.name, shape, info.image_usage)?;
-            let needs = image.requirements();
-            (Made::Image(image), needs)
-        }
-        ResourceKind::Buffer(desc) => {
-            let buffer = vulkan::Buffer::unbound(device, &info.name, desc.size_bytes, info.buffer_usage)?;
-            let needs = buffer.requirements();
-            (Made::Buffer(buffer), needs)
+        Err(error) => {
+            failure.get_or_insert(error);
+            MemoryRequirement { size_bytes: 1, alignment: 1, memory_type_bits: !0 }
         }
     };
-    let vk::MemoryRequirements { size: size_bytes, alignment, memory_type_bits } = needs;
-    Ok((object, MemoryRequirement { size_bytes, alignment, memory_type_bits }))
+    let plan = match store {
+        Some(store) => graph.compile_keeping(&store.kept, &mut memory)?,
+        None => graph.compile(&mut memory)?,
+    };
+    failure.map_or(Ok((plan, made)), Err)
 }
 
 /// The memory of each block of the plan.

@@ -1,33 +1,15 @@
 //! Keep: results that outlive the frame, so that passes that would only make the same again do not run.
 //!
 //! The *fingerprint* of a version says what its contents are a function of: the pass that makes it, what that pass
-//! depends on besides resources ([`super::PassBuilder::depends_on`]), and the fingerprints of all versions that it looks at.
+//! depends on besides resources ([`super::PassBuilder::depends_on`]; compute and raster passes find it in their pipeline, their
+//! push constants and what they are given), and the fingerprints of all versions that it looks at.
 //! Two versions of one fingerprint have the same contents, so a kept resource that still holds what a frame would make of it
 //! is as good as made.
-use super::declare::{Graph, Handle, Resource};
-use super::plan::ResourceInfo;
-use ash::vk::{AccessFlags2, ImageLayout, PipelineStageFlags2};
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use super::declare::{Graph, Resource};
+use super::kept::{Held, Kept};
+use super::resource::{Handle, ResourceInfo};
+use std::collections::{BTreeSet, HashMap};
 use std::hash::{DefaultHasher, Hash, Hasher};
-
-/// What kept resources hold between two frames, by name: the plan of each frame says it for the next.
-#[derive(Clone, Debug, Default)]
-pub struct Kept(pub(super) BTreeMap<String, Held>);
-
-/// What a kept resource holds, and how it was last used.
-#[derive(Clone, Debug)]
-pub(super) struct Held {
-    /// What it was made as.
-    pub info: ResourceInfo,
-    /// Of the version that it holds; none if it depends on something unknown.
-    pub fingerprint: Option<u64>,
-    /// Stages of the last use.
-    pub stages: PipelineStageFlags2,
-    /// Memory accesses of the last use.
-    pub accesses: AccessFlags2,
-    /// Layout that the last use left it in.
-    pub layout: ImageLayout,
-}
 
 /// The fingerprint of every version that a pass makes. None where something that it depends on is not known: a pass that does
 /// not say what it depends on, contents that someone else owns.
@@ -35,7 +17,7 @@ pub(super) fn fingerprints<W>(graph: &Graph<W>) -> HashMap<Handle, Option<u64>> 
     let mut known: HashMap<Handle, Option<u64>> = HashMap::new();
     // A handle is had from the pass that makes it, so makers are declared before users.
     for pass in &graph.passes {
-        let of_pass = pass.inputs.as_ref().and_then(|inputs| {
+        let of_pass = pass.inputs.as_ref().filter(|_| !pass.depends_on_unknown).and_then(|inputs| {
             let mut hasher = DefaultHasher::new();
             (&pass.name, inputs).hash(&mut hasher);
             for needed in pass.uses.iter().filter_map(|use_| use_.needs()) {
@@ -57,16 +39,14 @@ pub(super) fn fingerprints<W>(graph: &Graph<W>) -> HashMap<Handle, Option<u64>> 
     known
 }
 
-impl Kept {
-    /// What resource number `index` of `graph`, to be kept, is from now on: what it was, and whatever this graph uses it as.
-    pub(super) fn info<W>(&self, graph: &Graph<W>, index: usize) -> ResourceInfo {
-        let mut info = graph.info(index);
-        if let Some(held) = graph.resources[index].held(Some(self)) {
-            info.image_usage |= held.info.image_usage;
-            info.buffer_usage |= held.info.buffer_usage;
-        }
-        info
+/// What resource number `index` of `graph`, to be kept, is from now on: what it was, and whatever this graph uses it as.
+pub(super) fn info<W>(kept: &Kept, graph: &Graph<W>, index: usize) -> ResourceInfo {
+    let mut info = graph.info(index);
+    if let Some(held) = graph.resources[index].held(Some(kept)) {
+        info.image_usage |= held.info.image_usage;
+        info.buffer_usage |= held.info.buffer_usage;
     }
+    info
 }
 
 impl Resource {
@@ -87,7 +67,7 @@ pub(super) fn still_good<W>(
     for (version, fingerprint) in fingerprints {
         let held = graph.resources[version.resource].held(kept);
         // What is to be used in another way than before has to be made anew for that.
-        let fits = |held: &&Held| kept.is_some_and(|kept| kept.info(graph, version.resource) == held.info);
+        let fits = |held: &&Held| kept.is_some_and(|kept| info(kept, graph, version.resource) == held.info);
         if fingerprint.is_some() && held.filter(fits).is_some_and(|held| held.fingerprint == *fingerprint) {
             good.insert(*version);
         }

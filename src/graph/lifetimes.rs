@@ -1,23 +1,9 @@
 //! Lifetimes: which resources the plan uses, for what, and from which pass to which.
 use super::declare::Graph;
-use super::keep::Kept;
-use super::plan::{PlannedResource, ResourceInfo};
-
-/// First and last position in the plan, both included.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Lifetime {
-    /// Position of the first pass that uses the resource.
-    pub first: usize,
-    /// Position of the last pass that uses the resource.
-    pub last: usize,
-}
-
-impl Lifetime {
-    /// Whether some pass of the plan is in both.
-    pub fn overlaps(self, other: Self) -> bool {
-        self.first <= other.last && other.first <= self.last
-    }
-}
+use super::keep;
+use super::kept::Kept;
+use super::plan::{Lifetime, PlannedResource};
+use super::resource::ResourceInfo;
 
 /// The resources that some pass of `order` uses, in order of declaration: no other is ever made.
 ///
@@ -34,7 +20,7 @@ pub(super) fn lifetimes<W>(graph: &Graph<W>, order: &[usize], kept: Option<&Kept
         let kept = kept.filter(|_| resource.keep);
         let info = match kept {
             // Passes that do not run in this frame will in another.
-            Some(kept) => kept.info(graph, declared),
+            Some(kept) => keep::info(kept, graph, declared),
             None => {
                 let accesses = uses.map(|(_, access)| access).chain(by_owner);
                 ResourceInfo::used_as(&resource.name, resource.kind, accesses)

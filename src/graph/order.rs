@@ -1,7 +1,7 @@
 //! Order: a topological order of the passes that run, the order of declaration wherever there is a choice.
 use super::access::Mode;
 use super::declare::Graph;
-use super::validate::GraphError;
+use super::error::GraphError;
 
 /// `before` must run earlier than `after` because of `resource`.
 struct Edge {

@@ -1,12 +1,8 @@
 //! Plan: the frame as data, everything that executing it needs; printed by [`std::fmt::Display`] in `text.rs`.
 use super::access::{Access, Mode};
-use super::alias::{Block, Placement};
-use super::barriers::Barrier;
-use super::declare::{Graph, Handle, Pass, ResourceKind, Use};
-use super::keep::Kept;
-use super::lifetimes::Lifetime;
-use ash::vk;
-use std::collections::HashSet;
+use super::kept::Kept;
+use super::resource::{Handle, ResourceInfo};
+use ash::vk::{AccessFlags2, ImageLayout, PipelineStageFlags2};
 
 /// What runs in a frame, in which order, with which barriers, in which memory.
 ///
@@ -51,43 +47,8 @@ pub struct PlannedUse {
     pub mode: Mode,
     /// Whether anything looks at what this pass leaves (for an attachment: store, or do not care). False for reads.
     pub kept: bool,
-}
-
-/// What a resource must be when it is made.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct ResourceInfo {
-    /// Its name.
-    pub name: String,
-    /// Image or buffer, and its size.
-    pub kind: ResourceKind,
-    /// All uses of an image together; empty for a buffer.
-    pub image_usage: vk::ImageUsageFlags,
-    /// All uses of a buffer together; empty for an image.
-    pub buffer_usage: vk::BufferUsageFlags,
-}
-
-impl ResourceInfo {
-    /// A resource for these accesses.
-    pub(super) fn used_as(name: &str, kind: ResourceKind, accesses: impl Iterator<Item = Access>) -> Self {
-        let mut info = Self {
-            name: name.to_owned(),
-            kind,
-            image_usage: vk::ImageUsageFlags::empty(),
-            buffer_usage: vk::BufferUsageFlags::empty(),
-        };
-        for access in accesses.map(Access::info) {
-            match kind {
-                ResourceKind::Image(_) => info.image_usage |= access.image_usage.unwrap_or_default(),
-                ResourceKind::Buffer(_) => info.buffer_usage |= access.buffer_usage.unwrap_or_default(),
-            }
-        }
-        info
-    }
-
-    /// Whether it is an image rather than a buffer.
-    pub fn is_image(&self) -> bool {
-        matches!(self.kind, ResourceKind::Image(_))
-    }
+    /// The version that it finds.
+    pub(super) handle: Handle,
 }
 
 /// A resource that a pass of the plan uses.
@@ -107,6 +68,101 @@ pub struct PlannedResource {
     pub(super) declared: usize,
 }
 
+/// First and last position in the plan, both included.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Lifetime {
+    /// Position of the first pass that uses the resource.
+    pub first: usize,
+    /// Position of the last pass that uses the resource.
+    pub last: usize,
+}
+
+impl Lifetime {
+    /// Whether some pass of the plan is in both.
+    pub fn overlaps(self, other: Self) -> bool {
+        self.first <= other.last && other.first <= self.last
+    }
+}
+
+/// What Vulkan asks for a resource (`VkMemoryRequirements`).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct MemoryRequirement {
+    /// Bytes of memory.
+    pub size_bytes: u64,
+    /// Its offset in a block must be a multiple of this.
+    pub alignment: u64,
+    /// Memory types that will do, one bit each.
+    pub memory_type_bits: u32,
+}
+
+/// One allocation of device memory, shared by resources of one kind: images and buffers are kept apart, so that
+/// `bufferImageGranularity` never matters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Block {
+    /// Bytes of memory.
+    pub size_bytes: u64,
+    /// The strictest alignment of the resources in it.
+    pub alignment: u64,
+    /// Memory types that will do for all resources in it.
+    pub memory_type_bits: u32,
+}
+
+/// Where a resource lies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Placement {
+    /// Index of the block.
+    pub block: usize,
+    /// First byte within the block.
+    pub offset_bytes: u64,
+    /// Bytes that the resource occupies.
+    pub size_bytes: u64,
+}
+
+impl Placement {
+    /// Whether some byte belongs to both.
+    pub fn overlaps(self, other: Self) -> bool {
+        self.block == other.block && self.offset_bytes < other.end_bytes() && other.offset_bytes < self.end_bytes()
+    }
+
+    /// First byte after it.
+    pub(super) fn end_bytes(self) -> u64 {
+        self.offset_bytes + self.size_bytes
+    }
+}
+
+/// One dependency, in the terms of `VkMemoryBarrier2` and `VkImageMemoryBarrier2` over a whole resource.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Barrier {
+    /// Index of the resource in the plan.
+    pub resource: usize,
+    /// Stages that must have finished.
+    pub src_stage: PipelineStageFlags2,
+    /// Writes of these stages that must be made available; empty where execution is all that is waited for.
+    pub src_access: AccessFlags2,
+    /// Stages that wait.
+    pub dst_stage: PipelineStageFlags2,
+    /// Accesses of these stages that memory is made visible to.
+    pub dst_access: AccessFlags2,
+    /// Layout before; `UNDEFINED` where the contents are not kept, and for buffers.
+    pub old_layout: ImageLayout,
+    /// Layout after; `UNDEFINED` for buffers. No transition if it is the old one.
+    pub new_layout: ImageLayout,
+    /// Empty but for the first use of transient memory, where these are the resources whose last accesses it waits for: all
+    /// that share bytes with it, in order, itself included.
+    pub takes_over: Vec<usize>,
+}
+
+impl Barrier {
+    /// Whether the source is (also) accesses made through other resources in the same memory.
+    ///
+    /// An image or buffer barrier covers accesses through that image or buffer only, so this one must be recorded as a
+    /// global memory barrier. An image then gets its layout by a barrier of its own in a later command, from `dst_stage`
+    /// to `dst_stage`, which forms a chain with the first.
+    pub fn is_aliasing(&self) -> bool {
+        self.takes_over.iter().any(|&other| other != self.resource)
+    }
+}
+
 impl<W> Plan<W> {
     /// Index in [`Plan::resources`] of the resource that `handle` is a version of; `None` if no pass that runs uses it.
     pub fn find(&self, handle: impl Into<Handle>) -> Option<usize> {
@@ -123,30 +179,4 @@ impl<W> Plan<W> {
     pub fn unaliased_bytes(&self) -> u64 {
         self.resources.iter().filter_map(|resource| resource.placement).map(|placement| placement.size_bytes).sum()
     }
-}
-
-/// Puts together what the stages before have found.
-pub(super) fn plan<W>(
-    graph: Graph<W>,
-    order: &[usize],
-    resources: Vec<PlannedResource>,
-    blocks: Vec<Block>,
-    (barriers, final_barriers): (Vec<Vec<Barrier>>, Vec<Barrier>),
-    culled: Vec<(String, String)>,
-    kept: Kept,
-) -> Plan<W> {
-    let needed: HashSet<Handle> =
-        order.iter().flat_map(|&pass| &graph.passes[pass].uses).filter_map(|use_| use_.needs()).collect();
-    let plan_use = |use_: &Use| {
-        let resource = resources.iter().position(|resource| resource.declared == use_.handle.resource)?;
-        let outlives = resources[resource].imported || resources[resource].kept;
-        let kept = use_.makes().is_some_and(|made| outlives || needed.contains(&made));
-        Some(PlannedUse { resource, access: use_.access, mode: use_.mode, kept })
-    };
-    let mut declared: Vec<Option<Pass<W>>> = graph.passes.into_iter().map(Some).collect();
-    let passes = order.iter().zip(barriers).filter_map(|(&pass, barriers)| {
-        let Pass { name, uses, work, .. } = declared[pass].take()?;
-        Some(PlannedPass { name, barriers, uses: uses.iter().filter_map(plan_use).collect(), work: work? })
-    });
-    Plan { passes: passes.collect(), final_barriers, resources, blocks, culled, kept }
 }

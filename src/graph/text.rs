@@ -1,8 +1,7 @@
 //! The plan as text: what runs, what waits for what, what does not run, and where everything lies.
 use super::access::{Access, Mode};
-use super::barriers::Barrier;
-use super::declare::ResourceKind;
-use super::plan::{Plan, PlannedResource, PlannedUse};
+use super::plan::{Barrier, Plan, PlannedResource, PlannedUse};
+use super::resource::ResourceKind;
 use ash::vk::{AccessFlags2, ImageLayout, PipelineStageFlags2};
 use std::fmt::{Display, Formatter, Result};
 

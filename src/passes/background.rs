@@ -1,10 +1,10 @@
 //! Puts the environment behind the surface.
-use super::{CameraRays, FrameGraph, View, tiles_of};
+use super::{CameraRays, View};
 use crate::Result;
 use crate::environment::Environment;
-use crate::graph::{Access, Image};
+use crate::graph::{FrameGraph, ImageHandle};
 use crate::memo::Keyed;
-use crate::vulkan::{self, Bindings, ComputePipeline, Device, Groups, ImageShape, Sampler, SamplerKind};
+use crate::vulkan::{self, ComputePipeline, Device, ImageShape, Sampler, SamplerKind};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 use half::f16;
@@ -74,26 +74,16 @@ pub(super) fn check_map_size(
 pub fn background<'a>(
     graph: &mut FrameGraph<'a>,
     background: &'a Background,
-    radiance: Image,
-    view: &'a View,
-) -> Image {
-    let mut pass = graph.pass("background");
-    let radiance = pass.modify(radiance, Access::StorageWriteCompute);
-    let push = Push {
-        camera: view.camera_rays(),
-        size_px: [view.width, view.height],
-        rotation: view.rotation(),
-        radiance_scale: view.intensity as f32,
-    };
-    pass.depends_on(&background.pipeline.key).depends_on(&background.map.key).depends_on(&bytemuck::bytes_of(&push));
-    pass.record(Box::new(move |commands, resources| {
-        let Background { pipeline, map } = background;
-        let bindings = Bindings::new().image("radiance", resources.image(radiance)).sampled(
-            "environment_map",
-            &map.image,
-            &map.sampler,
-        );
-        commands.dispatch(pipeline, &bindings, bytemuck::bytes_of(&push), Groups::Direct(tiles_of(view)))
-    }));
+    mut radiance: ImageHandle,
+    view: &View,
+) -> ImageHandle {
+    let size_px = [view.width, view.height];
+    let (rotation, radiance_scale) = (view.rotation(), view.intensity as f32);
+    graph
+        .compute("background", &background.pipeline)
+        .modify("radiance", &mut radiance)
+        .sampled("environment_map", &background.map.image, &background.map.sampler)
+        .push(&Push { camera: view.camera_rays(), size_px, rotation, radiance_scale })
+        .cover([view.width, view.height, 1]);
     radiance
 }

@@ -1,16 +1,13 @@
 //! The floor of shading: as many trilinear lookups as a method makes, and nothing else.
-use super::FrameGraph;
 use super::light::DevicePyramid;
 use crate::Result;
 use crate::environment::Pyramid;
-use crate::graph::{Access, Buffer, BufferDesc};
-use crate::vulkan::{Bindings, ComputePipeline, Device, Groups, PipelineCache, compiled};
+use crate::graph::{BufferDesc, BufferHandle, FrameGraph};
+use crate::vulkan::{ComputePipeline, Device, PipelineCache, compiled};
 use bytemuck::{Pod, Zeroable};
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
-/// Pixels of a workgroup.
-const GROUP_SIZE: u32 = 64;
 /// Workgroups along an axis that every device can dispatch.
 const MAX_GROUPS: u32 = 65535;
 
@@ -59,18 +56,15 @@ impl BareLookups {
 }
 
 /// Looks up; leaves for each pixel the sum of what it saw, RGB in units of the pyramid's texels, and 1.
-pub fn bare_lookups<'a>(graph: &mut FrameGraph<'a>, bare: &'a BareLookups) -> Buffer {
-    let sums = graph.buffer("sums", BufferDesc { size_bytes: bare.sums_bytes() });
-    let mut pass = graph.pass("bare_lookups");
-    let sums = pass.write(sums, Access::StorageWriteCompute);
-    pass.record(Box::new(move |commands, resources| {
-        let BareLookups { pipeline, pyramid, push } = bare;
-        let bindings = Bindings::new()
-            .sampled("environment_pyramid", &pyramid.image, &pyramid.sampler)
-            .buffer("Sums", resources.buffer(sums));
-        let groups = push.pixel_count.div_ceil(GROUP_SIZE);
-        let groups = Groups::Direct([groups.min(MAX_GROUPS), groups.div_ceil(MAX_GROUPS), 1]);
-        commands.dispatch(pipeline, &bindings, bytemuck::bytes_of(push), groups)
-    }));
+pub fn bare_lookups<'a>(graph: &mut FrameGraph<'a>, bare: &'a BareLookups) -> BufferHandle {
+    let BareLookups { pipeline, pyramid, push } = bare;
+    let mut sums = graph.buffer("sums", BufferDesc { size_bytes: bare.sums_bytes() });
+    let groups = push.pixel_count.div_ceil(pipeline.group_size()[0]);
+    graph
+        .compute("bare_lookups", pipeline)
+        .sampled("environment_pyramid", &pyramid.image, &pyramid.sampler)
+        .write("Sums", &mut sums)
+        .push(push)
+        .groups([groups.min(MAX_GROUPS), groups.div_ceil(MAX_GROUPS), 1]);
     sums
 }

@@ -1,8 +1,8 @@
 //! Sorts pixels into interior, edge and background, and lists those to shade: nothing else is looked at again.
-use super::{FrameGraph, View, clear, tiles_of};
-use crate::graph::{Access, Buffer, BufferDesc, Image, ImageDesc};
+use super::View;
+use crate::graph::{BufferDesc, BufferHandle, FrameGraph, ImageDesc, ImageHandle};
 use crate::memo::Keyed;
-use crate::vulkan::{Bindings, ComputePipeline, Groups};
+use crate::vulkan::ComputePipeline;
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 
@@ -10,9 +10,6 @@ use bytemuck::{Pod, Zeroable};
 /// parts of a mesh count as edges and cost as much as all sub-pixels shaded alone; wider, and the parts of the sum
 /// belong to visibly different normals.
 pub const SMOOTH_DEG: f32 = 10.0;
-
-/// Pixels on the side of a tile. `TILE_SIDE` in glsl/tiles.glsl.
-const TILE_SIDE: u32 = 8;
 
 /// The tiles of one class: arguments of an indirect dispatch and a count. `TileClass` in glsl/tiles.glsl.
 #[repr(C)]
@@ -63,41 +60,36 @@ struct Push {
 #[derive(Clone, Copy)]
 pub struct Tiles {
     /// [`Counters`].
-    pub counters: Buffer,
+    pub counters: BufferHandle,
     /// The tiles that hold interior pixels, then, from the middle, those that hold edge pixels.
-    pub tiles: Buffer,
+    pub tiles: BufferHandle,
     /// For each tile of the image the places of its pixels in it: interior ones from the front, edge ones from the back.
-    pub pixels: Buffer,
+    pub pixels: BufferHandle,
     /// Linear radiance times coverage, and coverage.
-    pub radiance: Image,
+    pub radiance: ImageHandle,
 }
 
 /// Lists the pixels of `geometry` that hold surface.
-pub fn classify<'a>(graph: &mut FrameGraph<'a>, classify: &'a Classify, geometry: Image, view: &'a View) -> Tiles {
+pub fn classify<'a>(graph: &mut FrameGraph<'a>, classify: &'a Classify, geometry: ImageHandle, view: &View) -> Tiles {
     let (width, height) = (view.width, view.height);
-    let counters = graph.buffer("counters", BufferDesc { size_bytes: size_of::<Counters>() as u64 });
-    let counters = clear(graph, "clear_counters", counters);
-    let tile_count = u64::from(width.div_ceil(TILE_SIDE)) * u64::from(height.div_ceil(TILE_SIDE));
-    let tiles = graph.buffer("tile_list", BufferDesc { size_bytes: 2 * 4 * tile_count });
-    let pixels = graph.buffer("pixel_list", BufferDesc { size_bytes: 4 * u64::from(TILE_SIDE.pow(2)) * tile_count });
-    let radiance = graph.kept_image("radiance", ImageDesc { format: vk::Format::R32G32B32A32_SFLOAT, width, height });
-    let mut pass = graph.pass("classify");
-    pass.read(geometry, Access::SampledCompute);
-    let counters = pass.modify(counters, Access::StorageWriteCompute);
-    let tiles = pass.write(tiles, Access::StorageWriteCompute);
-    let pixels = pass.write(pixels, Access::StorageWriteCompute);
-    let radiance = pass.write(radiance, Access::StorageWriteCompute);
-    let push = Push { size_px: [width, height], cos_smooth: SMOOTH_DEG.to_radians().cos() };
-    pass.depends_on(&classify.pipeline.key).depends_on(&bytemuck::bytes_of(&push));
-    pass.record(Box::new(move |commands, resources| {
-        let bindings = Bindings::new()
-            .image("geometry", resources.image(geometry))
-            .buffer("counters", resources.buffer(counters))
-            .buffer("tile_list", resources.buffer(tiles))
-            .buffer("pixel_list", resources.buffer(pixels))
-            .image("radiance", resources.image(radiance));
-        let groups = Groups::Direct(tiles_of(view));
-        commands.dispatch(&classify.pipeline, &bindings, bytemuck::bytes_of(&push), groups)
-    }));
+    // A workgroup is a tile.
+    let [columns, rows, _] = classify.pipeline.group_size();
+    let tile_count = u64::from(width.div_ceil(columns)) * u64::from(height.div_ceil(rows));
+    let tile_pixels = u64::from(columns * rows);
+    let mut counters = graph.buffer("counters", BufferDesc { size_bytes: size_of::<Counters>() as u64 });
+    graph.clear_buffer("clear_counters", &mut counters);
+    let mut tiles = graph.buffer("tile_list", BufferDesc { size_bytes: 2 * 4 * tile_count });
+    let mut pixels = graph.buffer("pixel_list", BufferDesc { size_bytes: 4 * tile_pixels * tile_count });
+    let linear = vk::Format::R32G32B32A32_SFLOAT;
+    let mut radiance = graph.kept_image("radiance", ImageDesc { format: linear, width, height });
+    graph
+        .compute("classify", &classify.pipeline)
+        .read("geometry", geometry)
+        .modify("counters", &mut counters)
+        .write("tile_list", &mut tiles)
+        .write("pixel_list", &mut pixels)
+        .write("radiance", &mut radiance)
+        .push(&Push { size_px: [width, height], cos_smooth: SMOOTH_DEG.to_radians().cos() })
+        .cover([width, height, 1]);
     Tiles { counters, tiles, pixels, radiance }
 }

@@ -1,12 +1,10 @@
 //! Pass 1 of the paper (section 4.1): normal and material of what is seen, at sub-pixel resolution.
-use super::{FrameGraph, View};
+use super::View;
 use crate::Result;
-use crate::graph::{Access, Image, ImageDesc};
+use crate::graph::{FrameGraph, ImageDesc, ImageHandle};
 use crate::memo::Keyed;
 use crate::scene::Mesh;
-use crate::vulkan::{
-    Buffer, ColorTarget, DepthTarget, Device, GraphicsPipeline, GraphicsState, PipelineCache, compiled,
-};
+use crate::vulkan::{Device, GraphicsPipeline, GraphicsState, PipelineCache, Triangles, VertexAttribute, compiled};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 use glam::{DAffine3, DVec3, Vec3};
@@ -16,16 +14,16 @@ use std::sync::Arc;
 const GEOMETRY_FORMAT: vk::Format = vk::Format::R32G32_UINT;
 const DEPTH_FORMAT: vk::Format = vk::Format::D32_SFLOAT;
 
+/// Bytes of a position, and of a normal.
+const VERTEX_STRIDE: u32 = size_of::<[f32; 3]>() as u32;
+
 /// Distance of the near plane in units of the scene's extent: with reversed, infinite depth it costs no precision to keep it
 /// nearer than any surface that a camera outside of the scene sees.
 const NEAR_PLANE: f64 = 1e-6;
 
 /// The triangles of a mesh on the device.
 pub struct DeviceMesh {
-    positions: Buffer,
-    normals: Buffer,
-    indices: Buffer,
-    index_count: u32,
+    triangles: Triangles,
     /// Bounding sphere in object space: centre and radius.
     bounds: (Vec3, f32),
 }
@@ -36,13 +34,13 @@ impl DeviceMesh {
     /// # Errors
     /// No device memory left.
     pub fn new(device: &Arc<Device>, name: &str, mesh: &Mesh) -> Result<Self> {
-        let vertex = vk::BufferUsageFlags::VERTEX_BUFFER;
-        let upload = |part, usage, bytes: &[u8]| Buffer::with_contents(device, &format!("{name} {part}"), usage, bytes);
+        let attribute = |name, bytes| VertexAttribute { name, stride: VERTEX_STRIDE, bytes };
+        let attributes = [
+            attribute("positions", bytemuck::cast_slice(&mesh.positions)),
+            attribute("normals", bytemuck::cast_slice(&mesh.normals)),
+        ];
         Ok(Self {
-            positions: upload("positions", vertex, bytemuck::cast_slice(&mesh.positions))?,
-            normals: upload("normals", vertex, bytemuck::cast_slice(&mesh.normals))?,
-            indices: upload("indices", vk::BufferUsageFlags::INDEX_BUFFER, bytemuck::cast_slice(&mesh.indices))?,
-            index_count: mesh.indices.len() as u32,
+            triangles: Triangles::new(device, name, &attributes, &mesh.indices)?,
             bounds: mesh.bounding_sphere(),
         })
     }
@@ -87,7 +85,7 @@ struct Push {
 /// A driver that cannot compile them.
 pub fn geometry_pipeline(device: &Arc<Device>, cache: &PipelineCache) -> Result<GraphicsPipeline> {
     let state = GraphicsState {
-        attributes: &[(vk::Format::R32G32B32_SFLOAT, 12), (vk::Format::R32G32B32_SFLOAT, 12)],
+        attributes: &[(vk::Format::R32G32B32_SFLOAT, VERTEX_STRIDE); 2],
         colors: &[GEOMETRY_FORMAT],
         depth: DEPTH_FORMAT,
     };
@@ -97,7 +95,7 @@ pub fn geometry_pipeline(device: &Arc<Device>, cache: &PipelineCache) -> Result<
 
 impl GeometryCache {
     /// The push constants of every object that is drawn.
-    fn draws(&self, view: &View) -> Vec<(&Keyed<DeviceMesh>, Push)> {
+    fn draws(&self, view: &View) -> Vec<(&Triangles, Push)> {
         let (right, up, forward) = view.camera.basis();
         let eye = view.camera.eye;
         let half_height = (view.camera.fov_y_deg.to_radians() / 2.0).tan();
@@ -120,7 +118,7 @@ impl GeometryCache {
                 forward: pack(forward, NEAR_PLANE),
                 material: object.material,
             };
-            (&self.meshes[object.mesh], push)
+            (&self.meshes[object.mesh].triangles, push)
         };
         self.objects.iter().map(draw).collect()
     }
@@ -142,29 +140,11 @@ impl GeometryCache {
 }
 
 /// Draws every object into the geometry cache.
-pub fn geometry_cache<'a>(graph: &mut FrameGraph<'a>, cache: &'a GeometryCache, view: &'a View) -> Image {
+pub fn geometry_cache<'a>(graph: &mut FrameGraph<'a>, cache: &'a GeometryCache, view: &View) -> ImageHandle {
     let [width, height] = view.cache_size();
-    let geometry = graph.kept_image("geometry", ImageDesc { format: GEOMETRY_FORMAT, width, height });
-    let depth = graph.image("depth", ImageDesc { format: DEPTH_FORMAT, width, height });
-    let mut pass = graph.pass("geometry_cache");
-    let geometry = pass.write(geometry, Access::ColorAttachment);
-    let depth = pass.write(depth, Access::DepthAttachment);
-    let draws = cache.draws(view);
-    pass.depends_on(&cache.pipeline.key);
-    for (mesh, push) in &draws {
-        pass.depends_on(&mesh.key).depends_on(&bytemuck::bytes_of(push));
-    }
-    pass.record(Box::new(move |commands, resources| {
-        let color = ColorTarget { image: resources.image(geometry), clear: [0; 4] };
-        let depth = DepthTarget { image: resources.image(depth), clear: 0.0 };
-        commands.render(&color, &depth, |commands| {
-            for (mesh, push) in &draws {
-                let vertices = [&mesh.positions, &mesh.normals];
-                let push = bytemuck::bytes_of(push);
-                commands.draw(&cache.pipeline, push, &vertices, &mesh.indices, mesh.index_count)?;
-            }
-            Ok(())
-        })
-    }));
+    let mut geometry = graph.kept_image("geometry", ImageDesc { format: GEOMETRY_FORMAT, width, height });
+    let mut depth = graph.image("depth", ImageDesc { format: DEPTH_FORMAT, width, height });
+    let pass = graph.raster("geometry_cache", &cache.pipeline);
+    pass.color(&mut geometry, [0; 4]).depth(&mut depth, 0.0).draw(cache.draws(view));
     geometry
 }

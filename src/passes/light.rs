@@ -4,7 +4,7 @@ use crate::Result;
 use crate::environment::{Environment, LightMap, Pyramid};
 use crate::light::{BlurredLight, Light};
 use crate::method::Method;
-use crate::vulkan::{self, Bindings, Buffer, Device, ImageKind, ImageShape, Sampler, SamplerKind};
+use crate::vulkan::{self, Bound, Buffer, Device, ImageKind, ImageShape, Sampler, SamplerKind};
 use ash::vk;
 use std::sync::Arc;
 
@@ -76,27 +76,21 @@ impl DeviceLight {
         Ok(())
     }
 
-    /// Adds all of it to `bindings`.
-    pub(super) fn bind<'a>(&'a self, mut bindings: Bindings<'a>) -> Bindings<'a> {
+    /// All of it, by name in the shader.
+    pub(super) fn bindings(&self) -> Vec<(&'static str, Bound<'_>)> {
         let pyramids = [
             ("environment_pyramid", &self.pyramid),
             ("source_pyramid", &self.source_pyramid),
             ("irradiance_map", &self.irradiance),
         ];
-        for (name, pyramid) in pyramids {
-            if let Some(pyramid) = pyramid {
-                bindings = bindings.sampled(name, &pyramid.image, &pyramid.sampler);
-            }
-        }
-        if let Some(map) = &self.map {
-            bindings = bindings.image("environment_map", map);
-        }
-        for (name, buffer) in [("LightAliases", &self.aliases), ("Sources", &self.sources)] {
-            if let Some(buffer) = buffer {
-                bindings = bindings.buffer(name, buffer);
-            }
-        }
-        bindings
+        let pyramids = pyramids.into_iter().filter_map(|(name, pyramid)| {
+            let DevicePyramid { image, sampler, .. } = pyramid.as_ref()?;
+            Some((name, Bound::Sampled(image, sampler)))
+        });
+        let buffers = [("LightAliases", &self.aliases), ("Sources", &self.sources)];
+        let buffers = buffers.into_iter().filter_map(|(name, buffer)| Some((name, Bound::from(buffer.as_ref()?))));
+        let map = self.map.iter().map(|map| ("environment_map", Bound::from(map)));
+        pyramids.chain(map).chain(buffers).collect()
     }
 
     /// Texels along the edge of a face of the pyramid; 0 if there is none.

@@ -5,7 +5,6 @@
 mod background;
 mod bare_lookups;
 mod classify;
-mod clear;
 mod geometry_cache;
 mod light;
 #[cfg(feature = "viewer")]
@@ -21,7 +20,6 @@ mod vmf_pyramid;
 pub use background::{Background, BackgroundMap, background};
 pub use bare_lookups::{BareLookups, bare_lookups};
 pub use classify::{Classify, Counters, SMOOTH_DEG, Tiles, classify};
-pub use clear::clear;
 pub use geometry_cache::{DeviceMesh, GeometryCache, PlacedMesh, geometry_cache, geometry_pipeline};
 pub use light::DeviceLight;
 #[cfg(feature = "viewer")]
@@ -33,13 +31,3 @@ pub use tone_map::{ToneMap, tone_map};
 pub use ui::ui;
 pub use view::{CameraRays, View};
 pub use vmf_pyramid::vmf_pyramid;
-
-use crate::graph::{Graph, Work};
-
-/// The graph that these passes declare themselves in.
-pub type FrameGraph<'a> = Graph<Work<'a>>;
-
-/// Workgroups of 8 x 8 that cover an image.
-fn tiles_of(view: &View) -> [u32; 3] {
-    [view.width.div_ceil(8), view.height.div_ceil(8), 1]
-}

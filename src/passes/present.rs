@@ -1,6 +1,5 @@
 //! Puts the picture into the window.
-use super::FrameGraph;
-use crate::graph::{Access, Image};
+use crate::graph::{FrameGraph, ImageHandle};
 
 /// Where the picture is in the window, in pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,21 +18,16 @@ pub struct Area {
 const AROUND: [f32; 4] = [0.08, 0.08, 0.08, 1.0];
 
 /// Scales `display` to its `area` of `window`, an image of the swapchain; all else is grey, as all is without a picture.
-pub fn present(graph: &mut FrameGraph<'_>, display: Option<Image>, window: Image, area: Area) -> Image {
-    let mut pass = graph.pass("clear_window");
-    let window = pass.write(window, Access::TransferWrite);
-    pass.record(Box::new(move |commands, resources| {
-        commands.clear_image(resources.image(window), AROUND);
-        Ok(())
-    }));
-    let Some(display) = display else { return window };
-    let mut pass = graph.pass("present");
-    pass.read(display, Access::TransferRead);
-    let window = pass.modify(window, Access::TransferWrite);
-    pass.record(Box::new(move |commands, resources| {
+pub fn present(
+    graph: &mut FrameGraph<'_>,
+    display: Option<ImageHandle>,
+    mut window: ImageHandle,
+    area: Area,
+) -> ImageHandle {
+    graph.clear_image("clear_window", &mut window, AROUND);
+    if let Some(display) = display {
         let Area { left, top, width, height } = area;
-        commands.blit(resources.image(display), resources.image(window), [left, top, width, height]);
-        Ok(())
-    }));
+        graph.blit("present", display, &mut window, [left, top, width, height]);
+    }
     window
 }

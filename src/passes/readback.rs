@@ -1,34 +1,9 @@
 //! Copies what the CPU wants to see into memory that it can read.
-use super::FrameGraph;
 use crate::Result;
-use crate::graph::{Access, Buffer, BufferDesc, DeviceResource, Handle, Image};
+use crate::graph::{Access, BufferDesc, BufferHandle, DeviceResource, FrameGraph, Handle, ImageHandle};
 use crate::vulkan::{self, BufferUse, Device};
 use ash::vk;
 use std::sync::Arc;
-
-/// Copies all texels of `image`, tightly packed, into the imported buffer `target`.
-fn read_image(graph: &mut FrameGraph<'_>, name: &str, image: Image, target: Buffer) -> Buffer {
-    let mut pass = graph.pass(name);
-    pass.read(image, Access::TransferRead);
-    let target = pass.write(target, Access::TransferWrite);
-    pass.record(Box::new(move |commands, resources| {
-        commands.copy_image_to_buffer(resources.image(image), resources.buffer(target));
-        Ok(())
-    }));
-    target
-}
-
-/// Copies all of `buffer` into the imported buffer `target`.
-fn read_buffer(graph: &mut FrameGraph<'_>, name: &str, buffer: Buffer, target: Buffer) -> Buffer {
-    let mut pass = graph.pass(name);
-    pass.read(buffer, Access::TransferRead);
-    let target = pass.write(target, Access::TransferWrite);
-    pass.record(Box::new(move |commands, resources| {
-        commands.copy_buffer(resources.buffer(buffer), resources.buffer(target));
-        Ok(())
-    }));
-    target
-}
 
 /// Adds copies into host memory to a graph.
 pub struct Readbacks<'a, 'd> {
@@ -46,7 +21,7 @@ impl<'a, 'd> Readbacks<'a, 'd> {
     }
 
     /// Imports a buffer that the CPU will read after the frame.
-    fn target(&mut self, name: &str, size_bytes: u64) -> Result<(Buffer, Arc<vulkan::Buffer>)> {
+    fn target(&mut self, name: &str, size_bytes: u64) -> Result<(BufferHandle, Arc<vulkan::Buffer>)> {
         let usage = vk::BufferUsageFlags::TRANSFER_DST;
         let target = Arc::new(vulkan::Buffer::new(self.device, name, size_bytes, usage, BufferUse::Readback)?);
         let handle = self.graph.import_buffer(name, BufferDesc { size_bytes }, None, Some(Access::HostRead));
@@ -58,10 +33,10 @@ impl<'a, 'd> Readbacks<'a, 'd> {
     ///
     /// # Errors
     /// No memory left.
-    pub fn buffer(&mut self, name: &str, source: Buffer, size_bytes: u64) -> Result<Arc<vulkan::Buffer>> {
-        let (handle, target) = self.target(&format!("{name}_target"), size_bytes)?;
-        let copied = read_buffer(&mut self.graph, name, source, handle);
-        self.graph.output(copied);
+    pub fn buffer(&mut self, name: &str, source: BufferHandle, size_bytes: u64) -> Result<Arc<vulkan::Buffer>> {
+        let (mut handle, target) = self.target(&format!("{name}_target"), size_bytes)?;
+        self.graph.copy_buffer(name, source, &mut handle);
+        self.graph.output(handle);
         Ok(target)
     }
 
@@ -72,7 +47,7 @@ impl<'a, 'd> Readbacks<'a, 'd> {
     pub fn image(
         &mut self,
         name: &str,
-        source: Image,
+        source: ImageHandle,
         [width, height]: [u32; 2],
         texel_bytes: u64,
         wanted: bool,
@@ -80,10 +55,10 @@ impl<'a, 'd> Readbacks<'a, 'd> {
         if !wanted {
             return Ok(None);
         }
-        let (handle, target) =
+        let (mut handle, target) =
             self.target(&format!("{name}_target"), texel_bytes * u64::from(width) * u64::from(height))?;
-        let copied = read_image(&mut self.graph, name, source, handle);
-        self.graph.output(copied);
+        self.graph.copy_image(name, source, &mut handle);
+        self.graph.output(handle);
         Ok(Some(target))
     }
 }

@@ -1,13 +1,11 @@
 //! Pass 2 of the paper (section 4.2): the radiance of every listed pixel, by its partition of the sample threads.
-use super::{CameraRays, Counters, DeviceLight, FrameGraph, Tiles, View, clear};
+use super::{CameraRays, Counters, DeviceLight, Tiles, View};
 use crate::brdf::{Brdf, MaterialRecord, MerlTable};
-use crate::graph::{self, Access, BufferDesc, Image};
+use crate::graph::{BufferDesc, BufferHandle, FrameGraph, ImageHandle};
 use crate::memo::Keyed;
 use crate::method::Method;
 use crate::threads::{SliceTable, Threads};
-use crate::vulkan::{
-    self, Bindings, Buffer, ComputePipeline, Device, Groups, ImageKind, ImageShape, Sampler, SamplerKind,
-};
+use crate::vulkan::{self, Bound, Buffer, ComputePipeline, Device, ImageKind, ImageShape, Sampler, SamplerKind};
 use crate::{Error, Result};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
@@ -78,6 +76,16 @@ impl DeviceMaterials {
             table_sampler: Sampler::new(device, "brdf tables", SamplerKind::WrappedLinear)?,
             models_used,
         })
+    }
+}
+
+impl DeviceMaterials {
+    /// All of it, by name in the shader; the last two as the method declares them.
+    fn bindings(&self) -> Vec<(&'static str, Bound<'_>)> {
+        let tables = Bound::Sampled(&self.tables, &self.table_sampler);
+        let optional = [("Threads", &self.threads), ("Slices", &self.slices)];
+        let optional = optional.into_iter().filter_map(|(name, buffer)| Some((name, Bound::from(buffer.as_ref()?))));
+        [("Materials", Bound::from(&self.records)), ("brdf_tables", tables)].into_iter().chain(optional).collect()
     }
 }
 
@@ -172,70 +180,53 @@ struct Push {
     seed: [u32; 2],
 }
 
+impl Push {
+    fn new(view: &View, sampling: &Sampling, light: &DeviceLight, kind: u32) -> Self {
+        Self {
+            camera: view.camera_rays(),
+            size_px: [view.width, view.height],
+            kind,
+            face_size: light.face_size(),
+            rotation: view.rotation(),
+            radiance_scale: view.intensity as f32 * light.radiance_scale(),
+            sample_count: sampling.count,
+            seed: [sampling.seed as u32, (sampling.seed >> 32) as u32],
+        }
+    }
+}
+
 /// What shading leaves.
 #[derive(Clone, Copy)]
 pub struct Shaded {
     /// Linear radiance times coverage, and coverage.
-    pub radiance: Image,
+    pub radiance: ImageHandle,
     /// Number of lookups in the environment that were made: a u64.
-    pub lookups: graph::Buffer,
+    pub lookups: BufferHandle,
 }
 
 /// Shades the pixels that `tiles` lists: interior ones with one sum shared by all sub-pixels, then those at edges.
 pub fn shade<'a>(
     graph: &mut FrameGraph<'a>,
     shade: &'a Shade,
-    geometry: Image,
+    geometry: ImageHandle,
     tiles: &Tiles,
-    view: &'a View,
+    view: &View,
 ) -> Shaded {
-    let Tiles { counters, tiles, pixels, radiance } = *tiles;
-    let lookups = graph.buffer("lookups", BufferDesc { size_bytes: size_of::<u64>() as u64 });
-    let lookups = clear(graph, "clear_lookups", lookups);
-    let mut pass = graph.pass("shade");
-    pass.read(geometry, Access::SampledCompute);
-    pass.read(counters, Access::Indirect);
-    pass.read(counters, Access::StorageReadCompute);
-    pass.read(tiles, Access::StorageReadCompute);
-    pass.read(pixels, Access::StorageReadCompute);
-    let radiance = pass.modify(radiance, Access::StorageWriteCompute);
-    let lookups = pass.modify(lookups, Access::StorageWriteCompute);
+    let Tiles { counters, tiles, pixels, mut radiance } = *tiles;
     let Shade { pipeline, materials, light, sampling } = shade;
-    let push = Push {
-        camera: view.camera_rays(),
-        size_px: [view.width, view.height],
-        kind: 0,
-        face_size: light.face_size(),
-        rotation: view.rotation(),
-        radiance_scale: view.intensity as f32 * light.radiance_scale(),
-        sample_count: sampling.count,
-        seed: [sampling.seed as u32, (sampling.seed >> 32) as u32],
-    };
-    pass.depends_on(&[pipeline.key, materials.key, light.key]).depends_on(&bytemuck::bytes_of(&push));
-    pass.record(Box::new(move |commands, resources| {
-        let counters = resources.buffer(counters);
-        let mut bindings = Bindings::new()
-            .image("geometry", resources.image(geometry))
-            .buffer("counters", counters)
-            .buffer("tile_list", resources.buffer(tiles))
-            .buffer("pixel_list", resources.buffer(pixels))
-            .image("radiance", resources.image(radiance))
-            .buffer("Materials", &materials.records)
-            .sampled("brdf_tables", &materials.tables, &materials.table_sampler)
-            .buffer("all_lookups", resources.buffer(lookups));
-        // The rest as the method declares it.
-        bindings = light.bind(bindings);
-        for (name, buffer) in [("Threads", &materials.threads), ("Slices", &materials.slices)] {
-            if let Some(buffer) = buffer {
-                bindings = bindings.buffer(name, buffer);
-            }
-        }
-        for kind in [0, 1] {
-            let push = Push { kind, ..push };
-            let groups = Groups::Indirect(counters, Counters::arguments_of(kind));
-            commands.dispatch(pipeline, &bindings, bytemuck::bytes_of(&push), groups)?;
-        }
-        Ok(())
-    }));
+    let mut lookups = graph.buffer("lookups", BufferDesc { size_bytes: size_of::<u64>() as u64 });
+    graph.clear_buffer("clear_lookups", &mut lookups);
+    let dispatch = |kind| (Counters::arguments_of(kind), Push::new(view, sampling, light, kind));
+    graph
+        .compute("shade", pipeline)
+        .read("geometry", geometry)
+        .read("counters", counters)
+        .read("tile_list", tiles)
+        .read("pixel_list", pixels)
+        .modify("radiance", &mut radiance)
+        .modify("all_lookups", &mut lookups)
+        .bind_all(materials.bindings())
+        .bind_all(light.bindings())
+        .indirect(counters, [0, 1].map(dispatch));
     Shaded { radiance, lookups }
 }

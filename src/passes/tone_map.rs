@@ -1,8 +1,8 @@
 //! Linear radiance to 8-bit display values: exposure, clamp, gamma.
-use super::{FrameGraph, View, tiles_of};
-use crate::graph::{Access, Image, ImageDesc};
+use super::View;
+use crate::graph::{FrameGraph, ImageDesc, ImageHandle};
 use crate::memo::Keyed;
-use crate::vulkan::{Bindings, ComputePipeline, Groups};
+use crate::vulkan::ComputePipeline;
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 
@@ -22,18 +22,19 @@ struct Push {
 }
 
 /// Makes the picture to look at out of `radiance`: RGBA, 8 bits each.
-pub fn tone_map<'a>(graph: &mut FrameGraph<'a>, tone_map: &'a ToneMap, radiance: Image, view: &'a View) -> Image {
+pub fn tone_map<'a>(
+    graph: &mut FrameGraph<'a>,
+    tone_map: &'a ToneMap,
+    radiance: ImageHandle,
+    view: &'a View,
+) -> ImageHandle {
     let (width, height) = (view.width, view.height);
-    let display = graph.kept_image("display", ImageDesc { format: vk::Format::R8G8B8A8_UNORM, width, height });
-    let mut pass = graph.pass("tone_map");
-    pass.read(radiance, Access::StorageReadCompute);
-    let display = pass.write(display, Access::StorageWriteCompute);
-    let push = Push { size_px: [width, height], exposure: view.exposure, inverse_gamma: 1.0 / view.gamma };
-    pass.depends_on(&tone_map.pipeline.key).depends_on(&bytemuck::bytes_of(&push));
-    pass.record(Box::new(move |commands, resources| {
-        let bindings =
-            Bindings::new().image("radiance", resources.image(radiance)).image("display", resources.image(display));
-        commands.dispatch(&tone_map.pipeline, &bindings, bytemuck::bytes_of(&push), Groups::Direct(tiles_of(view)))
-    }));
+    let mut display = graph.kept_image("display", ImageDesc { format: vk::Format::R8G8B8A8_UNORM, width, height });
+    graph
+        .compute("tone_map", &tone_map.pipeline)
+        .read("radiance", radiance)
+        .write("display", &mut display)
+        .push(&Push { size_px: [width, height], exposure: view.exposure, inverse_gamma: 1.0 / view.gamma })
+        .cover([width, height, 1]);
     display
 }

@@ -1,12 +1,16 @@
 //! Draws the panel over the picture.
-use super::FrameGraph;
-use crate::graph::{Access, Image};
+use crate::graph::{Access, FrameGraph, ImageHandle};
 use crate::vulkan::{UiFrame, UiPainter};
 
 /// Draws `frame` over `window`, an image of the swapchain.
-pub fn ui<'a>(graph: &mut FrameGraph<'a>, painter: &'a UiPainter, frame: &'a UiFrame, window: Image) -> Image {
+pub fn ui<'a>(
+    graph: &mut FrameGraph<'a>,
+    painter: &'a UiPainter,
+    frame: &'a UiFrame,
+    window: ImageHandle,
+) -> ImageHandle {
     let mut pass = graph.pass("ui");
     let window = pass.modify(window, Access::ColorAttachment);
-    pass.record(Box::new(move |commands, resources| commands.draw_ui(painter, frame, resources.image(window))));
+    pass.record(Box::new(move |commands, resources| Ok(commands.draw_ui(painter, frame, resources.image(window)?)?)));
     window
 }

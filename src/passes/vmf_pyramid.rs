@@ -2,19 +2,17 @@
 //!
 //! In many short submissions, since a device without a second queue (such as a processor) draws no frame until a submission has ended,
 //! and so that it can be cancelled.
-use super::{FrameGraph, Readbacks, texels};
+use super::{Readbacks, texels};
 use crate::environment::{BlurKernel, BlurStep, Pyramid, VmfPyramid};
-use crate::graph::{Access, BufferDesc, DeviceResource, Executable};
+use crate::graph::{Access, BufferDesc, DeviceResource, Executable, FrameGraph};
 use crate::progress::Observer;
-use crate::vulkan::{Bindings, Buffer, BufferUse, ComputePipeline, Device, Frames, Groups, PipelineCache, compiled};
+use crate::vulkan::{Buffer, BufferUse, ComputePipeline, Device, Frames, PipelineCache, compiled};
 use crate::{Error, Result};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 use std::cell::Cell;
 use std::sync::Arc;
 
-/// Texels along the edges of a workgroup.
-const GROUP: usize = 8;
 /// Maps with smaller faces are made at once; in larger ones a submission is a row of workgroups of one face.
 const SMALLEST_DIVIDED: usize = 64;
 
@@ -44,7 +42,7 @@ pub fn vmf_pyramid(
     let storage = vk::BufferUsageFlags::STORAGE_BUFFER;
     let finest = Arc::new(Buffer::with_contents(device, "box", storage, finest_texels)?);
     let steps = VmfPyramid::steps(source.face_size);
-    let total = steps.iter().map(|step| parts(step.size).count()).sum();
+    let total = steps.iter().map(|step| parts(&pipeline, step.size).count()).sum();
     let (mut done, mut maps, mut levels) = (0, Vec::new(), Vec::new());
     for step in &steps {
         let usage = storage | vk::BufferUsageFlags::TRANSFER_SRC;
@@ -65,9 +63,10 @@ pub fn vmf_pyramid(
 }
 
 /// First row and first face of each part of a map with faces of `size`.
-fn parts(size: usize) -> impl Iterator<Item = [u32; 2]> {
-    let (rows, faces) = if size < SMALLEST_DIVIDED { (1, 1) } else { (size.div_ceil(GROUP), 6) };
-    (0..faces).flat_map(move |face| (0..rows).map(move |row| [(row * GROUP) as u32, face]))
+fn parts(pipeline: &ComputePipeline, size: usize) -> impl Iterator<Item = [u32; 2]> + use<> {
+    let group_rows = pipeline.group_size()[1];
+    let (rows, faces) = if size < SMALLEST_DIVIDED { (1, 1) } else { ((size as u32).div_ceil(group_rows), 6) };
+    (0..faces).flat_map(move |face| (0..rows).map(move |row| [row * group_rows, face]))
 }
 
 /// Makes the map of `step` part by part; `go_on` is asked before each of them.
@@ -83,36 +82,28 @@ fn blur(
     let BlurStep { from_kernel, from_size, size, kernel, .. } = *step;
     let mut graph = FrameGraph::new();
     let mut import = |name: &str, buffer: &Arc<Buffer>| {
-        let desc = BufferDesc { size_bytes: buffer.size_bytes };
+        let desc = BufferDesc { size_bytes: buffer.size_bytes() };
         graph.import_buffer(name, desc, Some(Access::StorageWriteCompute), None)
     };
-    let (source, target) = (import("source", from), import("vmf_map", map));
+    let (source, mut target) = (import("source", from), import("vmf_map", map));
     let imports =
         [(source.into(), DeviceResource::Buffer(from.clone())), (target.into(), DeviceResource::Buffer(map.clone()))];
-    let mut pass = graph.pass("blur");
-    pass.read(source, Access::StorageReadCompute);
-    let target = pass.modify(target, Access::StorageWriteCompute);
-    let part_now = &part;
-    pass.record(Box::new(move |commands, resources| {
-        let bindings =
-            Bindings::new().buffer("Source", resources.buffer(source)).buffer("Destination", resources.buffer(target));
-        let [first_row, first_face] = part_now.get();
-        let push = Push {
-            from_size: from_size as u32,
-            size: size as u32,
-            from_kernel: from_kernel as u32,
-            kernel: kernel as u32,
-            first_row,
-            first_face,
-        };
-        let across = size.div_ceil(GROUP) as u32;
-        let groups = if size < SMALLEST_DIVIDED { [across, across, 6] } else { [across, 1, 1] };
-        commands.dispatch(pipeline, &bindings, bytemuck::bytes_of(&push), Groups::Direct(groups))
-    }));
+    let size_u32 = size as u32;
+    graph
+        .compute("blur", pipeline)
+        .read("Source", source)
+        .modify("Destination", &mut target)
+        .push_later(|| {
+            let [first_row, first_face] = part.get();
+            let (from_kernel, kernel) = (from_kernel as u32, kernel as u32);
+            Push { from_size: from_size as u32, size: size_u32, from_kernel, kernel, first_row, first_face }
+        })
+        // One row of workgroups, or all of all faces.
+        .cover(if size < SMALLEST_DIVIDED { [size_u32, size_u32, 6] } else { [size_u32, 1, 1] });
     graph.output(target);
     let executable = Executable::new(device, graph, &imports)?;
     let mut frames = Frames::new(device, "vmf_pyramid", 1)?;
-    for place in parts(size) {
+    for place in parts(pipeline, size) {
         go_on()?;
         part.set(place);
         executable.execute(&mut frames)?;
@@ -124,11 +115,11 @@ fn blur(
 /// The texels of `map`.
 fn read_back(device: &Arc<Device>, map: &Arc<Buffer>) -> Result<Vec<[f32; 3]>> {
     let mut graph = FrameGraph::new();
-    let desc = BufferDesc { size_bytes: map.size_bytes };
+    let desc = BufferDesc { size_bytes: map.size_bytes() };
     let handle = graph.import_buffer("vmf_map", desc, Some(Access::StorageWriteCompute), None);
     let mut readbacks = Readbacks::new(device, graph);
     readbacks.imports.push((handle.into(), DeviceResource::Buffer(map.clone())));
-    let target = readbacks.buffer("read_map", handle, map.size_bytes)?;
+    let target = readbacks.buffer("read_map", handle, map.size_bytes())?;
     let Readbacks { graph, imports, .. } = readbacks;
     let executable = Executable::new(device, graph, &imports)?;
     let mut frames = Frames::new(device, "vmf_pyramid", 1)?;

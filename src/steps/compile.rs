@@ -48,7 +48,7 @@ impl Step for CompileCompute<'_> {
     const NAME: &'static str = "shaders";
 
     fn key(&self, _: &Memo) -> Result<Key> {
-        let key = on(self.device, self.shader.name).bytes(bytemuck::cast_slice(&self.shader.words()));
+        let key = on(self.device, self.shader.name()).bytes(bytemuck::cast_slice(&self.shader.words()));
         Ok(self.constants.iter().fold(key, |key, (name, value)| key.text(name).number(*value)).build())
     }
 

@@ -1,8 +1,8 @@
 //! The stage: draws frames into the window.
 use crate::Result;
-use crate::graph::{Access, DeviceResource, Executable, ImageDesc, Store};
-use crate::passes::{Area, Counters, FrameGraph, Readbacks, View, present, texels, ui};
-use crate::pipeline::{Renderer, declare};
+use crate::graph::{Access, DeviceResource, Executable, FrameGraph, ImageDesc, ImageHandle, Store};
+use crate::passes::{Area, Counters, Readbacks, View, present, texels, ui};
+use crate::pipeline::{Frame, Renderer, declare};
 use crate::vulkan::{Device, Frames, PassTime, PresentMode, Presented, Surface, Swapchain, UiFrame, UiPainter};
 use egui::TexturesDelta;
 use std::sync::Arc;
@@ -50,6 +50,35 @@ pub struct Extras {
     pub counts: bool,
     /// What the window shows.
     pub screenshot: bool,
+}
+
+/// A frame in the window.
+struct WindowFrame {
+    /// The window's image as it is imported.
+    window: ImageHandle,
+    /// The same, drawn.
+    shown: ImageHandle,
+    /// Of the picture, if there is one.
+    frame: Option<Frame>,
+}
+
+/// Declares `picture` and `panel` over it, in a window of `size`.
+fn declare_window<'a>(
+    graph: &mut FrameGraph<'a>,
+    picture: Option<&ShownPicture<'a>>,
+    painter: &'a UiPainter,
+    panel: &'a UiFrame,
+    [width, height]: [u32; 2],
+) -> WindowFrame {
+    let desc = ImageDesc { format: Swapchain::FORMAT, width, height };
+    let window = graph.import_image("window", desc, None, Some(Access::Present));
+    let nowhere = Area { left: 0, top: 0, width, height };
+    let frame = picture.map(|ShownPicture { renderer, view, .. }| declare(graph, renderer, view));
+    let area = picture.map_or(nowhere, |picture| picture.area);
+    let shown = present(graph, frame.as_ref().map(|frame| frame.display), window, area);
+    let shown = ui(graph, painter, panel, shown);
+    graph.output(shown);
+    WindowFrame { window, shown, frame }
 }
 
 /// The window, as frames see it.
@@ -106,15 +135,8 @@ impl Presenter {
         let [width, height, _] = turn.image.shape.extent;
 
         let mut graph = FrameGraph::new();
-        let desc = ImageDesc { format: Swapchain::FORMAT, width, height };
-        let window = graph.import_image("window", desc, None, Some(Access::Present));
-        let nowhere = Area { left: 0, top: 0, width, height };
-        let frame = picture.as_ref().map(|ShownPicture { renderer, view, .. }| declare(&mut graph, renderer, view));
-        let area = picture.as_ref().map_or(nowhere, |picture| picture.area);
-        let shown = present(&mut graph, frame.as_ref().map(|frame| frame.display), window, area);
-        let shown = ui(&mut graph, &self.painter, panel, shown);
-        graph.output(shown);
-
+        let WindowFrame { window, shown, frame } =
+            declare_window(&mut graph, picture.as_ref(), &self.painter, panel, [width, height]);
         let mut readbacks = Readbacks::new(&self.device, graph);
         // Only frames that shade count: reading what was counted must not be what makes them do so.
         let counting =
@@ -162,3 +184,7 @@ impl Presenter {
         Ok(Some(Drawn { passes, ran, counted, screenshot }))
     }
 }
+
+#[cfg(test)]
+#[path = "presenter_tests.rs"]
+mod tests;

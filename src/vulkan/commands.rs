@@ -1,73 +1,62 @@
 //! Recording: one pass after another, with descriptors bound by the names that the GLSL gives them.
-use super::Result;
+//!
+//! What is recorded here and in the files above has its sizes and usages checked. Two things cannot be: that barriers order
+//! accesses and set layouts, and that what is recorded stays alive until it is submitted. Both are what the frame graph
+//! is for, so only this crate records commands.
 use super::device::Device;
-use super::error::During;
-use super::frames::is_timed;
-use super::memory::{Buffer, Image, Sampler};
-use super::pipeline::{ComputePipeline, GraphicsPipeline, Pipeline};
-use super::shader::Shader;
+use super::error::{During, Result};
+use super::identity::Identity;
+use super::image::{Image, Sampler};
+use super::memory::Buffer;
+use super::pipeline::{ComputePipeline, Pipeline};
+use super::shader::Binding;
 use ash::vk;
 use std::sync::Arc;
 
+/// Passes that a frame can time; more are recorded, but not timed.
+pub(super) const MAX_TIMED_PASSES: u32 = 64;
+
 /// What a binding refers to.
-enum Bound<'a> {
+#[derive(Clone, Copy)]
+pub enum Bound<'a> {
+    /// A storage or uniform buffer.
     Buffer(&'a Buffer),
-    /// Sampled or storage, as the shader declares it.
+    /// An image read by `texelFetch`, or a storage image.
     Image(&'a Image),
+    /// An image with its sampler.
     Sampled(&'a Image, &'a Sampler),
 }
 
-/// The resources of one dispatch or draw, by their names in the shader.
-#[derive(Default)]
-pub struct Bindings<'a>(Vec<(&'a str, Bound<'a>)>);
-
-impl<'a> Bindings<'a> {
-    /// None yet.
-    pub fn new() -> Self {
-        Self::default()
+impl<'a> From<&'a Buffer> for Bound<'a> {
+    fn from(buffer: &'a Buffer) -> Self {
+        Self::Buffer(buffer)
     }
+}
 
-    /// A storage or uniform buffer.
-    pub fn buffer(mut self, name: &'a str, buffer: &'a Buffer) -> Self {
-        self.0.push((name, Bound::Buffer(buffer)));
-        self
+impl<'a> From<&'a Image> for Bound<'a> {
+    fn from(image: &'a Image) -> Self {
+        Self::Image(image)
     }
+}
 
-    /// An image read by `texelFetch` or as a storage image.
-    pub fn image(mut self, name: &'a str, image: &'a Image) -> Self {
-        self.0.push((name, Bound::Image(image)));
-        self
-    }
-
-    /// An image with its sampler.
-    pub fn sampled(mut self, name: &'a str, image: &'a Image, sampler: &'a Sampler) -> Self {
-        self.0.push((name, Bound::Sampled(image, sampler)));
-        self
+impl Bound<'_> {
+    /// Which objects these are.
+    pub(crate) fn identity(&self) -> (Identity, Option<Identity>) {
+        match self {
+            Self::Buffer(buffer) => (buffer.identity, None),
+            Self::Image(image) => (image.identity, None),
+            Self::Sampled(image, sampler) => (image.identity, Some(sampler.identity)),
+        }
     }
 }
 
 /// How many workgroups a dispatch has.
-pub enum Groups<'a> {
+#[derive(Clone, Copy)]
+pub(crate) enum Groups<'a> {
     /// Known now.
     Direct([u32; 3]),
     /// Three u32 at this byte offset of a buffer that an earlier pass has written.
     Indirect(&'a Buffer, u64),
-}
-
-/// A colour target of a draw: cleared first.
-pub struct ColorTarget<'a> {
-    /// Where to draw.
-    pub image: &'a Image,
-    /// What it is cleared to; integer formats take the bits as they are.
-    pub clear: [u32; 4],
-}
-
-/// The depth target of a draw: cleared first, contents not kept afterwards.
-pub struct DepthTarget<'a> {
-    /// Where to draw.
-    pub image: &'a Image,
-    /// What it is cleared to.
-    pub clear: f32,
 }
 
 /// A command buffer being recorded.
@@ -97,7 +86,7 @@ impl Commands {
     ///
     /// # Errors
     /// What `pass` returns.
-    pub fn timed_pass<E>(
+    pub(crate) fn timed_pass<E>(
         &mut self,
         name: &str,
         pass: impl FnOnce(&mut Self) -> std::result::Result<(), E>,
@@ -110,7 +99,7 @@ impl Commands {
             unsafe { debug.cmd_begin_debug_utils_label(self.raw, &info) };
         }
         // Both wait for all work before them, so that passes are timed one by one even where they could overlap.
-        let timed = is_timed(self.timed.len()) && self.queries.is_some();
+        let timed = self.timed.len() < MAX_TIMED_PASSES as usize && self.queries.is_some();
         let first_query = 2 * self.timed.len() as u32;
         if timed {
             self.timed.push(name.to_owned());
@@ -138,17 +127,33 @@ impl Commands {
     /// Runs a compute shader.
     ///
     /// # Errors
-    /// A binding or push constant that the shader does not declare, or one that it declares and is not given.
-    pub fn dispatch(
+    /// What is bound or pushed is not what the shader declares; more workgroups than the device runs.
+    pub(crate) fn dispatch(
         &mut self,
         pipeline: &ComputePipeline,
-        bindings: &Bindings,
+        bindings: &[(&str, Bound)],
         push_constants: &[u8],
         groups: Groups,
     ) -> Result<()> {
+        match groups {
+            Groups::Direct(counts) => {
+                let most = self.device.limits().max_compute_work_group_count;
+                if counts.iter().zip(most).any(|(count, most)| *count > most) {
+                    let problem = format!("{counts:?} workgroups, the device runs at most {most:?}");
+                    return Err(pipeline.0.refuse(problem));
+                }
+            }
+            Groups::Indirect(buffer, offset) => {
+                buffer.check(&self.device, vk::BufferUsageFlags::INDIRECT_BUFFER, offset.saturating_add(12))?;
+                if offset % 4 != 0 {
+                    return Err(pipeline.0.refuse(format!("arguments at byte {offset}, which is no multiple of 4")));
+                }
+            }
+        }
         self.bind(&pipeline.0, vk::PipelineBindPoint::COMPUTE, bindings)?;
         self.push(&pipeline.0, push_constants)?;
-        // SAFETY: pipeline and descriptors are bound; the resources are kept alive by the deletion queue.
+        // SAFETY: pipeline, descriptors and all push constants were set just above, the counts and the range of the arguments
+        // checked; whoever records keeps the resources until the submission.
         unsafe {
             match groups {
                 Groups::Direct([x, y, z]) => self.device.raw.cmd_dispatch(self.raw, x, y, z),
@@ -158,178 +163,18 @@ impl Commands {
         Ok(())
     }
 
-    /// Clears the targets and draws into them what `draw` records.
-    ///
-    /// # Errors
-    /// What `draw` returns.
-    pub fn render(
-        &mut self,
-        color: &ColorTarget,
-        depth: &DepthTarget,
-        draw: impl FnOnce(&mut Self) -> Result<()>,
-    ) -> Result<()> {
-        let [width, height, _] = color.image.shape.extent;
-        let area = vk::Rect2D { offset: vk::Offset2D::default(), extent: vk::Extent2D { width, height } };
-        let colors = [vk::RenderingAttachmentInfo::default()
-            .image_view(color.image.view)
-            .image_layout(vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL)
-            .load_op(vk::AttachmentLoadOp::CLEAR)
-            .store_op(vk::AttachmentStoreOp::STORE)
-            .clear_value(vk::ClearValue { color: vk::ClearColorValue { uint32: color.clear } })];
-        let depth_attachment = vk::RenderingAttachmentInfo::default()
-            .image_view(depth.image.view)
-            .image_layout(vk::ImageLayout::DEPTH_STENCIL_ATTACHMENT_OPTIMAL)
-            .load_op(vk::AttachmentLoadOp::CLEAR)
-            .store_op(vk::AttachmentStoreOp::DONT_CARE)
-            .clear_value(vk::ClearValue {
-                depth_stencil: vk::ClearDepthStencilValue { depth: depth.clear, stencil: 0 },
-            });
-        let info = vk::RenderingInfo::default()
-            .render_area(area)
-            .layer_count(1)
-            .color_attachments(&colors)
-            .depth_attachment(&depth_attachment);
-        let viewport =
-            vk::Viewport { width: width as f32, height: height as f32, max_depth: 1.0, ..Default::default() };
-        // SAFETY: the views are alive and in the layouts named above, by the caller's barriers; ended below.
-        unsafe {
-            self.device.dynamic_rendering.cmd_begin_rendering(self.raw, &info);
-            self.device.raw.cmd_set_viewport(self.raw, 0, &[viewport]);
-            self.device.raw.cmd_set_scissor(self.raw, 0, &[area]);
-        }
-        let result = draw(self);
-        // SAFETY: begun above.
-        unsafe { self.device.dynamic_rendering.cmd_end_rendering(self.raw) };
-        result
-    }
-
-    /// Draws indexed triangles, inside of [`Commands::render`].
-    ///
-    /// # Errors
-    /// Push constants of another size than the shaders declare.
-    pub fn draw(
-        &mut self,
-        pipeline: &GraphicsPipeline,
-        push_constants: &[u8],
-        vertices: &[&Buffer],
-        indices: &Buffer,
-        index_count: u32,
-    ) -> Result<()> {
-        self.bind(&pipeline.0, vk::PipelineBindPoint::GRAPHICS, &Bindings::new())?;
-        self.push(&pipeline.0, push_constants)?;
-        let buffers: Vec<_> = vertices.iter().map(|buffer| buffer.raw).collect();
-        let offsets = vec![0; buffers.len()];
-        // SAFETY: rendering is on; the buffers are kept alive by the deletion queue; indices were checked by the mesh.
-        unsafe {
-            self.device.raw.cmd_bind_vertex_buffers(self.raw, 0, &buffers, &offsets);
-            self.device.raw.cmd_bind_index_buffer(self.raw, indices.raw, 0, vk::IndexType::UINT32);
-            self.device.raw.cmd_draw_indexed(self.raw, index_count, 1, 0, 0, 0);
-        }
-        Ok(())
-    }
-
-    /// Sets a whole buffer to zero.
-    pub fn clear_buffer(&mut self, buffer: &Buffer) {
-        // SAFETY: the buffer is alive, with transfer usage, and not in use by the barriers before.
-        unsafe { self.device.raw.cmd_fill_buffer(self.raw, buffer.raw, 0, vk::WHOLE_SIZE, 0) };
-    }
-
-    /// Copies all of `source` to the start of `target`.
-    pub fn copy_buffer(&mut self, source: &Buffer, target: &Buffer) {
-        let region = [vk::BufferCopy::default().size(source.size_bytes.min(target.size_bytes))];
-        // SAFETY: both are alive and large enough.
-        unsafe { self.device.raw.cmd_copy_buffer(self.raw, source.raw, target.raw, &region) };
-    }
-
-    /// Scales level 0 of `source` to `area` (left, top, width, height) of `target`, bilinearly where their sizes differ; formats
-    /// are converted. Of what lies outside of the target nothing is drawn.
-    pub fn blit(&mut self, source: &Image, target: &Image, [left, top, width, height]: [u32; 4]) {
-        let [target_width, target_height, _] = target.shape.extent;
-        let [source_width, source_height, _] = source.shape.extent;
-        let (shown_width, shown_height) =
-            (width.min(target_width.saturating_sub(left)), height.min(target_height.saturating_sub(top)));
-        if shown_width == 0 || shown_height == 0 {
-            return;
-        }
-        let part = |side: u32, shown: u32, of: u32| (u64::from(side) * u64::from(shown) / u64::from(of)).max(1) as i32;
-        let corner = |x: u32, y: u32| vk::Offset3D { x: x as i32, y: y as i32, z: 0 };
-        let source_end = vk::Offset3D {
-            x: part(source_width, shown_width, width),
-            y: part(source_height, shown_height, height),
-            z: 1,
-        };
-        let region = [vk::ImageBlit::default()
-            .src_subresource(source.shape.level(0))
-            .src_offsets([corner(0, 0), source_end])
-            .dst_subresource(target.shape.level(0))
-            .dst_offsets([corner(left, top), vk::Offset3D { z: 1, ..corner(left + shown_width, top + shown_height) }])];
-        let filter =
-            if [source_width, source_height] == [width, height] { vk::Filter::NEAREST } else { vk::Filter::LINEAR };
-        let layouts = [vk::ImageLayout::TRANSFER_SRC_OPTIMAL, vk::ImageLayout::TRANSFER_DST_OPTIMAL];
-        // SAFETY: both are alive, the caller's barriers set the layouts, the regions are within the images.
-        unsafe {
-            self.device.raw.cmd_blit_image(self.raw, source.raw, layouts[0], target.raw, layouts[1], &region, filter);
-        }
-    }
-
-    /// Fills level 0 of `image`, in transfer-destination layout, with a colour.
-    pub fn clear_image(&mut self, image: &Image, color: [f32; 4]) {
-        let (color, layout) = (vk::ClearColorValue { float32: color }, vk::ImageLayout::TRANSFER_DST_OPTIMAL);
-        // SAFETY: the image is alive, the caller's barriers set the layout.
-        unsafe { self.device.raw.cmd_clear_color_image(self.raw, image.raw, layout, &color, &[image.shape.whole()]) };
-    }
-
-    /// Copies level 0 of `source`, in transfer-source layout, into `target`, tightly packed.
-    pub fn copy_image_to_buffer(&mut self, source: &Image, target: &Buffer) {
-        let region = [vk::BufferImageCopy::default()
-            .image_subresource(source.shape.level(0))
-            .image_extent(source.shape.extent_at(0))];
-        let layout = vk::ImageLayout::TRANSFER_SRC_OPTIMAL;
-        // SAFETY: both are alive, the buffer was sized for the image, the caller's barriers set the layout.
-        unsafe { self.device.raw.cmd_copy_image_to_buffer(self.raw, source.raw, layout, target.raw, &region) };
-    }
-
-    /// Fills every level of a new image and leaves it ready to be sampled.
-    pub(super) fn upload_image(&mut self, image: &Image, levels: &[Buffer]) {
-        let to_transfer = vk::ImageMemoryBarrier2::default()
-            .image(image.raw)
-            .subresource_range(image.shape.whole())
-            .dst_stage_mask(vk::PipelineStageFlags2::COPY)
-            .dst_access_mask(vk::AccessFlags2::TRANSFER_WRITE)
-            .new_layout(vk::ImageLayout::TRANSFER_DST_OPTIMAL);
-        self.barriers(&[to_transfer], &[], &[]);
-        for (level, texels) in (0..).zip(levels) {
-            let region = [vk::BufferImageCopy::default()
-                .image_subresource(image.shape.level(level))
-                .image_extent(image.shape.extent_at(level))];
-            let layout = vk::ImageLayout::TRANSFER_DST_OPTIMAL;
-            // SAFETY: both are alive; the staging buffer holds this level.
-            unsafe { self.device.raw.cmd_copy_buffer_to_image(self.raw, texels.raw, image.raw, layout, &region) };
-        }
-        let to_shaders = vk::ImageMemoryBarrier2::default()
-            .image(image.raw)
-            .subresource_range(image.shape.whole())
-            .src_stage_mask(vk::PipelineStageFlags2::COPY)
-            .src_access_mask(vk::AccessFlags2::TRANSFER_WRITE)
-            .dst_stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)
-            .dst_access_mask(vk::AccessFlags2::SHADER_SAMPLED_READ)
-            .old_layout(vk::ImageLayout::TRANSFER_DST_OPTIMAL)
-            .new_layout(vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL);
-        self.barriers(&[to_shaders], &[], &[]);
-    }
-
     /// An image barrier over all of `image`, for the frame graph.
-    pub fn image_barrier<'a>(image: &Image) -> vk::ImageMemoryBarrier2<'a> {
+    pub(crate) fn image_barrier<'a>(image: &Image) -> vk::ImageMemoryBarrier2<'a> {
         vk::ImageMemoryBarrier2::default().image(image.raw).subresource_range(image.shape.whole())
     }
 
     /// A buffer barrier over all of `buffer`, for the frame graph.
-    pub fn buffer_barrier<'a>(buffer: &Buffer) -> vk::BufferMemoryBarrier2<'a> {
+    pub(crate) fn buffer_barrier<'a>(buffer: &Buffer) -> vk::BufferMemoryBarrier2<'a> {
         vk::BufferMemoryBarrier2::default().buffer(buffer.raw).size(vk::WHOLE_SIZE)
     }
 
     /// Records barriers in one call.
-    pub fn barriers(
+    pub(crate) fn barriers(
         &mut self,
         images: &[vk::ImageMemoryBarrier2],
         buffers: &[vk::BufferMemoryBarrier2],
@@ -346,10 +191,10 @@ impl Commands {
         unsafe { self.device.synchronization2.cmd_pipeline_barrier2(self.raw, &info) };
     }
 
-    fn push(&mut self, pipeline: &Pipeline, push_constants: &[u8]) -> Result<()> {
+    pub(super) fn push(&mut self, pipeline: &Pipeline, push_constants: &[u8]) -> Result<()> {
         if push_constants.len() != pipeline.push_constant_bytes as usize {
             let (given, wanted) = (push_constants.len(), pipeline.push_constant_bytes);
-            return Err(refuse(pipeline, format!("{given} bytes of push constants given, {wanted} declared")));
+            return Err(pipeline.refuse(format!("{given} bytes of push constants given, {wanted} declared")));
         }
         if !push_constants.is_empty() {
             // SAFETY: size and stages are those of the layout.
@@ -361,13 +206,17 @@ impl Commands {
     }
 
     /// Binds the pipeline and a fresh descriptor set.
-    fn bind(&mut self, pipeline: &Pipeline, point: vk::PipelineBindPoint, bindings: &Bindings) -> Result<()> {
-        // SAFETY: the pipeline is alive.
+    pub(super) fn bind(
+        &mut self,
+        pipeline: &Pipeline,
+        point: vk::PipelineBindPoint,
+        bindings: &[(&str, Bound)],
+    ) -> Result<()> {
+        self.device.check_same(&pipeline.device, pipeline.name)?;
+        // SAFETY: the pipeline is alive, and of this device.
         unsafe { self.device.raw.cmd_bind_pipeline(self.raw, point, pipeline.raw) };
-        for (name, _) in &bindings.0 {
-            if !pipeline.bindings.contains_key(*name) {
-                return Err(refuse(pipeline, format!("it declares no binding {name}")));
-            }
+        if let Some((name, _)) = bindings.iter().find(|(name, _)| !pipeline.bindings.contains_key(*name)) {
+            return Err(pipeline.refuse(format!("it declares no binding {name}")));
         }
         if pipeline.bindings.is_empty() {
             return Ok(());
@@ -378,44 +227,63 @@ impl Commands {
         let set = unsafe { self.device.raw.allocate_descriptor_sets(&info) }
             .during("vkAllocateDescriptorSets", pipeline.name)?[0];
         for (name, declared) in &pipeline.bindings {
-            let given = bindings.0.iter().find(|(given, _)| given == name);
-            let (_, bound) = given.ok_or_else(|| refuse(pipeline, format!("binding {name} is not given")))?;
-            let write = vk::WriteDescriptorSet::default()
-                .dst_set(set)
-                .dst_binding(declared.index)
-                .descriptor_type(declared.kind);
-            let layout = match declared.kind {
-                vk::DescriptorType::STORAGE_IMAGE => vk::ImageLayout::GENERAL,
-                _ => vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL,
-            };
-            let (buffers, images);
-            let write = match (bound, declared.kind) {
-                (Bound::Buffer(buffer), vk::DescriptorType::STORAGE_BUFFER | vk::DescriptorType::UNIFORM_BUFFER) => {
-                    buffers = [vk::DescriptorBufferInfo::default().buffer(buffer.raw).range(vk::WHOLE_SIZE)];
-                    write.buffer_info(&buffers)
-                }
-                (Bound::Image(image), vk::DescriptorType::STORAGE_IMAGE | vk::DescriptorType::SAMPLED_IMAGE) => {
-                    images = [vk::DescriptorImageInfo::default().image_view(image.view).image_layout(layout)];
-                    write.image_info(&images)
-                }
-                (Bound::Sampled(image, sampler), vk::DescriptorType::COMBINED_IMAGE_SAMPLER) => {
-                    images = [vk::DescriptorImageInfo::default()
-                        .image_view(image.view)
-                        .sampler(sampler.raw)
-                        .image_layout(layout)];
-                    write.image_info(&images)
-                }
-                (_, kind) => return Err(refuse(pipeline, format!("binding {name} is declared as {kind:?}"))),
-            };
-            // SAFETY: the set is fresh and not yet in use; the infos outlive the call.
-            unsafe { self.device.raw.update_descriptor_sets(&[write], &[]) };
+            let given = bindings.iter().find(|(given, _)| given == name);
+            let (_, bound) = given.ok_or_else(|| pipeline.refuse(format!("binding {name} is not given")))?;
+            self.describe(pipeline, set, name, *declared, bound)?;
         }
         // SAFETY: the set was made for this pipeline's layout.
         unsafe { self.device.raw.cmd_bind_descriptor_sets(self.raw, point, pipeline.layout, 0, &[set], &[]) };
         Ok(())
     }
-}
 
-fn refuse(pipeline: &Pipeline, problem: String) -> super::VulkanError {
-    Shader { name: pipeline.name, stage: super::ShaderStage::Compute, spirv: &[] }.refuse(problem)
+    /// Writes one descriptor of a set that is not yet in use.
+    fn describe(
+        &self,
+        pipeline: &Pipeline,
+        set: vk::DescriptorSet,
+        name: &str,
+        declared: Binding,
+        bound: &Bound,
+    ) -> Result<()> {
+        use vk::{BufferUsageFlags as B, DescriptorType as D, ImageLayout as L, ImageUsageFlags as I};
+        let write =
+            vk::WriteDescriptorSet::default().dst_set(set).dst_binding(declared.index).descriptor_type(declared.kind);
+        let of_buffer = |buffer: &Buffer, usage| {
+            buffer.check(&self.device, usage, 0)?;
+            Ok([vk::DescriptorBufferInfo::default().buffer(buffer.raw).range(vk::WHOLE_SIZE)])
+        };
+        let of_image = |image: &Image, usage, layout| {
+            image.check(&self.device, usage)?;
+            Ok(vk::DescriptorImageInfo::default().image_view(image.view).image_layout(layout))
+        };
+        let (buffers, images);
+        let write = match (bound, declared.kind) {
+            (Bound::Buffer(buffer), D::STORAGE_BUFFER) => {
+                buffers = of_buffer(buffer, B::STORAGE_BUFFER)?;
+                write.buffer_info(&buffers)
+            }
+            (Bound::Buffer(buffer), D::UNIFORM_BUFFER) => {
+                buffers = of_buffer(buffer, B::UNIFORM_BUFFER)?;
+                write.buffer_info(&buffers)
+            }
+            (Bound::Image(image), D::STORAGE_IMAGE) => {
+                images = [of_image(image, I::STORAGE, L::GENERAL)?];
+                write.image_info(&images)
+            }
+            (Bound::Image(image), D::SAMPLED_IMAGE) => {
+                images = [of_image(image, I::SAMPLED, L::SHADER_READ_ONLY_OPTIMAL)?];
+                write.image_info(&images)
+            }
+            (Bound::Sampled(image, sampler), D::COMBINED_IMAGE_SAMPLER) => {
+                self.device.check_same(&sampler.device, name)?;
+                images = [of_image(image, I::SAMPLED, L::SHADER_READ_ONLY_OPTIMAL)?.sampler(sampler.raw)];
+                write.image_info(&images)
+            }
+            (_, kind) => return Err(pipeline.refuse(format!("binding {name} is declared as {kind:?}"))),
+        };
+        // SAFETY: the set is fresh and not yet in use; what it refers to is alive, made for that use, and the infos outlive
+        // the call.
+        unsafe { self.device.raw.update_descriptor_sets(&[write], &[]) };
+        Ok(())
+    }
 }

@@ -1,186 +1,32 @@
-//! The device: which one, its queue, its submissions, and the queue of objects waiting to be destroyed.
-use super::commands::Commands;
-use super::error::{During, VulkanError};
-use super::frames::Semaphores;
+//! The device: which one, its queue, its submissions, and the deletion of what they no longer use.
+use super::deletion::{Deletions, Garbage};
+use super::error::{During, Result, VulkanError};
 use super::instance::Instance;
+use super::physical_device::{Candidate, DeviceDescription, candidates};
 #[cfg(feature = "viewer")]
 use super::surface::Surface;
-use super::{Frames, Result};
 use ash::{ext, khr, vk};
 use gpu_allocator::vulkan::{Allocation, Allocator, AllocatorCreateDesc};
-use std::ffi::CStr;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// What a device is, in the order in which one is preferred when none is named.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum DeviceKind {
-    /// A GPU with memory of its own.
-    Discrete,
-    /// A GPU that shares the CPU's memory.
-    Integrated,
-    /// A GPU handed through by a hypervisor.
-    Virtual,
-    /// A software implementation such as lavapipe.
-    Cpu,
-    /// Anything else.
-    Other,
+/// What a submission waits for before it starts, and signals when it has finished, besides the device's timeline.
+#[derive(Clone, Copy, Default)]
+pub struct Semaphores {
+    pub(super) wait: Option<vk::Semaphore>,
+    pub(super) signal: Option<vk::Semaphore>,
 }
 
-/// A physical device, as `threadlight devices` lists it.
-#[derive(Clone, Debug)]
-pub struct DeviceDescription {
-    /// Position in the loader's list: what `--device INDEX` means.
-    pub index: usize,
-    /// Name as the driver gives it.
-    pub name: String,
-    /// Driver name and version, e.g. `llvmpipe (Mesa 22.3.6)`.
-    pub driver: String,
-    /// What it is.
-    pub kind: DeviceKind,
-    /// Vulkan version, e.g. `1.3.230`.
-    pub api_version: String,
-    /// What it lacks for Threadlight; empty if it can be used.
-    pub lacks: Vec<&'static str>,
-}
-
-impl DeviceDescription {
-    /// Whether `--device asked` means this device: its index, or part of its name or its driver's, in any case.
-    fn answers_to(&self, asked: &str) -> bool {
-        let asked = asked.to_lowercase();
-        match asked.parse::<usize>() {
-            Ok(index) => index == self.index,
-            Err(_) => {
-                let driver = self.driver.to_lowercase();
-                // Mesa's software driver calls itself llvmpipe; everybody else calls it lavapipe.
-                self.name.to_lowercase().contains(&asked)
-                    || driver.contains(&asked)
-                    || (asked == "lavapipe" && driver.starts_with("llvmpipe"))
-            }
-        }
-    }
-}
-
-/// A physical device and what was found out about it.
-struct Candidate {
-    description: DeviceDescription,
-    physical: vk::PhysicalDevice,
-    properties: vk::PhysicalDeviceProperties,
-    queue_family: u32,
-    timestamp_valid_bits: u32,
-    is_lavapipe: bool,
-    extensions: Vec<&'static CStr>,
-}
-
-/// The devices that the loader offers, usable or not.
-///
-/// # Errors
-/// No driver at all, or a failing query.
-pub fn describe_devices(instance: &Instance) -> Result<Vec<DeviceDescription>> {
-    Ok(candidates(instance)?.into_iter().map(|candidate| candidate.description).collect())
-}
-
-fn candidates(instance: &Instance) -> Result<Vec<Candidate>> {
-    // SAFETY: plain query of a live instance.
-    let physical_devices = unsafe { instance.raw.enumerate_physical_devices() };
-    let physical_devices = match physical_devices {
-        Err(vk::Result::ERROR_INITIALIZATION_FAILED) => Vec::new(),
-        other => other.during("vkEnumeratePhysicalDevices", "instance")?,
-    };
-    if physical_devices.is_empty() {
-        return Err(VulkanError::NoDriver);
-    }
-    physical_devices.into_iter().enumerate().map(|(index, physical)| candidate(instance, index, physical)).collect()
-}
-
-fn candidate(instance: &Instance, index: usize, physical: vk::PhysicalDevice) -> Result<Candidate> {
-    let mut driver = vk::PhysicalDeviceDriverProperties::default();
-    let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut driver);
-    // SAFETY: `physical` comes from this instance.
-    unsafe { instance.raw.get_physical_device_properties2(physical, &mut properties) };
-    let properties = properties.properties;
-    let name = text(properties.device_name_as_c_str());
-    let driver_text = format!("{} ({})", text(driver.driver_name_as_c_str()), text(driver.driver_info_as_c_str()));
-
-    let mut lacks = Vec::new();
-    let version = properties.api_version;
-    if version < vk::API_VERSION_1_2 {
-        lacks.push("Vulkan 1.2");
-    }
-    // SAFETY: as above.
-    let available = unsafe { instance.raw.enumerate_device_extension_properties(physical) }
-        .during("vkEnumerateDeviceExtensionProperties", &name)?;
-    let mut extensions = Vec::new();
-    let mut has = |wanted: &'static CStr| {
-        let found = available.iter().any(|extension| extension.extension_name_as_c_str() == Ok(wanted));
-        if found {
-            extensions.push(wanted);
-        }
-        found
-    };
-    // The extensions are asked for even where Vulkan 1.3 has them in its core: their entry points are the same ones.
-    let has_synchronization2 = has(khr::synchronization2::NAME);
-    let has_dynamic_rendering = has(khr::dynamic_rendering::NAME);
-    // A portability driver insists on this one being enabled.
-    has(khr::portability_subset::NAME);
-    #[cfg(feature = "viewer")]
-    if instance.presents {
-        has(khr::swapchain::NAME);
-    }
-    if !has_synchronization2 {
-        lacks.push("VK_KHR_synchronization2");
-    }
-    if !has_dynamic_rendering {
-        lacks.push("VK_KHR_dynamic_rendering");
+impl Semaphores {
+    /// The same for the first of several submissions that were to be one.
+    pub fn first(self) -> Self {
+        Self { signal: None, ..self }
     }
 
-    // SAFETY: as above.
-    let families = unsafe { instance.raw.get_physical_device_queue_family_properties(physical) };
-    let wanted = vk::QueueFlags::GRAPHICS | vk::QueueFlags::COMPUTE;
-    let queue_family = families.iter().position(|family| family.queue_flags.contains(wanted));
-    if queue_family.is_none() {
-        lacks.push("a queue for both graphics and compute");
+    /// The same for the last of several submissions that were to be one.
+    pub fn last(self) -> Self {
+        Self { wait: None, ..self }
     }
-    let queue_family = queue_family.unwrap_or(0);
-    let timestamp_valid_bits = families.get(queue_family).map_or(0, |family| family.timestamp_valid_bits);
-
-    let kind = match properties.device_type {
-        vk::PhysicalDeviceType::DISCRETE_GPU => DeviceKind::Discrete,
-        vk::PhysicalDeviceType::INTEGRATED_GPU => DeviceKind::Integrated,
-        vk::PhysicalDeviceType::VIRTUAL_GPU => DeviceKind::Virtual,
-        vk::PhysicalDeviceType::CPU => DeviceKind::Cpu,
-        _ => DeviceKind::Other,
-    };
-    let api_version = format!(
-        "{}.{}.{}",
-        vk::api_version_major(version),
-        vk::api_version_minor(version),
-        vk::api_version_patch(version)
-    );
-    let description = DeviceDescription { index, name, driver: driver_text, kind, api_version, lacks };
-    let queue_family = queue_family as u32;
-    let is_lavapipe = driver.driver_id == vk::DriverId::MESA_LLVMPIPE;
-    Ok(Candidate { description, physical, properties, queue_family, timestamp_valid_bits, is_lavapipe, extensions })
-}
-
-/// A name in a fixed-size array of the driver's; empty if it is not terminated.
-fn text<E>(name: std::result::Result<&CStr, E>) -> String {
-    name.map(|name| name.to_string_lossy().into_owned()).unwrap_or_default()
-}
-
-/// A handle whose last use may still be in flight.
-pub(super) enum Garbage {
-    Buffer(vk::Buffer),
-    Image(vk::Image),
-    ImageView(vk::ImageView),
-    Sampler(vk::Sampler),
-    Pipeline(vk::Pipeline),
-    PipelineLayout(vk::PipelineLayout),
-    DescriptorSetLayout(vk::DescriptorSetLayout),
-    DescriptorPool(vk::DescriptorPool),
-    CommandPool(vk::CommandPool),
-    QueryPool(vk::QueryPool),
-    Memory(Allocation),
 }
 
 /// A logical device with one queue for everything.
@@ -203,7 +49,7 @@ pub struct Device {
     submitted: AtomicU64,
     // `None` only while the device is being dropped: the allocator has to go first.
     allocator: Mutex<Option<Allocator>>,
-    deletions: Mutex<Vec<(u64, Garbage)>>,
+    deletions: Deletions,
     pub(super) instance: Arc<Instance>,
 }
 
@@ -223,6 +69,7 @@ impl Device {
     /// No driver, no device of that name, or one that lacks what the renderer needs or cannot present to that window.
     #[cfg(feature = "viewer")]
     pub fn for_surface(instance: &Arc<Instance>, asked: Option<&str>, surface: &Surface) -> Result<Arc<Self>> {
+        surface.check_instance(instance)?;
         let mut candidates = candidates(instance)?;
         for candidate in &mut candidates {
             if !candidate.extensions.contains(&khr::swapchain::NAME) {
@@ -307,7 +154,7 @@ impl Device {
             timeline,
             submitted: AtomicU64::new(0),
             allocator: Mutex::new(Some(allocator)),
-            deletions: Mutex::new(Vec::new()),
+            deletions: Deletions::default(),
             instance: instance.clone(),
             raw,
         }))
@@ -326,6 +173,11 @@ impl Device {
         self.timestamp_valid_bits > 0 && !self.is_lavapipe
     }
 
+    /// An error for the object `name` of `other`, if that is another device than this.
+    pub(super) fn check_same(&self, other: &Self, name: &str) -> Result<()> {
+        if std::ptr::eq(self, other) { Ok(()) } else { Err(VulkanError::unfit(name, "it is of another device")) }
+    }
+
     /// Limits, as the driver states them.
     pub fn limits(&self) -> &vk::PhysicalDeviceLimits {
         &self.properties.limits
@@ -341,21 +193,6 @@ impl Device {
     /// Bytes of device memory handed out to buffers and images at this moment.
     pub fn allocated_bytes(&self) -> u64 {
         lock(&self.allocator).as_ref().map_or(0, |allocator| allocator.generate_report().total_allocated_bytes)
-    }
-
-    /// Records commands, submits them and waits until they are done: for uploads and tests, not for frames.
-    ///
-    /// # Errors
-    /// Whatever recording or submission fails with.
-    pub fn submit_and_wait<T>(
-        self: &Arc<Self>,
-        name: &str,
-        record: impl FnOnce(&mut Commands) -> Result<T>,
-    ) -> Result<T> {
-        let mut frames = Frames::new(self, name, 1)?;
-        let result = frames.record(record)?;
-        frames.wait()?;
-        Ok(result)
     }
 
     /// Hands `commands` to the queue; the returned value is reached when they have finished.
@@ -414,17 +251,11 @@ impl Device {
     /// Destroys `garbage` when everything submitted so far has finished.
     pub(super) fn delete_later(&self, garbage: Garbage) {
         let last_use = self.submitted.load(Ordering::Acquire);
-        lock(&self.deletions).push((last_use, garbage));
+        self.deletions.add(last_use, garbage);
     }
 
     fn collect_garbage(&self, finished: u64) {
-        let ready: Vec<_> = {
-            let mut deletions = lock(&self.deletions);
-            let (ready, waiting) = deletions.drain(..).partition(|(last_use, _)| *last_use <= finished);
-            *deletions = waiting;
-            ready
-        };
-        for (_, garbage) in ready {
+        for garbage in self.deletions.take(finished) {
             // SAFETY: each handle was made by this device, is owned by the queue alone since its owner was dropped,
             // and the last submission that could use it has finished.
             unsafe {
@@ -482,7 +313,7 @@ impl Drop for Device {
     }
 }
 
-/// A panic elsewhere leaves these plain lists intact, so a poisoned lock is no reason to stop.
+/// A panic elsewhere leaves these plain values intact, so a poisoned lock is no reason to stop.
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

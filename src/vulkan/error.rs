@@ -1,6 +1,8 @@
 //! What Vulkan refused, with the call and the object's name kept.
 use ash::vk;
 
+pub(crate) type Result<T> = std::result::Result<T, VulkanError>;
+
 /// An error of the Vulkan layer.
 #[derive(Debug, thiserror::Error)]
 pub enum VulkanError {
@@ -62,6 +64,14 @@ pub enum VulkanError {
         /// What the allocator said.
         cause: String,
     },
+    /// An object is used for what it was not made for.
+    #[error("{object}: {problem}")]
+    Unfit {
+        /// Debug name of the object concerned.
+        object: String,
+        /// What does not fit.
+        problem: String,
+    },
     /// A shader and its caller disagree.
     #[error("shader {shader}: {problem}")]
     Shader {
@@ -72,13 +82,20 @@ pub enum VulkanError {
     },
 }
 
+impl VulkanError {
+    /// A [`VulkanError::Unfit`] about the object of this name.
+    pub(super) fn unfit(object: &str, problem: impl ToString) -> Self {
+        Self::Unfit { object: object.to_owned(), problem: problem.to_string() }
+    }
+}
+
 /// Attaches the call and the object's name to a bare `vk::Result`.
 pub(super) trait During<T> {
-    fn during(self, call: &'static str, object: &str) -> Result<T, VulkanError>;
+    fn during(self, call: &'static str, object: &str) -> Result<T>;
 }
 
 impl<T> During<T> for ash::prelude::VkResult<T> {
-    fn during(self, call: &'static str, object: &str) -> Result<T, VulkanError> {
+    fn during(self, call: &'static str, object: &str) -> Result<T> {
         self.map_err(|result| VulkanError::Call { call, object: object.to_owned(), result })
     }
 }

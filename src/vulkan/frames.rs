@@ -1,8 +1,8 @@
 //! Frames in flight: each has its command pool, descriptors and timestamps, and is reused when the GPU is done with it.
-use super::Result;
-use super::commands::Commands;
-use super::device::{Device, Garbage};
-use super::error::During;
+use super::commands::{Commands, MAX_TIMED_PASSES};
+use super::deletion::Garbage;
+use super::device::{Device, Semaphores};
+use super::error::{During, Result, VulkanError};
 use ash::vk;
 use std::sync::Arc;
 
@@ -14,28 +14,6 @@ pub struct PassTime {
     /// Milliseconds between the timestamps before and after it.
     pub gpu_ms: f64,
 }
-
-/// What a submission waits for before it starts, and signals when it has finished, besides the device's timeline.
-#[derive(Clone, Copy, Default)]
-pub struct Semaphores {
-    pub(super) wait: Option<vk::Semaphore>,
-    pub(super) signal: Option<vk::Semaphore>,
-}
-
-impl Semaphores {
-    /// The same for the first of several submissions that were to be one.
-    pub fn first(self) -> Self {
-        Self { signal: None, ..self }
-    }
-
-    /// The same for the last of several submissions that were to be one.
-    pub fn last(self) -> Self {
-        Self { wait: None, ..self }
-    }
-}
-
-/// Passes that a frame can time; more are recorded, but not timed.
-const MAX_TIMED_PASSES: u32 = 64;
 
 /// What one frame in flight owns.
 struct Slot {
@@ -71,7 +49,7 @@ impl Frames {
     ///
     /// # Errors
     /// What `record` returns, or a failing submission.
-    pub fn record<T>(&mut self, record: impl FnOnce(&mut Commands) -> Result<T>) -> Result<T> {
+    pub(crate) fn record<T>(&mut self, record: impl FnOnce(&mut Commands) -> Result<T>) -> Result<T> {
         self.record_between(Semaphores::default(), record)
     }
 
@@ -79,25 +57,26 @@ impl Frames {
     ///
     /// # Errors
     /// What `record` returns, or a failing submission.
-    pub fn record_between<T>(
+    pub(crate) fn record_between<T, E: From<VulkanError>>(
         &mut self,
         semaphores: Semaphores,
-        record: impl FnOnce(&mut Commands) -> Result<T>,
-    ) -> Result<T> {
+        record: impl FnOnce(&mut Commands) -> std::result::Result<T, E>,
+    ) -> std::result::Result<T, E> {
         let slot = &mut self.slots[self.next];
         self.device.wait_for(slot.finished_at)?;
         slot.begin(&self.device, &self.name)?;
         let mut commands = Commands::new(&self.device, slot.commands, slot.descriptor_pool, slot.queries);
         let result = record(&mut commands)?;
-        slot.timed = commands.into_timed_passes();
+        let timed = commands.into_timed_passes();
         // SAFETY: the command buffer is in the recording state.
         unsafe { self.device.raw.end_command_buffer(slot.commands) }.during("vkEndCommandBuffer", &self.name)?;
         slot.finished_at = self.device.submit(slot.commands, &self.name, semaphores)?;
+        slot.timed = timed;
         self.next = (self.next + 1) % self.slots.len();
         Ok(result)
     }
 
-    /// Blocks until the oldest frame has left the GPU, so that [`Frames::record`] will not wait.
+    /// Blocks until the oldest frame has left the GPU, so that recording the next will not wait.
     ///
     /// # Errors
     /// A lost device.
@@ -137,7 +116,7 @@ impl Frames {
         let Some(queries) = slot.queries.filter(|_| !slot.timed.is_empty()) else { return Ok(Vec::new()) };
         let mut ticks = vec![0_u64; 2 * slot.timed.len()];
         let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;
-        // SAFETY: both timestamps of every timed pass were written by the frame that was waited for.
+        // SAFETY: the frame that was submitted last writes both timestamps of every timed pass; this waits for them.
         unsafe { self.device.raw.get_query_pool_results(queries, 0, &mut ticks, flags) }
             .during("vkGetQueryPoolResults", &self.name)?;
         // Timestamps count modulo the valid bits of the queue.
@@ -227,9 +206,4 @@ impl Drop for Frames {
             }
         }
     }
-}
-
-/// Whether the `index`-th pass of a frame is timed.
-pub(super) fn is_timed(index: usize) -> bool {
-    index < MAX_TIMED_PASSES as usize
 }

@@ -1,11 +1,12 @@
 //! The Vulkan instance: loader, validation layer, and the messages it sends.
-use super::Result;
-use super::error::{During, VulkanError};
+use super::error::{During, Result, VulkanError};
 use ash::{ext, khr, vk};
 use std::ffi::{CStr, c_void};
 use std::sync::{Arc, Mutex, PoisonError};
 
 const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
+/// What errors call it.
+const NAME: &str = "instance";
 
 /// Messages of the validation layer, shared between the instance and whoever reports them.
 #[derive(Clone, Default)]
@@ -64,68 +65,21 @@ impl Instance {
         // SAFETY: loads the system's Vulkan loader; it is unloaded after every object made through it (field order).
         let entry =
             unsafe { ash::Entry::load() }.map_err(|cause| VulkanError::NoLoader { cause: cause.to_string() })?;
-        let name = "instance";
-        // SAFETY: plain query of the loader.
-        let loader_version = unsafe { entry.try_enumerate_instance_version() }
-            .during("vkEnumerateInstanceVersion", name)?
-            .unwrap_or(vk::API_VERSION_1_0);
-        // SAFETY: plain query of the loader.
-        let layers = unsafe { entry.enumerate_instance_layer_properties() }
-            .during("vkEnumerateInstanceLayerProperties", name)?;
-        let has_validation = layers.iter().any(|layer| layer.layer_name_as_c_str() == Ok(VALIDATION_LAYER));
-        if validate && !has_validation {
-            return Err(VulkanError::NoValidationLayer);
-        }
-        let layer_names: Vec<_> = validate.then_some(VALIDATION_LAYER.as_ptr()).into_iter().collect();
-
-        // SAFETY: plain query of the loader.
-        let available = unsafe { entry.enumerate_instance_extension_properties(None) }
-            .during("vkEnumerateInstanceExtensionProperties", name)?;
-        let has = |wanted: &CStr| available.iter().any(|extension| extension.extension_name_as_c_str() == Ok(wanted));
-        if let Some(missing) = wanted.iter().find(|wanted| !has(wanted)) {
+        let offer = Offer::of(&entry, validate)?;
+        if let Some(missing) = wanted.iter().find(|wanted| !offer.has(wanted)) {
             return Err(VulkanError::NoPresentation { extension: missing.to_string_lossy().into_owned() });
         }
-        let mut extensions: Vec<_> = wanted.iter().map(|extension| extension.as_ptr()).collect();
-        let mut flags = vk::InstanceCreateFlags::empty();
-        // Names and labels cost nothing without a tool that listens, and are what a frame debugger shows.
-        let debug_names = validate || has(ext::debug_utils::NAME);
-        if debug_names {
-            extensions.push(ext::debug_utils::NAME.as_ptr());
-        }
-        // MoltenVK is a portability driver: invisible unless the application says that it can cope.
-        if has(khr::portability_enumeration::NAME) {
-            extensions.push(khr::portability_enumeration::NAME.as_ptr());
-            flags |= vk::InstanceCreateFlags::ENUMERATE_PORTABILITY_KHR;
-        }
-
-        let application = vk::ApplicationInfo::default()
-            .application_name(c"threadlight")
-            .engine_name(c"threadlight")
-            .api_version(if loader_version >= vk::API_VERSION_1_3 { vk::API_VERSION_1_3 } else { vk::API_VERSION_1_2 });
         let messages = Messages::default();
         let user_data = Box::new(messages.clone());
-        let mut messenger_info = messenger_info(&user_data);
-        let enabled = [vk::ValidationFeatureEnableEXT::SYNCHRONIZATION_VALIDATION];
-        let mut features = vk::ValidationFeaturesEXT::default().enabled_validation_features(&enabled);
-        let mut info = vk::InstanceCreateInfo::default()
-            .flags(flags)
-            .application_info(&application)
-            .enabled_layer_names(&layer_names)
-            .enabled_extension_names(&extensions);
-        if validate {
-            info = info.push_next(&mut features).push_next(&mut messenger_info);
-        }
-        // SAFETY: `info` and all it points to outlive the call; the user data outlives the instance (field order).
-        let raw = match unsafe { entry.create_instance(&info, None) } {
-            Err(vk::Result::ERROR_INCOMPATIBLE_DRIVER) => return Err(VulkanError::NoDriver),
-            other => other.during("vkCreateInstance", name)?,
-        };
+        // Names and labels cost nothing without a tool that listens, and are what a frame debugger shows.
+        let debug_names = validate || offer.has(ext::debug_utils::NAME);
+        let raw = create(&entry, &offer, validate.then_some(&*user_data), wanted, debug_names)?;
         let messenger = if validate {
             let functions = ext::debug_utils::Instance::new(&entry, &raw);
-            let info = self::messenger_info(&user_data);
+            let info = messenger_info(&user_data);
             // SAFETY: the instance was made with VK_EXT_debug_utils; the user data outlives the messenger.
             let messenger = unsafe { functions.create_debug_utils_messenger(&info, None) }
-                .during("vkCreateDebugUtilsMessengerEXT", name)?;
+                .during("vkCreateDebugUtilsMessengerEXT", NAME)?;
             Some((functions, messenger))
         } else {
             None
@@ -156,6 +110,76 @@ impl Drop for Instance {
         }
         // SAFETY: every device holds an `Arc` of this instance, so none is left.
         unsafe { self.raw.destroy_instance(None) };
+    }
+}
+
+/// What the loader offers.
+struct Offer {
+    version: u32,
+    extensions: Vec<vk::ExtensionProperties>,
+}
+
+impl Offer {
+    /// An error if the validation layer is `needed` and not there.
+    fn of(entry: &ash::Entry, needs_validation: bool) -> Result<Self> {
+        // SAFETY: plain query of the loader.
+        let version = unsafe { entry.try_enumerate_instance_version() }.during("vkEnumerateInstanceVersion", NAME)?;
+        // SAFETY: plain query of the loader.
+        let layers = unsafe { entry.enumerate_instance_layer_properties() }
+            .during("vkEnumerateInstanceLayerProperties", NAME)?;
+        if needs_validation && !layers.iter().any(|layer| layer.layer_name_as_c_str() == Ok(VALIDATION_LAYER)) {
+            return Err(VulkanError::NoValidationLayer);
+        }
+        // SAFETY: plain query of the loader.
+        let extensions = unsafe { entry.enumerate_instance_extension_properties(None) }
+            .during("vkEnumerateInstanceExtensionProperties", NAME)?;
+        Ok(Self { version: version.unwrap_or(vk::API_VERSION_1_0), extensions })
+    }
+
+    fn has(&self, wanted: &CStr) -> bool {
+        self.extensions.iter().any(|extension| extension.extension_name_as_c_str() == Ok(wanted))
+    }
+}
+
+/// Makes an instance with the extensions that are `wanted`, all of which there are, and the validation layer where somebody
+/// listens to it.
+fn create(
+    entry: &ash::Entry,
+    offer: &Offer,
+    listener: Option<&Messages>,
+    wanted: &[&CStr],
+    debug_names: bool,
+) -> Result<ash::Instance> {
+    let layers: Vec<_> = listener.map(|_| VALIDATION_LAYER.as_ptr()).into_iter().collect();
+    let mut extensions: Vec<_> = wanted.iter().map(|extension| extension.as_ptr()).collect();
+    let mut flags = vk::InstanceCreateFlags::empty();
+    if debug_names {
+        extensions.push(ext::debug_utils::NAME.as_ptr());
+    }
+    // MoltenVK is a portability driver: invisible unless the application says that it can cope.
+    if offer.has(khr::portability_enumeration::NAME) {
+        extensions.push(khr::portability_enumeration::NAME.as_ptr());
+        flags |= vk::InstanceCreateFlags::ENUMERATE_PORTABILITY_KHR;
+    }
+    let application = vk::ApplicationInfo::default()
+        .application_name(c"threadlight")
+        .engine_name(c"threadlight")
+        .api_version(if offer.version >= vk::API_VERSION_1_3 { vk::API_VERSION_1_3 } else { vk::API_VERSION_1_2 });
+    let mut messenger_info = listener.map(messenger_info);
+    let enabled = [vk::ValidationFeatureEnableEXT::SYNCHRONIZATION_VALIDATION];
+    let mut features = vk::ValidationFeaturesEXT::default().enabled_validation_features(&enabled);
+    let mut info = vk::InstanceCreateInfo::default()
+        .flags(flags)
+        .application_info(&application)
+        .enabled_layer_names(&layers)
+        .enabled_extension_names(&extensions);
+    if let Some(messenger_info) = &mut messenger_info {
+        info = info.push_next(&mut features).push_next(messenger_info);
+    }
+    // SAFETY: `info` and all it points to outlive the call; whoever listens does so for as long as there is the instance.
+    match unsafe { entry.create_instance(&info, None) } {
+        Err(vk::Result::ERROR_INCOMPATIBLE_DRIVER) => Err(VulkanError::NoDriver),
+        other => other.during("vkCreateInstance", NAME),
     }
 }
 

@@ -1,7 +1,8 @@
-//! Memory and what lives in it: buffers, images, samplers, and getting data there and back.
-use super::Result;
-use super::device::{Device, Garbage};
-use super::error::{During, VulkanError};
+//! Device memory, and the buffers in it.
+use super::deletion::Garbage;
+use super::device::Device;
+use super::error::{During, Result, VulkanError};
+use super::identity::Identity;
 use ash::vk;
 use gpu_allocator::MemoryLocation;
 use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme};
@@ -11,6 +12,8 @@ use std::sync::Arc;
 pub struct Memory {
     // `None` only after drop has taken it.
     allocation: Option<Allocation>,
+    /// The types that it may be of.
+    memory_type_bits: u32,
     device: Arc<Device>,
 }
 
@@ -20,7 +23,7 @@ impl Memory {
     ///
     /// # Errors
     /// No memory left.
-    pub fn new(
+    pub(crate) fn new(
         device: &Arc<Device>,
         name: &str,
         requirements: vk::MemoryRequirements,
@@ -29,7 +32,7 @@ impl Memory {
         Self::allocate(device, name, requirements, MemoryLocation::GpuOnly, for_buffers).map(Arc::new)
     }
 
-    fn allocate(
+    pub(super) fn allocate(
         device: &Arc<Device>,
         name: &str,
         requirements: vk::MemoryRequirements,
@@ -43,15 +46,35 @@ impl Memory {
             .with_allocator(|allocator| allocator.allocate(&description))
             .ok_or_else(|| failed("the device is closing".to_owned()))?
             .map_err(|cause| failed(cause.to_string()))?;
-        Ok(Self { allocation: Some(allocation), device: device.clone() })
+        let memory_type_bits = requirements.memory_type_bits;
+        Ok(Self { allocation: Some(allocation), memory_type_bits, device: device.clone() })
     }
 
-    /// The raw memory object and the position of `offset` in it.
-    fn place(&self, offset: u64) -> (vk::DeviceMemory, u64) {
-        self.allocation.as_ref().map_or((vk::DeviceMemory::null(), 0), |allocation| {
-            // SAFETY: the memory is only bound to, never freed or mapped, through this handle.
-            (unsafe { allocation.memory() }, allocation.offset() + offset)
-        })
+    /// The raw memory object and the position of `offset` in it, where an object of these `needs` has room.
+    pub(super) fn place(
+        &self,
+        offset: u64,
+        needs: vk::MemoryRequirements,
+        object: &str,
+    ) -> Result<(vk::DeviceMemory, u64)> {
+        let refused = |problem: &str| VulkanError::unfit(object, problem);
+        let allocation = self.allocation.as_ref().ok_or_else(|| refused("it was freed"))?;
+        let end = offset.checked_add(needs.size);
+        if end.is_none_or(|end| end > allocation.size())
+            || !(allocation.offset() + offset).is_multiple_of(needs.alignment.max(1))
+        {
+            return Err(refused("it does not fit where it was placed"));
+        }
+        if needs.memory_type_bits & self.memory_type_bits != self.memory_type_bits {
+            return Err(refused("its memory may be of a type that it cannot use"));
+        }
+        // SAFETY: the memory is only bound to, never freed or mapped, through this handle.
+        Ok((unsafe { allocation.memory() }, allocation.offset() + offset))
+    }
+
+    /// What is in it, where the CPU can reach it.
+    pub(super) fn mapped(&mut self) -> Option<&mut [u8]> {
+        self.allocation.as_mut()?.mapped_slice_mut()
     }
 }
 
@@ -77,15 +100,27 @@ pub enum BufferUse {
 /// A buffer and, unless it is transient, its own memory.
 pub struct Buffer {
     pub(super) raw: vk::Buffer,
-    /// Size in bytes.
-    pub size_bytes: u64,
+    size_bytes: u64,
+    usage: vk::BufferUsageFlags,
     name: String,
+    pub(super) identity: Identity,
     // After `raw`, which `drop` queues first.
     memory: Option<Arc<Memory>>,
     device: Arc<Device>,
 }
 
 impl Buffer {
+    /// What buffers can be used as: all that Vulkan has without further extensions.
+    const USAGES: vk::BufferUsageFlags = vk::BufferUsageFlags::from_raw(
+        vk::BufferUsageFlags::TRANSFER_SRC.as_raw()
+            | vk::BufferUsageFlags::TRANSFER_DST.as_raw()
+            | vk::BufferUsageFlags::UNIFORM_BUFFER.as_raw()
+            | vk::BufferUsageFlags::STORAGE_BUFFER.as_raw()
+            | vk::BufferUsageFlags::INDEX_BUFFER.as_raw()
+            | vk::BufferUsageFlags::VERTEX_BUFFER.as_raw()
+            | vk::BufferUsageFlags::INDIRECT_BUFFER.as_raw(),
+    );
+
     /// A buffer with memory of its own; its contents are undefined.
     ///
     /// # Errors
@@ -108,66 +143,61 @@ impl Buffer {
         Ok(buffer)
     }
 
-    /// A device-local buffer that holds `contents`.
-    ///
-    /// # Errors
-    /// No memory left, or a failing submission.
-    pub fn with_contents(
-        device: &Arc<Device>,
-        name: &str,
-        usage: vk::BufferUsageFlags,
-        contents: &[u8],
-    ) -> Result<Self> {
-        let usage = usage | vk::BufferUsageFlags::TRANSFER_DST;
-        let buffer = Self::new(device, name, contents.len() as u64, usage, BufferUse::Device)?;
-        let staging = Self::staging(device, name, contents)?;
-        device.submit_and_wait("upload", |commands| {
-            commands.copy_buffer(&staging, &buffer);
-            Ok(())
-        })?;
-        Ok(buffer)
-    }
-
-    /// A buffer that the CPU has filled with `contents`, to copy from.
-    fn staging(device: &Arc<Device>, name: &str, contents: &[u8]) -> Result<Self> {
-        let name = format!("{name} (staging)");
-        let mut buffer = Self::unbound(device, &name, contents.len() as u64, vk::BufferUsageFlags::TRANSFER_SRC)?;
-        let mut memory = Memory::allocate(device, &name, buffer.requirements(), MemoryLocation::CpuToGpu, true)?;
-        let mapped = memory.allocation.as_mut().and_then(|allocation| allocation.mapped_slice_mut());
-        let mapped = mapped.ok_or_else(|| VulkanError::Memory {
-            object: name.clone(),
-            cause: "the driver's upload memory cannot be mapped".to_owned(),
-        })?;
-        mapped[..contents.len()].copy_from_slice(contents);
-        buffer.bind(&Arc::new(memory), 0)?;
-        Ok(buffer)
-    }
-
     /// A buffer without memory: [`Buffer::bind`] it before use.
     ///
     /// # Errors
     /// A size of zero, or one that the driver refuses.
-    pub fn unbound(device: &Arc<Device>, name: &str, size_bytes: u64, usage: vk::BufferUsageFlags) -> Result<Self> {
+    pub(crate) fn unbound(
+        device: &Arc<Device>,
+        name: &str,
+        size_bytes: u64,
+        usage: vk::BufferUsageFlags,
+    ) -> Result<Self> {
+        if size_bytes == 0 || usage.is_empty() || !Self::USAGES.contains(usage) {
+            return Err(VulkanError::unfit(name, format!("no buffer has {size_bytes} bytes for {usage:?}")));
+        }
         let info = vk::BufferCreateInfo::default().size(size_bytes).usage(usage);
-        // SAFETY: plain creation; destroyed through the deletion queue.
+        // SAFETY: size and usage are valid on every device; destroyed through the deletion queue.
         let raw = unsafe { device.raw.create_buffer(&info, None) }.during("vkCreateBuffer", name)?;
         device.set_name(raw, name);
-        Ok(Self { raw, size_bytes, name: name.to_owned(), memory: None, device: device.clone() })
+        let (name, identity, device) = (name.to_owned(), Identity::new(), device.clone());
+        Ok(Self { raw, size_bytes, usage, name, identity, memory: None, device })
+    }
+
+    /// Its size in bytes.
+    pub fn size_bytes(&self) -> u64 {
+        self.size_bytes
+    }
+
+    /// An error for a buffer that is not of `device`, lacks some `needed` usage, or the bytes before `end`.
+    pub(super) fn check(&self, device: &Device, needed: vk::BufferUsageFlags, end: u64) -> Result<()> {
+        device.check_same(&self.device, &self.name)?;
+        if !self.usage.contains(needed) {
+            return Err(VulkanError::unfit(&self.name, format!("it was not made to be used as {needed:?}")));
+        }
+        if end > self.size_bytes {
+            let problem = format!("it has {} bytes, where {end} are needed", self.size_bytes);
+            return Err(VulkanError::unfit(&self.name, problem));
+        }
+        Ok(())
     }
 
     /// What memory it needs.
-    pub fn requirements(&self) -> vk::MemoryRequirements {
+    pub(crate) fn requirements(&self) -> vk::MemoryRequirements {
         // SAFETY: plain query of a live buffer.
         unsafe { self.device.raw.get_buffer_memory_requirements(self.raw) }
     }
 
-    /// Gives it memory, once.
+    /// Gives it the memory at `offset`, once.
     ///
     /// # Errors
-    /// No memory left.
-    pub fn bind(&mut self, memory: &Arc<Memory>, offset: u64) -> Result<()> {
-        let (raw_memory, offset) = memory.place(offset);
-        // SAFETY: an unbound buffer and a live range that the caller sized by `requirements`; kept alive by `memory`.
+    /// Memory that it has already, or that is not as it requires.
+    pub(crate) fn bind(&mut self, memory: &Arc<Memory>, offset: u64) -> Result<()> {
+        if self.memory.is_some() {
+            return Err(VulkanError::unfit(&self.name, "it has memory already"));
+        }
+        let (raw_memory, offset) = memory.place(offset, self.requirements(), &self.name)?;
+        // SAFETY: the buffer has no memory yet, and the range, which `memory` keeps alive, is as it requires.
         unsafe { self.device.raw.bind_buffer_memory(self.raw, raw_memory, offset) }
             .during("vkBindBufferMemory", &self.name)?;
         self.memory = Some(memory.clone());
@@ -175,7 +205,7 @@ impl Buffer {
     }
 
     /// The contents of a [`BufferUse::Readback`] buffer whose writers have finished; `None` if it is not one.
-    pub fn contents(&self) -> Option<&[u8]> {
+    pub(crate) fn contents(&self) -> Option<&[u8]> {
         let mapped = self.memory.as_ref()?.allocation.as_ref()?.mapped_slice()?;
         mapped.get(..self.size_bytes as usize)
     }
@@ -184,235 +214,5 @@ impl Buffer {
 impl Drop for Buffer {
     fn drop(&mut self) {
         self.device.delete_later(Garbage::Buffer(self.raw));
-    }
-}
-
-/// How an image is addressed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ImageKind {
-    /// Two-dimensional.
-    Plane,
-    /// Three-dimensional.
-    Volume,
-    /// Six square faces, sampled by direction.
-    Cube,
-}
-
-/// Size, format and kind of an image.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ImageShape {
-    /// Format of a texel.
-    pub format: vk::Format,
-    /// Width, height and depth of level 0 in texels.
-    pub extent: [u32; 3],
-    /// Mip levels.
-    pub levels: u32,
-    /// How it is addressed.
-    pub kind: ImageKind,
-}
-
-impl ImageShape {
-    /// A plain two-dimensional image with one level.
-    pub fn plane(format: vk::Format, width: u32, height: u32) -> Self {
-        Self { format, extent: [width, height, 1], levels: 1, kind: ImageKind::Plane }
-    }
-
-    fn layers(&self) -> u32 {
-        if self.kind == ImageKind::Cube { 6 } else { 1 }
-    }
-
-    fn view_type(&self) -> vk::ImageViewType {
-        match self.kind {
-            ImageKind::Plane => vk::ImageViewType::TYPE_2D,
-            ImageKind::Volume => vk::ImageViewType::TYPE_3D,
-            ImageKind::Cube => vk::ImageViewType::CUBE,
-        }
-    }
-
-    /// Colour or depth.
-    pub(super) fn aspect(&self) -> vk::ImageAspectFlags {
-        match self.format {
-            vk::Format::D16_UNORM | vk::Format::D32_SFLOAT | vk::Format::X8_D24_UNORM_PACK32 => {
-                vk::ImageAspectFlags::DEPTH
-            }
-            _ => vk::ImageAspectFlags::COLOR,
-        }
-    }
-
-    /// All levels and layers.
-    pub(super) fn whole(&self) -> vk::ImageSubresourceRange {
-        vk::ImageSubresourceRange::default()
-            .aspect_mask(self.aspect())
-            .level_count(self.levels)
-            .layer_count(self.layers())
-    }
-
-    /// One level of all layers, for copies.
-    pub(super) fn level(&self, level: u32) -> vk::ImageSubresourceLayers {
-        vk::ImageSubresourceLayers::default().aspect_mask(self.aspect()).mip_level(level).layer_count(self.layers())
-    }
-
-    /// Extent of `level`.
-    pub(super) fn extent_at(&self, level: u32) -> vk::Extent3D {
-        let [width, height, depth] = self.extent.map(|size| (size >> level).max(1));
-        vk::Extent3D { width, height, depth }
-    }
-}
-
-/// An image with a view of all of it.
-pub struct Image {
-    pub(super) raw: vk::Image,
-    pub(super) view: vk::ImageView,
-    /// Size, format and kind.
-    pub shape: ImageShape,
-    name: String,
-    memory: Option<Arc<Memory>>,
-    /// Whether it is destroyed with the swapchain that it is of, not by itself.
-    of_swapchain: bool,
-    device: Arc<Device>,
-}
-
-impl Image {
-    /// An image that holds `levels` (texels of each level, layer by layer), ready to be sampled by any shader.
-    ///
-    /// # Errors
-    /// No memory left, or a failing submission.
-    pub fn with_texels(device: &Arc<Device>, name: &str, shape: ImageShape, levels: &[Vec<u8>]) -> Result<Self> {
-        let usage = vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_DST;
-        let mut image = Self::unbound(device, name, shape, usage)?;
-        let memory = Memory::allocate(device, name, image.requirements(), MemoryLocation::GpuOnly, false)?;
-        image.bind(&Arc::new(memory), 0)?;
-        let staging: Vec<_> =
-            levels.iter().map(|texels| Buffer::staging(device, name, texels)).collect::<Result<_>>()?;
-        device.submit_and_wait("upload", |commands| {
-            commands.upload_image(&image, &staging);
-            Ok(())
-        })?;
-        Ok(image)
-    }
-
-    /// An image without memory or view: [`Image::bind`] it before use.
-    ///
-    /// # Errors
-    /// A size or format that the driver refuses.
-    pub fn unbound(device: &Arc<Device>, name: &str, shape: ImageShape, usage: vk::ImageUsageFlags) -> Result<Self> {
-        let [width, height, depth] = shape.extent;
-        let (flags, kind) = match shape.kind {
-            ImageKind::Plane => (vk::ImageCreateFlags::empty(), vk::ImageType::TYPE_2D),
-            ImageKind::Volume => (vk::ImageCreateFlags::empty(), vk::ImageType::TYPE_3D),
-            ImageKind::Cube => (vk::ImageCreateFlags::CUBE_COMPATIBLE, vk::ImageType::TYPE_2D),
-        };
-        let info = vk::ImageCreateInfo::default()
-            .flags(flags)
-            .image_type(kind)
-            .format(shape.format)
-            .extent(vk::Extent3D { width, height, depth })
-            .mip_levels(shape.levels)
-            .array_layers(shape.layers())
-            .samples(vk::SampleCountFlags::TYPE_1)
-            .usage(usage);
-        // SAFETY: plain creation; destroyed through the deletion queue.
-        let raw = unsafe { device.raw.create_image(&info, None) }.during("vkCreateImage", name)?;
-        device.set_name(raw, name);
-        let view = vk::ImageView::null();
-        let (name, device) = (name.to_owned(), device.clone());
-        Ok(Self { raw, view, shape, name, memory: None, of_swapchain: false, device })
-    }
-
-    /// An image that a swapchain owns, which has to outlive it.
-    #[cfg(feature = "viewer")]
-    pub(super) fn of_swapchain(device: &Arc<Device>, name: &str, shape: ImageShape, raw: vk::Image) -> Result<Self> {
-        let (view, memory, name, device) = (vk::ImageView::null(), None, name.to_owned(), device.clone());
-        let mut image = Self { raw, view, shape, name, memory, of_swapchain: true, device };
-        image.make_view()?;
-        Ok(image)
-    }
-
-    /// What memory it needs.
-    pub fn requirements(&self) -> vk::MemoryRequirements {
-        // SAFETY: plain query of a live image.
-        unsafe { self.device.raw.get_image_memory_requirements(self.raw) }
-    }
-
-    /// Gives it memory, once, and makes its view.
-    ///
-    /// # Errors
-    /// No memory left.
-    pub fn bind(&mut self, memory: &Arc<Memory>, offset: u64) -> Result<()> {
-        let (raw_memory, offset) = memory.place(offset);
-        // SAFETY: an unbound image and a live range that the caller sized by `requirements`; kept alive by `memory`.
-        unsafe { self.device.raw.bind_image_memory(self.raw, raw_memory, offset) }
-            .during("vkBindImageMemory", &self.name)?;
-        self.memory = Some(memory.clone());
-        self.make_view()
-    }
-
-    fn make_view(&mut self) -> Result<()> {
-        let info = vk::ImageViewCreateInfo::default()
-            .image(self.raw)
-            .view_type(self.shape.view_type())
-            .format(self.shape.format)
-            .subresource_range(self.shape.whole());
-        // SAFETY: the image is alive and has memory; the view is destroyed with it.
-        self.view =
-            unsafe { self.device.raw.create_image_view(&info, None) }.during("vkCreateImageView", &self.name)?;
-        self.device.set_name(self.view, &self.name);
-        Ok(())
-    }
-}
-
-impl Drop for Image {
-    fn drop(&mut self) {
-        self.device.delete_later(Garbage::ImageView(self.view));
-        if !self.of_swapchain {
-            self.device.delete_later(Garbage::Image(self.raw));
-        }
-    }
-}
-
-/// How a sampler treats coordinates outside of [0, 1] and between texels.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum SamplerKind {
-    /// Trilinear, clamped at the edges: cube maps.
-    Trilinear,
-    /// Bilinear, repeating in the first coordinate and clamped in the others: lat-long maps, tables periodic in phi.
-    WrappedLinear,
-}
-
-/// A sampler.
-pub struct Sampler {
-    pub(super) raw: vk::Sampler,
-    device: Arc<Device>,
-}
-
-impl Sampler {
-    /// Makes one.
-    ///
-    /// # Errors
-    /// The driver's limit of samplers is reached.
-    pub fn new(device: &Arc<Device>, name: &str, kind: SamplerKind) -> Result<Self> {
-        let clamp = vk::SamplerAddressMode::CLAMP_TO_EDGE;
-        let (address_u, mipmaps) = match kind {
-            SamplerKind::Trilinear => (clamp, vk::SamplerMipmapMode::LINEAR),
-            SamplerKind::WrappedLinear => (vk::SamplerAddressMode::REPEAT, vk::SamplerMipmapMode::NEAREST),
-        };
-        let info = vk::SamplerCreateInfo::default()
-            .mag_filter(vk::Filter::LINEAR)
-            .min_filter(vk::Filter::LINEAR)
-            .mipmap_mode(mipmaps)
-            .address_mode_u(address_u)
-            .address_mode_v(clamp)
-            .address_mode_w(clamp)
-            .max_lod(vk::LOD_CLAMP_NONE);
-        // SAFETY: plain creation; destroyed through the deletion queue.
-        let raw = unsafe { device.raw.create_sampler(&info, None) }.during("vkCreateSampler", name)?;
-        device.set_name(raw, name);
-        Ok(Self { raw, device: device.clone() })
-    }
-}
-
-impl Drop for Sampler {
-    fn drop(&mut self) {
-        self.device.delete_later(Garbage::Sampler(self.raw));
     }
 }

@@ -4,15 +4,23 @@
 //! [`Device`], and dropping one hands its handles to the device's deletion queue, which destroys them when
 //! the GPU has finished the last submission made before the drop. So no caller ever has to wait before dropping.
 //!
+//! A file leans only on those above it, or to its left:
+//!
 //! ```text
-//! instance  loader, validation messages          shader    SPIR-V and what it declares (reflection)
-//! device    choice, queue, submissions, deletion  pipeline  layouts from reflection, cache on disk
-//! memory    buffers, images, samplers, upload     commands  one recorded pass after another
-//! surface, swapchain  images that go to a window  frames    frames in flight, timestamps
-//! ui        what egui has laid out
+//! error, instance, surface     what was refused; loader, validation messages; windows
+//! physical_device, deletion    what there is to choose from; what waits for being destroyed
+//! device, identity             the chosen one: its queue and its submissions; which object is which
+//! memory, image                buffers; images and samplers
+//! shader                       SPIR-V and what it declares (reflection)
+//! pipeline_cache, pipeline     compiled ones on disk; layouts from reflection
+//! commands, copies, frames     one recorded pass after another; frames in flight, timestamps
+//! upload, triangles, render    contents of buffers and images; meshes; drawing them
+//! swapchain, ui                images of a window; what egui has laid out
 //! ```
 
 mod commands;
+mod copies;
+mod deletion;
 mod device;
 mod error;
 mod frames;
@@ -20,30 +28,44 @@ mod frames;
 mod glslc;
 #[cfg(feature = "hot-reload")]
 pub mod hot_reload;
+mod identity;
+mod image;
 mod instance;
 mod memory;
+mod physical_device;
 mod pipeline;
+mod pipeline_cache;
+mod render;
 mod shader;
 #[cfg(feature = "viewer")]
 mod surface;
 #[cfg(feature = "viewer")]
 mod swapchain;
+mod triangles;
 #[cfg(feature = "viewer")]
 mod ui;
+mod upload;
 
-pub use commands::{Bindings, ColorTarget, Commands, DepthTarget, Groups};
-pub use device::{Device, DeviceDescription, DeviceKind, describe_devices};
+pub use commands::{Bound, Commands};
+pub use device::{Device, Semaphores};
 pub use error::VulkanError;
-pub use frames::{Frames, PassTime, Semaphores};
+pub use frames::{Frames, PassTime};
+pub use image::{Image, ImageKind, ImageShape, Sampler, SamplerKind};
 pub use instance::{Instance, Messages};
-pub use memory::{Buffer, BufferUse, Image, ImageKind, ImageShape, Memory, Sampler, SamplerKind};
-pub use pipeline::{ComputePipeline, GraphicsPipeline, GraphicsState, PipelineCache};
+pub use memory::{Buffer, BufferUse, Memory};
+pub use physical_device::{DeviceDescription, DeviceKind, describe_devices};
+pub use pipeline::{ComputePipeline, GraphicsPipeline};
+pub use pipeline_cache::PipelineCache;
 pub use shader::{Shader, ShaderStage, compiled};
 #[cfg(feature = "viewer")]
 pub use surface::{Surface, Window};
 #[cfg(feature = "viewer")]
 pub use swapchain::{AcquiredImage, PresentMode, Presented, Swapchain};
+pub use triangles::{Triangles, VertexAttribute};
 #[cfg(feature = "viewer")]
 pub use ui::{UiFrame, UiPainter};
 
-pub(crate) type Result<T> = std::result::Result<T, VulkanError>;
+pub(crate) use commands::Groups;
+pub(crate) use pipeline::GraphicsState;
+pub(crate) use render::{ColorTarget, DepthTarget};
+pub(crate) use shader::{Binding, BindingAccess};

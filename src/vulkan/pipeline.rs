@@ -1,64 +1,13 @@
-//! Pipelines, with every layout taken from the shaders themselves, and the cache of compiled ones on disk.
-use super::Result;
-use super::device::{Device, Garbage};
-use super::error::During;
-use super::shader::{Binding, Interface, Shader};
+//! Pipelines, with every layout taken from the shaders themselves.
+use super::deletion::Garbage;
+use super::device::Device;
+use super::error::{During, Result, VulkanError};
+use super::identity::Identity;
+use super::pipeline_cache::PipelineCache;
+use super::shader::{Binding, Interface, Shader, ShaderStage};
 use ash::vk;
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
 use std::sync::Arc;
-
-/// The driver's cache of compiled pipelines, kept in a file.
-///
-/// A missing, foreign or damaged file is only a slower start: drivers check the header of what they are given.
-pub struct PipelineCache {
-    raw: vk::PipelineCache,
-    file: Option<PathBuf>,
-    device: Arc<Device>,
-}
-
-impl PipelineCache {
-    /// Opens the cache of this device in `folder`; without a folder it lives in memory only.
-    ///
-    /// # Errors
-    /// The driver cannot make a cache.
-    pub fn new(device: &Arc<Device>, folder: Option<&Path>) -> Result<Self> {
-        let uuid: String = device.properties.pipeline_cache_uuid.iter().map(|byte| format!("{byte:02x}")).collect();
-        let file = folder.map(|folder| folder.join(format!("pipelines-{uuid}.bin")));
-        let contents = file.as_deref().and_then(|file| std::fs::read(file).ok()).unwrap_or_default();
-        let info = vk::PipelineCacheCreateInfo::default().initial_data(&contents);
-        // SAFETY: `contents` outlives the call; the driver validates it.
-        let raw = unsafe { device.raw.create_pipeline_cache(&info, None) }
-            .during("vkCreatePipelineCache", "pipeline cache")?;
-        Ok(Self { raw, file, device: device.clone() })
-    }
-
-    /// Writes the file. A folder that cannot be written costs time at the next start, nothing else, so it only warns.
-    fn save(&self) {
-        let Some(file) = &self.file else { return };
-        // SAFETY: plain query of a live cache.
-        let contents = match unsafe { self.device.raw.get_pipeline_cache_data(self.raw) } {
-            Ok(contents) => contents,
-            Err(result) => return tracing::warn!("vkGetPipelineCacheData failed: {result}"),
-        };
-        if std::fs::read(file).is_ok_and(|old| old == contents) {
-            return;
-        }
-        // If the folder cannot be made, neither can the file, and that is what to say.
-        let _ = file.parent().map(std::fs::create_dir_all);
-        if let Err(cause) = crate::output::write_whole(file, &contents) {
-            tracing::warn!("the pipeline cache was not saved: {cause}");
-        }
-    }
-}
-
-impl Drop for PipelineCache {
-    fn drop(&mut self) {
-        self.save();
-        // SAFETY: pipelines do not need their cache after creation, and this one is destroyed once.
-        unsafe { self.device.raw.destroy_pipeline_cache(self.raw, None) };
-    }
-}
 
 /// A pipeline, its layout, and what it expects to be bound.
 pub(super) struct Pipeline {
@@ -69,7 +18,8 @@ pub(super) struct Pipeline {
     pub push_constant_bytes: u32,
     pub stages: vk::ShaderStageFlags,
     pub name: &'static str,
-    device: Arc<Device>,
+    pub identity: Identity,
+    pub device: Arc<Device>,
 }
 
 impl Pipeline {
@@ -89,33 +39,40 @@ impl Pipeline {
             }
             shader.check_bindings(&bindings)?;
         }
-        let set_bindings: Vec<_> = bindings
-            .values()
-            .map(|binding| {
-                vk::DescriptorSetLayoutBinding::default()
-                    .binding(binding.index)
-                    .descriptor_type(binding.kind)
-                    .descriptor_count(1)
-                    .stage_flags(stages)
-            })
-            .collect();
-        let info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&set_bindings);
-        // SAFETY: plain creation; destroyed through the deletion queue.
-        let set_layout = unsafe { device.raw.create_descriptor_set_layout(&info, None) }
-            .during("vkCreateDescriptorSetLayout", name)?;
+        let set_layout = set_layout(device, name, &bindings, stages)?;
         let set_layouts = [set_layout];
         let ranges: Vec<_> = (push_constant_bytes > 0)
             .then(|| vk::PushConstantRange::default().stage_flags(stages).size(push_constant_bytes))
             .into_iter()
             .collect();
         let info = vk::PipelineLayoutCreateInfo::default().set_layouts(&set_layouts).push_constant_ranges(&ranges);
-        // SAFETY: as above.
+        // SAFETY: plain creation; destroyed through the deletion queue.
         let layout =
             unsafe { device.raw.create_pipeline_layout(&info, None) }.during("vkCreatePipelineLayout", name)?;
-        let raw = vk::Pipeline::null();
-        let device = device.clone();
-        Ok(Self { raw, layout, set_layout, bindings, push_constant_bytes, stages, name, device })
+        let (raw, identity, device) = (vk::Pipeline::null(), Identity::new(), device.clone());
+        Ok(Self { raw, layout, set_layout, bindings, push_constant_bytes, stages, name, identity, device })
     }
+
+    /// An error for what does not fit its shaders.
+    pub fn refuse(&self, problem: impl ToString) -> VulkanError {
+        VulkanError::Shader { shader: self.name.to_owned(), problem: problem.to_string() }
+    }
+}
+
+fn set_layout(
+    device: &Device,
+    name: &str,
+    bindings: &BTreeMap<String, Binding>,
+    stages: vk::ShaderStageFlags,
+) -> Result<vk::DescriptorSetLayout> {
+    let of_binding = |binding: &Binding| {
+        let layout = vk::DescriptorSetLayoutBinding::default().binding(binding.index).descriptor_type(binding.kind);
+        layout.descriptor_count(1).stage_flags(stages)
+    };
+    let bindings: Vec<_> = bindings.values().map(of_binding).collect();
+    let info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&bindings);
+    // SAFETY: plain creation; destroyed through the deletion queue.
+    unsafe { device.raw.create_descriptor_set_layout(&info, None) }.during("vkCreateDescriptorSetLayout", name)
 }
 
 impl Drop for Pipeline {
@@ -136,11 +93,15 @@ impl Module {
     fn new(device: &Arc<Device>, shader: &Shader) -> Result<Self> {
         let words = shader.words();
         let info = vk::ShaderModuleCreateInfo::default().code(&words);
-        // SAFETY: the words come from the GLSL compiler.
+        // SAFETY: the words come from the GLSL compiler, as those of every shader.
         let raw =
             unsafe { device.raw.create_shader_module(&info, None) }.during("vkCreateShaderModule", shader.name)?;
         device.set_name(raw, shader.name);
         Ok(Self { raw, device: device.clone() })
+    }
+
+    fn stage(&self, shader: &Shader) -> vk::PipelineShaderStageCreateInfo<'_> {
+        vk::PipelineShaderStageCreateInfo::default().stage(shader.stage.flags()).module(self.raw).name(c"main")
     }
 }
 
@@ -151,8 +112,13 @@ impl Drop for Module {
     }
 }
 
+/// An error for a shader that is not of the stage it is wanted for.
+fn check_stage(shader: &Shader, wanted: ShaderStage) -> Result<()> {
+    if shader.stage == wanted { Ok(()) } else { Err(shader.refuse(format!("it is not a {wanted:?} shader"))) }
+}
+
 /// A compute shader, ready to dispatch.
-pub struct ComputePipeline(pub(super) Pipeline);
+pub struct ComputePipeline(pub(super) Pipeline, [u32; 3]);
 
 impl ComputePipeline {
     /// Compiles `shader` with its specialisation constants set by name.
@@ -165,6 +131,8 @@ impl ComputePipeline {
         shader: &Shader,
         constants: &[(&str, u32)],
     ) -> Result<Self> {
+        check_stage(shader, ShaderStage::Compute)?;
+        device.check_same(&cache.device, "pipeline cache")?;
         let interface = shader.reflect()?;
         let mut pipeline = Pipeline::new(device, shader.name, &[(shader, &interface)])?;
         let module = Module::new(device, shader)?;
@@ -178,22 +146,43 @@ impl ComputePipeline {
             data.extend_from_slice(&value.to_ne_bytes());
         }
         let specialization = vk::SpecializationInfo::default().map_entries(&entries).data(&data);
-        let stage = vk::PipelineShaderStageCreateInfo::default()
-            .stage(vk::ShaderStageFlags::COMPUTE)
-            .module(module.raw)
-            .name(c"main")
-            .specialization_info(&specialization);
+        let stage = module.stage(shader).specialization_info(&specialization);
         let info = [vk::ComputePipelineCreateInfo::default().stage(stage).layout(pipeline.layout)];
         // SAFETY: `info` and all it points to outlive the call.
         let made = unsafe { device.raw.create_compute_pipelines(cache.raw, &info, None) };
         pipeline.raw = made.map_err(|(_, result)| result).during("vkCreateComputePipelines", shader.name)?[0];
         device.set_name(pipeline.raw, shader.name);
-        Ok(Self(pipeline))
+        Ok(Self(pipeline, interface.group_size))
+    }
+
+    /// Invocations of a workgroup along each axis, as the shader has them.
+    pub fn group_size(&self) -> [u32; 3] {
+        self.1
+    }
+
+    /// Name of the shader.
+    pub(crate) fn name(&self) -> &'static str {
+        self.0.name
+    }
+
+    /// What is to be bound, by its name in GLSL.
+    pub(crate) fn bindings(&self) -> &BTreeMap<String, Binding> {
+        &self.0.bindings
+    }
+
+    /// What is to be pushed.
+    pub(crate) fn push_constant_bytes(&self) -> u32 {
+        self.0.push_constant_bytes
+    }
+
+    /// Which pipeline this is.
+    pub(crate) fn identity(&self) -> Identity {
+        self.0.identity
     }
 }
 
 /// The fixed-function part of a graphics pipeline: triangles, depth test by greater (reversed depth), no blending.
-pub struct GraphicsState<'a> {
+pub(crate) struct GraphicsState<'a> {
     /// Format of each vertex attribute, by location; attribute `i` comes from vertex buffer `i`, tightly packed.
     pub attributes: &'a [(vk::Format, u32)],
     /// Format of each colour target.
@@ -203,85 +192,95 @@ pub struct GraphicsState<'a> {
 }
 
 /// A vertex and a fragment shader, ready to draw with.
-pub struct GraphicsPipeline(pub(super) Pipeline);
+pub struct GraphicsPipeline {
+    pub(super) layouts: Pipeline,
+    /// Bytes of a vertex in each buffer.
+    pub(super) strides: Vec<u32>,
+    pub(super) colors: Vec<vk::Format>,
+    pub(super) depth: vk::Format,
+}
 
 impl GraphicsPipeline {
     /// Compiles the pair.
     ///
     /// # Errors
     /// Stages that declare one name differently, or a driver that cannot compile them.
-    pub fn new(
+    pub(crate) fn new(
         device: &Arc<Device>,
         cache: &PipelineCache,
         vertex: &Shader,
         fragment: &Shader,
         state: &GraphicsState,
     ) -> Result<Self> {
+        device.check_same(&cache.device, "pipeline cache")?;
+        check_stage(vertex, ShaderStage::Vertex)?;
+        check_stage(fragment, ShaderStage::Fragment)?;
         let interfaces = [vertex.reflect()?, fragment.reflect()?];
-        let mut pipeline =
+        let mut layouts =
             Pipeline::new(device, fragment.name, &[(vertex, &interfaces[0]), (fragment, &interfaces[1])])?;
         let modules = [Module::new(device, vertex)?, Module::new(device, fragment)?];
-        let stages: Vec<_> = [vertex, fragment]
-            .iter()
-            .zip(&modules)
-            .map(|(shader, module)| {
-                vk::PipelineShaderStageCreateInfo::default()
-                    .stage(shader.stage.flags())
-                    .module(module.raw)
-                    .name(c"main")
-            })
-            .collect();
-        let vertex_buffers: Vec<_> = (0..)
-            .zip(state.attributes)
-            .map(|(binding, (_, stride))| vk::VertexInputBindingDescription::default().binding(binding).stride(*stride))
-            .collect();
-        let attributes: Vec<_> = (0..)
-            .zip(state.attributes)
-            .map(|(location, (format, _))| {
-                vk::VertexInputAttributeDescription::default().location(location).binding(location).format(*format)
-            })
-            .collect();
-        let vertex_input = vk::PipelineVertexInputStateCreateInfo::default()
-            .vertex_binding_descriptions(&vertex_buffers)
-            .vertex_attribute_descriptions(&attributes);
-        let assembly =
-            vk::PipelineInputAssemblyStateCreateInfo::default().topology(vk::PrimitiveTopology::TRIANGLE_LIST);
-        let viewport = vk::PipelineViewportStateCreateInfo::default().viewport_count(1).scissor_count(1);
-        // Both sides are drawn: meshes from the wild are not wound consistently.
-        let raster = vk::PipelineRasterizationStateCreateInfo::default().line_width(1.0);
-        let multisample =
-            vk::PipelineMultisampleStateCreateInfo::default().rasterization_samples(vk::SampleCountFlags::TYPE_1);
-        let depth = vk::PipelineDepthStencilStateCreateInfo::default()
-            .depth_test_enable(true)
-            .depth_write_enable(true)
-            .depth_compare_op(vk::CompareOp::GREATER);
-        let blends: Vec<_> = state
-            .colors
-            .iter()
-            .map(|_| vk::PipelineColorBlendAttachmentState::default().color_write_mask(vk::ColorComponentFlags::RGBA))
-            .collect();
-        let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&blends);
-        let dynamic = [vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR];
-        let dynamic = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(&dynamic);
-        let mut rendering = vk::PipelineRenderingCreateInfo::default()
-            .color_attachment_formats(state.colors)
-            .depth_attachment_format(state.depth);
-        let info = [vk::GraphicsPipelineCreateInfo::default()
-            .stages(&stages)
-            .vertex_input_state(&vertex_input)
-            .input_assembly_state(&assembly)
-            .viewport_state(&viewport)
-            .rasterization_state(&raster)
-            .multisample_state(&multisample)
-            .depth_stencil_state(&depth)
-            .color_blend_state(&blend)
-            .dynamic_state(&dynamic)
-            .layout(pipeline.layout)
-            .push_next(&mut rendering)];
-        // SAFETY: `info` and all it points to outlive the call.
-        let made = unsafe { device.raw.create_graphics_pipelines(cache.raw, &info, None) };
-        pipeline.raw = made.map_err(|(_, result)| result).during("vkCreateGraphicsPipelines", fragment.name)?[0];
-        device.set_name(pipeline.raw, fragment.name);
-        Ok(Self(pipeline))
+        let stages = [modules[0].stage(vertex), modules[1].stage(fragment)];
+        layouts.raw = make_graphics(device, cache, &layouts, &stages, state)?;
+        device.set_name(layouts.raw, fragment.name);
+        let strides = state.attributes.iter().map(|(_, stride)| *stride).collect();
+        Ok(Self { layouts, strides, colors: state.colors.to_vec(), depth: state.depth })
     }
+
+    /// Which pipeline this is.
+    pub(crate) fn identity(&self) -> Identity {
+        self.layouts.identity
+    }
+}
+
+fn make_graphics(
+    device: &Device,
+    cache: &PipelineCache,
+    layouts: &Pipeline,
+    stages: &[vk::PipelineShaderStageCreateInfo],
+    state: &GraphicsState,
+) -> Result<vk::Pipeline> {
+    let buffer = |(binding, (_, stride)): (u32, &(vk::Format, u32))| {
+        vk::VertexInputBindingDescription::default().binding(binding).stride(*stride)
+    };
+    let attribute = |(location, (format, _)): (u32, &(vk::Format, u32))| {
+        vk::VertexInputAttributeDescription::default().location(location).binding(location).format(*format)
+    };
+    let buffers: Vec<_> = (0..).zip(state.attributes).map(buffer).collect();
+    let attributes: Vec<_> = (0..).zip(state.attributes).map(attribute).collect();
+    let vertex_input = vk::PipelineVertexInputStateCreateInfo::default()
+        .vertex_binding_descriptions(&buffers)
+        .vertex_attribute_descriptions(&attributes);
+    let assembly = vk::PipelineInputAssemblyStateCreateInfo::default().topology(vk::PrimitiveTopology::TRIANGLE_LIST);
+    let viewport = vk::PipelineViewportStateCreateInfo::default().viewport_count(1).scissor_count(1);
+    // Both sides are drawn: meshes from the wild are not wound consistently.
+    let raster = vk::PipelineRasterizationStateCreateInfo::default().line_width(1.0);
+    let multisample =
+        vk::PipelineMultisampleStateCreateInfo::default().rasterization_samples(vk::SampleCountFlags::TYPE_1);
+    let depth = vk::PipelineDepthStencilStateCreateInfo::default()
+        .depth_test_enable(true)
+        .depth_write_enable(true)
+        .depth_compare_op(vk::CompareOp::GREATER);
+    let all = vk::PipelineColorBlendAttachmentState::default().color_write_mask(vk::ColorComponentFlags::RGBA);
+    let blends = vec![all; state.colors.len()];
+    let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&blends);
+    let dynamic = [vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR];
+    let dynamic = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(&dynamic);
+    let mut rendering = vk::PipelineRenderingCreateInfo::default()
+        .color_attachment_formats(state.colors)
+        .depth_attachment_format(state.depth);
+    let info = [vk::GraphicsPipelineCreateInfo::default()
+        .stages(stages)
+        .vertex_input_state(&vertex_input)
+        .input_assembly_state(&assembly)
+        .viewport_state(&viewport)
+        .rasterization_state(&raster)
+        .multisample_state(&multisample)
+        .depth_stencil_state(&depth)
+        .color_blend_state(&blend)
+        .dynamic_state(&dynamic)
+        .layout(layouts.layout)
+        .push_next(&mut rendering)];
+    // SAFETY: `info` and all it points to outlive the call.
+    let made = unsafe { device.raw.create_graphics_pipelines(cache.raw, &info, None) };
+    Ok(made.map_err(|(_, result)| result).during("vkCreateGraphicsPipelines", layouts.name)?[0])
 }

@@ -1,6 +1,5 @@
 //! The surface: what a window is to Vulkan.
-use super::Result;
-use super::error::During;
+use super::error::{During, Result, VulkanError};
 use super::instance::Instance;
 use ash::{khr, vk};
 use raw_window_handle::{HasDisplayHandle, HasWindowHandle};
@@ -48,9 +47,17 @@ impl Surface {
         Ok(())
     }
 
+    /// An error for a surface of another instance than `instance`.
+    pub(super) fn check_instance(&self, instance: &Arc<Instance>) -> Result<()> {
+        if Arc::ptr_eq(&self.instance, instance) {
+            return Ok(());
+        }
+        Err(VulkanError::unfit("window", "its surface is of another Vulkan instance"))
+    }
+
     /// Whether queues of this family can present to it.
     pub(super) fn is_supported(&self, physical: vk::PhysicalDevice, queue_family: u32) -> bool {
-        // SAFETY: the device is this instance's, the surface is alive.
+        // SAFETY: the device is of this instance, as was checked before; the surface is alive.
         let supported = unsafe { self.functions.get_physical_device_surface_support(physical, queue_family, self.raw) };
         supported.unwrap_or(false)
     }

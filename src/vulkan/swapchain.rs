@@ -3,12 +3,11 @@
 //! Its images hold display values. Tone mapping has applied the gamma that the user asked for, so the format is plain UNORM:
 //! an sRGB format would encode them a second time. The colour space is the one that every window system has, in which
 //! it shows the bytes as they are.
-use super::device::Device;
-use super::error::{During, VulkanError};
-use super::frames::Semaphores;
-use super::memory::{Image, ImageShape};
+use super::device::{Device, Semaphores};
+use super::error::{During, Result, VulkanError};
+use super::frames::Frames;
+use super::image::{Image, ImageShape};
 use super::surface::Surface;
-use super::{Frames, Result};
 use ash::{khr, vk};
 use std::sync::Arc;
 
@@ -96,11 +95,12 @@ impl Swapchain {
     /// The format of the images.
     pub const FORMAT: vk::Format = vk::Format::B8G8R8A8_UNORM;
 
-    /// A swapchain of `surface` for so many frames in flight; it has images from the first [`Swapchain::turn`] on.
+    /// A swapchain of `surface` for so many frames in flight; it has images from the first turn on.
     ///
     /// # Errors
     /// A device that cannot present, or no memory left.
     pub fn new(device: &Arc<Device>, surface: Surface, mode: PresentMode, frames: usize) -> Result<Self> {
+        surface.check_instance(&device.instance)?;
         let functions = device.swapchain.clone().ok_or_else(|| VulkanError::Unsuitable {
             device: device.description().name.clone(),
             feature: "VK_KHR_swapchain".to_owned(),
@@ -127,7 +127,7 @@ impl Swapchain {
     ///
     /// # Errors
     /// A lost device, no memory left, a window that is gone.
-    pub fn turn(&mut self, frames: &Frames, size: [u32; 2]) -> Result<Option<AcquiredImage>> {
+    pub(crate) fn turn(&mut self, frames: &Frames, size: [u32; 2]) -> Result<Option<AcquiredImage>> {
         // A surface may change again while its images are made; one that always does is not to hang the program.
         const ATTEMPTS: usize = 8;
         // Window systems that give no images back for hidden windows must not make the program hang.
@@ -163,7 +163,7 @@ impl Swapchain {
     ///
     /// # Errors
     /// A lost device.
-    pub fn present(&mut self, turn: AcquiredImage) -> Result<Presented> {
+    pub(crate) fn present(&mut self, turn: AcquiredImage) -> Result<Presented> {
         let Some(current) = &mut self.current else { return Ok(Presented::Again) };
         let wait: Vec<_> = turn.semaphores.signal.into_iter().collect();
         let (swapchains, indices) = ([current.raw], [turn.index]);
@@ -217,6 +217,35 @@ impl Swapchain {
             return Ok(false);
         }
         self.check_format()?;
+        let usage = Self::USAGE & capabilities.supported_usage_flags;
+        let raw = self.create(&capabilities, extent, usage)?;
+        // SAFETY: plain query of the swapchain just made.
+        let images = unsafe { self.functions.get_swapchain_images(raw) };
+        let shape = ImageShape::plane(Self::FORMAT, extent.width, extent.height);
+        let mut current = Current { raw, images: Vec::new(), drawn: Vec::new(), stale: false };
+        let filled = images.during("vkGetSwapchainImagesKHR", "window").and_then(|images| {
+            for image in images {
+                current.images.push(Arc::new(Image::of_swapchain(&self.device, "window", shape, usage, image)?));
+                current.drawn.push(semaphore(&self.device, "image is drawn")?);
+            }
+            Ok(())
+        });
+        if let Err(error) = filled {
+            self.destroy(current);
+            return Err(error);
+        }
+        tracing::debug!("swapchain: {} images of {} x {}", current.images.len(), extent.width, extent.height);
+        self.current = Some(current);
+        Ok(true)
+    }
+
+    /// A swapchain in the place of the current one, which is destroyed.
+    fn create(
+        &mut self,
+        capabilities: &vk::SurfaceCapabilitiesKHR,
+        extent: vk::Extent2D,
+        usage: vk::ImageUsageFlags,
+    ) -> Result<vk::SwapchainKHR> {
         // One more than the least, so that drawing does not wait for the window system to give one back.
         let most = if capabilities.max_image_count == 0 { u32::MAX } else { capabilities.max_image_count };
         let old = self.current.take();
@@ -233,7 +262,7 @@ impl Swapchain {
             .image_color_space(vk::ColorSpaceKHR::SRGB_NONLINEAR)
             .image_extent(extent)
             .image_array_layers(1)
-            .image_usage(Self::USAGE & capabilities.supported_usage_flags)
+            .image_usage(usage)
             .pre_transform(capabilities.current_transform)
             .composite_alpha(composite)
             .present_mode(self.mode.raw())
@@ -246,24 +275,7 @@ impl Swapchain {
         }
         let raw = raw.during("vkCreateSwapchainKHR", "window")?;
         self.device.set_name(raw, "window");
-        // SAFETY: plain query of the swapchain just made.
-        let images = unsafe { self.functions.get_swapchain_images(raw) };
-        let shape = ImageShape::plane(Self::FORMAT, extent.width, extent.height);
-        let mut current = Current { raw, images: Vec::new(), drawn: Vec::new(), stale: false };
-        let filled = images.during("vkGetSwapchainImagesKHR", "window").and_then(|images| {
-            for image in images {
-                current.images.push(Arc::new(Image::of_swapchain(&self.device, "window", shape, image)?));
-                current.drawn.push(semaphore(&self.device, "image is drawn")?);
-            }
-            Ok(())
-        });
-        if let Err(error) = filled {
-            self.destroy(current);
-            return Err(error);
-        }
-        tracing::debug!("swapchain: {} images of {} x {}", current.images.len(), extent.width, extent.height);
-        self.current = Some(current);
-        Ok(true)
+        Ok(raw)
     }
 
     /// The picture is blitted into its images, the panel is drawn over it. Only screenshots read them, and are all that a window
@@ -276,7 +288,7 @@ impl Swapchain {
 
     fn capabilities(&self) -> Result<vk::SurfaceCapabilitiesKHR> {
         let Surface { raw, functions, .. } = &self.surface;
-        // SAFETY: the device is of the surface's instance.
+        // SAFETY: the device is of the surface's instance, as was checked when this was made.
         unsafe { functions.get_physical_device_surface_capabilities(self.device.physical, *raw) }
             .during("vkGetPhysicalDeviceSurfaceCapabilitiesKHR", "window")
     }
@@ -284,7 +296,7 @@ impl Swapchain {
     /// An error where the window cannot be given display values as they are.
     fn check_format(&self) -> Result<()> {
         let Surface { raw, functions, .. } = &self.surface;
-        // SAFETY: the device is of the surface's instance.
+        // SAFETY: the device is of the surface's instance, as was checked when this was made.
         let formats = unsafe { functions.get_physical_device_surface_formats(self.device.physical, *raw) }
             .during("vkGetPhysicalDeviceSurfaceFormatsKHR", "window")?;
         if formats.iter().any(|format| format.format == Self::FORMAT) {
@@ -299,7 +311,7 @@ impl Swapchain {
     /// `wanted` where the device has it for this window, else the one that every device has.
     fn available(&self, wanted: PresentMode) -> Result<PresentMode> {
         let Surface { raw, functions, .. } = &self.surface;
-        // SAFETY: the device is of the surface's instance.
+        // SAFETY: the device is of the surface's instance, as was checked when this was made.
         let modes = unsafe { functions.get_physical_device_surface_present_modes(self.device.physical, *raw) }
             .during("vkGetPhysicalDeviceSurfacePresentModesKHR", "window")?;
         if modes.contains(&wanted.raw()) {

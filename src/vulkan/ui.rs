@@ -1,9 +1,8 @@
 //! Draws what egui has laid out, by egui-ash-renderer.
-use super::Result;
 use super::commands::Commands;
 use super::device::Device;
-use super::error::{During, VulkanError};
-use super::memory::Image;
+use super::error::{During, Result, VulkanError};
+use super::image::Image;
 use ash::vk;
 use egui::epaint::{ClippedPrimitive, ColorImage, ImageDelta, TextureId, textures::TexturesDelta};
 use egui_ash_renderer::{DynamicRendering, Options, Renderer, RendererError};
@@ -100,7 +99,9 @@ impl Commands {
     ///
     /// # Errors
     /// No memory left for triangles.
-    pub fn draw_ui(&mut self, painter: &UiPainter, frame: &UiFrame, target: &Image) -> Result<()> {
+    pub(crate) fn draw_ui(&mut self, painter: &UiPainter, frame: &UiFrame, target: &Image) -> Result<()> {
+        target.check(&self.device, vk::ImageUsageFlags::COLOR_ATTACHMENT)?;
+        self.device.check_same(&painter.device, "panel")?;
         let [width, height, _] = target.shape.extent;
         let extent = vk::Extent2D { width, height };
         let colors = [vk::RenderingAttachmentInfo::default()

@@ -1,0 +1,175 @@
+//! The devices that the loader offers, and what each lacks.
+use super::error::{During, Result, VulkanError};
+use super::instance::Instance;
+use ash::{khr, vk};
+use std::ffi::CStr;
+
+/// What a device is, in the order in which one is preferred when none is named.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum DeviceKind {
+    /// A GPU with memory of its own.
+    Discrete,
+    /// A GPU that shares the CPU's memory.
+    Integrated,
+    /// A GPU handed through by a hypervisor.
+    Virtual,
+    /// A software implementation such as lavapipe.
+    Cpu,
+    /// Anything else.
+    Other,
+}
+
+impl DeviceKind {
+    fn of(kind: vk::PhysicalDeviceType) -> Self {
+        match kind {
+            vk::PhysicalDeviceType::DISCRETE_GPU => Self::Discrete,
+            vk::PhysicalDeviceType::INTEGRATED_GPU => Self::Integrated,
+            vk::PhysicalDeviceType::VIRTUAL_GPU => Self::Virtual,
+            vk::PhysicalDeviceType::CPU => Self::Cpu,
+            _ => Self::Other,
+        }
+    }
+}
+
+/// A physical device, as `threadlight devices` lists it.
+#[derive(Clone, Debug)]
+pub struct DeviceDescription {
+    /// Position in the loader's list: what `--device INDEX` means.
+    pub index: usize,
+    /// Name as the driver gives it.
+    pub name: String,
+    /// Driver name and version, e.g. `llvmpipe (Mesa 22.3.6)`.
+    pub driver: String,
+    /// What it is.
+    pub kind: DeviceKind,
+    /// Vulkan version, e.g. `1.3.230`.
+    pub api_version: String,
+    /// What it lacks for Threadlight; empty if it can be used.
+    pub lacks: Vec<&'static str>,
+}
+
+impl DeviceDescription {
+    /// Whether `--device asked` means this device: its index, or part of its name or its driver's, in any case.
+    pub(super) fn answers_to(&self, asked: &str) -> bool {
+        let asked = asked.to_lowercase();
+        match asked.parse::<usize>() {
+            Ok(index) => index == self.index,
+            Err(_) => {
+                let driver = self.driver.to_lowercase();
+                // Mesa's software driver calls itself llvmpipe; everybody else calls it lavapipe.
+                self.name.to_lowercase().contains(&asked)
+                    || driver.contains(&asked)
+                    || (asked == "lavapipe" && driver.starts_with("llvmpipe"))
+            }
+        }
+    }
+}
+
+/// A physical device and what was found out about it.
+pub(super) struct Candidate {
+    pub description: DeviceDescription,
+    pub physical: vk::PhysicalDevice,
+    pub properties: vk::PhysicalDeviceProperties,
+    pub queue_family: u32,
+    pub timestamp_valid_bits: u32,
+    pub is_lavapipe: bool,
+    pub extensions: Vec<&'static CStr>,
+}
+
+/// The devices that the loader offers, usable or not.
+///
+/// # Errors
+/// No driver at all, or a failing query.
+pub fn describe_devices(instance: &Instance) -> Result<Vec<DeviceDescription>> {
+    Ok(candidates(instance)?.into_iter().map(|candidate| candidate.description).collect())
+}
+
+/// Both.
+pub(super) fn candidates(instance: &Instance) -> Result<Vec<Candidate>> {
+    // SAFETY: plain query of a live instance.
+    let physical_devices = unsafe { instance.raw.enumerate_physical_devices() };
+    let physical_devices = match physical_devices {
+        Err(vk::Result::ERROR_INITIALIZATION_FAILED) => Vec::new(),
+        other => other.during("vkEnumeratePhysicalDevices", "instance")?,
+    };
+    if physical_devices.is_empty() {
+        return Err(VulkanError::NoDriver);
+    }
+    physical_devices.into_iter().enumerate().map(|(index, physical)| candidate(instance, index, physical)).collect()
+}
+
+fn candidate(instance: &Instance, index: usize, physical: vk::PhysicalDevice) -> Result<Candidate> {
+    let mut driver = vk::PhysicalDeviceDriverProperties::default();
+    let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut driver);
+    // SAFETY: `physical` comes from this instance.
+    unsafe { instance.raw.get_physical_device_properties2(physical, &mut properties) };
+    let properties = properties.properties;
+    let name = text(properties.device_name_as_c_str());
+    let mut lacks = Vec::new();
+    if properties.api_version < vk::API_VERSION_1_2 {
+        lacks.push("Vulkan 1.2");
+    }
+    let extensions = extensions(instance, physical, &name, &mut lacks)?;
+    let (queue_family, timestamp_valid_bits) = queue_family(instance, physical, &mut lacks);
+    let description = DeviceDescription {
+        index,
+        name,
+        driver: format!("{} ({})", text(driver.driver_name_as_c_str()), text(driver.driver_info_as_c_str())),
+        kind: DeviceKind::of(properties.device_type),
+        api_version: version_text(properties.api_version),
+        lacks,
+    };
+    let is_lavapipe = driver.driver_id == vk::DriverId::MESA_LLVMPIPE;
+    Ok(Candidate { description, physical, properties, queue_family, timestamp_valid_bits, is_lavapipe, extensions })
+}
+
+/// The extensions to enable: of those that are wanted, the ones that there are. Needed ones that there are not go to `lacks`.
+fn extensions(
+    instance: &Instance,
+    physical: vk::PhysicalDevice,
+    name: &str,
+    lacks: &mut Vec<&'static str>,
+) -> Result<Vec<&'static CStr>> {
+    // SAFETY: `physical` comes from this instance.
+    let available = unsafe { instance.raw.enumerate_device_extension_properties(physical) }
+        .during("vkEnumerateDeviceExtensionProperties", name)?;
+    let has = |wanted: &CStr| available.iter().any(|extension| extension.extension_name_as_c_str() == Ok(wanted));
+    // These are asked for even where Vulkan 1.3 has them in its core: their entry points are the same ones.
+    let needed = [
+        (khr::synchronization2::NAME, "VK_KHR_synchronization2"),
+        (khr::dynamic_rendering::NAME, "VK_KHR_dynamic_rendering"),
+    ];
+    lacks.extend(needed.iter().filter(|(extension, _)| !has(extension)).map(|(_, name)| *name));
+    let mut wanted: Vec<&'static CStr> = needed.iter().map(|(extension, _)| *extension).collect();
+    // A portability driver insists on this one being enabled.
+    wanted.push(khr::portability_subset::NAME);
+    #[cfg(feature = "viewer")]
+    if instance.presents {
+        wanted.push(khr::swapchain::NAME);
+    }
+    wanted.retain(|extension| has(extension));
+    Ok(wanted)
+}
+
+/// The family of the queue for everything, and how many bits of its timestamps count.
+fn queue_family(instance: &Instance, physical: vk::PhysicalDevice, lacks: &mut Vec<&'static str>) -> (u32, u32) {
+    // SAFETY: `physical` comes from this instance.
+    let families = unsafe { instance.raw.get_physical_device_queue_family_properties(physical) };
+    let wanted = vk::QueueFlags::GRAPHICS | vk::QueueFlags::COMPUTE;
+    let family = families.iter().position(|family| family.queue_flags.contains(wanted));
+    if family.is_none() {
+        lacks.push("a queue for both graphics and compute");
+    }
+    let family = family.unwrap_or(0);
+    (family as u32, families.get(family).map_or(0, |family| family.timestamp_valid_bits))
+}
+
+fn version_text(version: u32) -> String {
+    let (major, minor) = (vk::api_version_major(version), vk::api_version_minor(version));
+    format!("{major}.{minor}.{}", vk::api_version_patch(version))
+}
+
+/// A name in a fixed-size array of the driver's; empty if it is not terminated.
+fn text<E>(name: std::result::Result<&CStr, E>) -> String {
+    name.map(|name| name.to_string_lossy().into_owned()).unwrap_or_default()
+}
