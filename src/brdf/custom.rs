@@ -26,9 +26,15 @@
 //!
 //! On the CPU, and so in threads, pdfs and the reference, the BRDF is the function itself. Where a shader evaluates BRDFs it looks
 //! them up in a table that is made of the function, as it does for measured ones: cells of about a degree, finer towards the mirror
-//! direction, between which it is linear. So the function has to be isotropic and reciprocal. The error of the table, as the mean of
-//! |difference| cos over the mean of f cos, is below 0.5 % for GGX of alpha 0.3 up to 60 degrees, and below 2 % for alpha 0.03;
-//! alpha 0.01 has up to 5 %. At 80 degrees it is several times larger. A test measures that.
+//! direction, between which it is linear. So the function has to be isotropic and reciprocal. The error of that table, as the integral
+//! of |difference| cos over that of f cos, is for GGX, by roughness and view angle:
+//!
+//! | alpha | 0 to 60 degrees | 80 degrees | 87 degrees |
+//! |---|---|---|---|
+//! | 0.3 | 0.06 % | 0.10 % | 0.11 % |
+//! | 0.03 | 0.6 % | 1.0 % | 3.8 % |
+//! | 0.01 | 1.8 % | 2.1 % | 8 % |
+//! | 0.003 | 5.8 % | 6.2 % | 13 % |
 use std::sync::{Arc, OnceLock};
 
 use glam::DVec3;
@@ -184,10 +190,10 @@ mod tests {
     #[test]
     fn the_table_of_a_function_errs_as_documented() {
         for (alpha, bounds) in [
-            (0.3, [0.001, 0.001, 0.002, 0.01]),
-            (0.03, [0.01, 0.01, 0.015, 0.1]),
-            (0.01, [0.025, 0.025, 0.03, 0.2]),
-            (0.003, [1.0, 1.0, 1.0, 1.0]),
+            (0.3, [0.001, 0.001, 0.0015, 0.002]),
+            (0.03, [0.007, 0.007, 0.012, 0.045]),
+            (0.01, [0.02, 0.02, 0.025, 0.1]),
+            (0.003, [0.065, 0.065, 0.07, 0.15]),
         ] {
             let custom = Brdf::custom(Wrapped(ggx(alpha)));
             let table = Brdf::MerlTable(custom.table().unwrap());
