@@ -20,48 +20,34 @@
 //!                                                      └──────────────────────> EXR
 //! ```
 //!
-//! | the paper | here |
-//! |---|---|
-//! | 3.1, equation (2): the estimate | `glsl/methods/paper.glsl`, twin in [`shading`] |
-//! | 3.2, equations (4) to (6): pdf and cones | [`threads::slice`], [`threads::cones`] |
-//! | 3.2.1, equations (8) to (10): forces | [`threads::forces`] |
-//! | 3.2.2, 3.2.3: smoothing and peaks | [`threads::smoothing`], [`threads::peaks`] |
-//! | 4.1: geometry cache at sub-pixel resolution | [`passes::geometry_cache`] |
-//! | 4.2: each sub-pixel evaluates its partition of the threads | [`passes::shade`], `glsl/shade.comp` |
-//! | beyond it: fitted threads | [`threads::fitted`], `glsl/methods/fitted.glsl` |
-//! | tables 1 to 4, figures 10 to 13: how fast, how wrong | [`evaluate`] |
+//! A program renders in a few lines:
 //!
-//! Dependencies run downwards: `view` (the interactive viewer), then `pipeline` and [`prepare`], then [`passes`], then [`graph`]
-//! (which passes run, in which order, with which barriers, in which memory, and what is kept between frames) and [`vulkan`] (the
-//! only `unsafe` code) on one side, [`scene`], [`environment`], [`threads`] and [`brdf`] on the other. The method on one screen
-//! is `declare` in `pipeline.rs`.
+//! ```no_run
+//! use threadlight::{Renderer, Scene};
 //!
-//! The [`guide`] has all of it at length: usage, every equation, architecture, results, limits.
+//! let scene = Scene::default().with_material("silver").with_environment("sun");
+//! let picture = Renderer::new()?.render(&scene)?;
+//! picture.save("silver.png")?;
+//! # Ok::<(), threadlight::Error>(())
+//! ```
+//!
+//! Custom BRDFs are types that implement [`CustomBrdf`]. The [`guide`] has all of it at length: usage, every equation with the function that
+//! holds it, architecture, results, limits. [`low_level`] is the rest of the program, part by part.
+//!
+//! The method on one screen is `declare` in `src/pipeline.rs`.
 
-pub mod brdf;
-pub mod environment;
-pub mod error;
-pub mod evaluate;
-pub mod file_format;
-pub mod geometry_texel;
-pub mod graph;
+mod error;
+mod facade;
 pub mod guide;
-pub mod light;
-pub mod memo;
-pub mod method;
-pub mod output;
-pub mod packing;
-pub mod passes;
-pub mod pipeline;
-pub mod prepare;
-pub mod progress;
-pub mod scene;
-pub mod shading;
-pub mod steps;
-pub mod threads;
-#[cfg(feature = "viewer")]
-pub mod viewer;
-#[allow(unsafe_code)]
-pub mod vulkan;
+pub mod low_level;
 
+pub use brdf::{Brdf, Custom, CustomBrdf};
+pub use environment::Environment;
 pub use error::{Error, Result};
+pub use facade::{Picture, Renderer};
+pub use method::Method;
+pub use progress::Observer;
+pub use scene::Scene;
+pub use threads::Threads;
+
+use low_level::*;

@@ -8,7 +8,7 @@ mod cli;
 use clap::Parser;
 use std::process::ExitCode;
 use threadlight::Error;
-use threadlight::vulkan::VulkanError;
+use threadlight::low_level::vulkan::VulkanError;
 
 fn main() -> ExitCode {
     let arguments = match cli::Arguments::try_parse() {

@@ -24,7 +24,7 @@ pub struct Wanted {
 }
 
 /// The frame: pass 1 and pass 2 of the paper and what surrounds them.
-pub(crate) fn declare<'a>(graph: &mut FrameGraph<'a>, renderer: &'a Renderer, view: &'a View) -> Frame {
+pub(crate) fn declare<'a>(graph: &mut FrameGraph<'a>, renderer: &'a DeviceScene, view: &'a View) -> Frame {
     let geometry = geometry_cache(graph, &renderer.geometry_cache, view); // pass 1 of the paper
     let tiles = classify(graph, &renderer.classify, geometry, view);
     let Shaded { radiance, lookups } = shade(graph, &renderer.shade, geometry, &tiles, view); // pass 2 of the paper
@@ -47,7 +47,7 @@ pub(crate) struct Frame {
 
 /// A scene on a device, ready to render. Cheap to clone.
 #[derive(Clone)]
-pub struct Renderer {
+pub struct DeviceScene {
     /// Where from and how it is looked at. Its number of sub-pixels is that which the shaders were compiled for.
     pub view: View,
     geometry_cache: GeometryCache,
@@ -83,7 +83,7 @@ pub struct Rendering {
     pub plan: String,
 }
 
-impl Renderer {
+impl DeviceScene {
     /// Asks `round` for all that a frame of `prepared` needs on `device`: filtered, compiled and uploaded.
     ///
     /// # Errors

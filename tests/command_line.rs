@@ -6,9 +6,9 @@ use serde_json::Value;
 use std::fs;
 use std::path::Path;
 use tempfile::TempDir;
-use threadlight::output::{Picture, read_image};
-use threadlight::scene::{ImageSettings, MaterialSource, Scene, ShadingSettings, Source};
-use threadlight::threads::Threads;
+use threadlight::low_level::output::{PictureFile, read_image};
+use threadlight::low_level::scene::{ImageSettings, MaterialSource, Scene, ShadingSettings, Source};
+use threadlight::low_level::threads::Threads;
 
 /// What makes a render quick: few pixels, few threads, and an environment that takes no time.
 const SMALL: &str = "--size 96x72 --threads 8 --environment map.hdr";
@@ -48,12 +48,12 @@ fn bytes(folder: &TempDir, name: &str) -> Vec<u8> {
     fs::read(folder.path().join(name)).unwrap()
 }
 
-fn picture(folder: &TempDir, name: &str) -> Picture {
+fn picture(folder: &TempDir, name: &str) -> PictureFile {
     read_image(&folder.path().join(name)).unwrap()
 }
 
 /// The value at `column`, `row` of a picture.
-fn at(picture: &Picture, column: u32, row: u32) -> [f32; 4] {
+fn at(picture: &PictureFile, column: u32, row: u32) -> [f32; 4] {
     picture.rgba[(row * picture.width + column) as usize]
 }
 
@@ -444,7 +444,7 @@ fn threads_are_written_and_read_back_the_same() {
             threadlight(&folder, &flags).assert().success();
         }
         assert!(bytes(&folder, "a.threads") == bytes(&folder, "b.threads"), "{method}");
-        let threads = threadlight::threads::read(&folder.path().join("a.threads")).unwrap();
+        let threads = threadlight::low_level::threads::read(&folder.path().join("a.threads")).unwrap();
         assert_eq!((threads.kind().name(), threads.size()), (method, [90, 4]));
         match threads {
             Threads::Fitted(table) => assert_eq!(table.material, "gold"),
@@ -543,7 +543,7 @@ fn pictures_are_compared_as_a_table_as_json_and_as_a_heat_map() {
     let folder = workplace();
     for (name, value) in [("a.png", 51), ("b.png", 102)] {
         let rgba = vec![value; 24 * 16 * 4];
-        threadlight::output::write_png(&folder.path().join(name), 24, 16, &rgba, false).unwrap();
+        threadlight::low_level::output::write_png(&folder.path().join(name), 24, 16, &rgba, false).unwrap();
     }
     let table = printed(&mut threadlight(&folder, "compare a.png b.png --difference where.png"));
     let lines: Vec<Vec<_>> = table.lines().map(|line| line.split_whitespace().take(2).collect()).collect();

@@ -2,10 +2,10 @@
 mod common;
 
 use common::{Validated, analytic_materials, ready, sphere};
-use threadlight::evaluate::reference::{ReferenceSettings, reference};
-use threadlight::method::Method;
-use threadlight::pipeline::Wanted;
-use threadlight::shading::display_value;
+use threadlight::low_level::evaluate::reference::{ReferenceSettings, reference};
+use threadlight::low_level::method::Method;
+use threadlight::low_level::pipeline::Wanted;
+use threadlight::low_level::shading::display_value;
 
 /// What the camera turns by from frame to frame, and the places around the sphere at which it does.
 const STEP_DEG: f64 = 0.5;
@@ -28,7 +28,7 @@ fn frames_half_a_degree_apart_change_as_the_reference_does() {
     for (name, material) in analytic_materials().into_iter().filter(|(name, _)| *name != "conductor 0.5") {
         for environment in ["studio", "sun"] {
             let mut scene = sphere(material.clone(), environment, 8, (40, 30));
-            scene.image.background = threadlight::scene::Background::None;
+            scene.image.background = threadlight::low_level::scene::Background::None;
             let mut prepared = ready(&scene);
             let (mut of_threads, mut of_truth) = (0.0_f32, 0.0_f32);
             for place in 0..PLACES {

@@ -3,10 +3,10 @@ mod common;
 
 use common::{EVERYTHING, Validated, model, ready, sphere};
 use glam::{DVec3, Vec4};
-use threadlight::brdf::{Brdf, Custom, CustomBrdf};
-use threadlight::memo::Memo;
-use threadlight::scene::MaterialSource;
-use threadlight::steps::LoadMaterial;
+use threadlight::low_level::brdf::{Brdf, Custom, CustomBrdf};
+use threadlight::low_level::memo::Memo;
+use threadlight::low_level::scene::MaterialSource;
+use threadlight::low_level::steps::LoadMaterial;
 
 /// A built-in model in the place of a user's function.
 struct Wrapped(Brdf);

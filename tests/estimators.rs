@@ -4,18 +4,18 @@ mod common;
 use common::{EVERYTHING, Validated, analytic_materials, model, pixels, ready, sphere, texels_of};
 use glam::{DVec3, UVec2, Vec3, Vec4};
 use std::path::Path;
-use threadlight::brdf::luminance;
-use threadlight::environment::Environment;
-use threadlight::evaluate::Display;
-use threadlight::evaluate::reference::Integrator;
-use threadlight::geometry_texel::GeometryTexel;
-use threadlight::memo::Memo;
-use threadlight::method::Method;
-use threadlight::output::write_exr;
-use threadlight::pipeline::{Renderer, Rendering, Wanted};
-use threadlight::prepare::Prepared;
-use threadlight::scene::{Background, MaterialSettings, MaterialSource, ObjectSettings, Scene, Source};
-use threadlight::shading::{CpuShader, Surface};
+use threadlight::low_level::brdf::luminance;
+use threadlight::low_level::environment::Environment;
+use threadlight::low_level::evaluate::Display;
+use threadlight::low_level::evaluate::reference::Integrator;
+use threadlight::low_level::geometry_texel::GeometryTexel;
+use threadlight::low_level::memo::Memo;
+use threadlight::low_level::method::Method;
+use threadlight::low_level::output::write_exr;
+use threadlight::low_level::pipeline::{DeviceScene, Rendering, Wanted};
+use threadlight::low_level::prepare::Prepared;
+use threadlight::low_level::scene::{Background, MaterialSettings, MaterialSource, ObjectSettings, Scene, Source};
+use threadlight::low_level::shading::{CpuShader, Surface};
 
 /// The methods that draw random numbers.
 const ESTIMATORS: [Method; 7] = [
@@ -34,7 +34,7 @@ fn unbiased() -> impl Iterator<Item = Method> {
 }
 
 /// A renderer whose compiled shaders are kept between tests and runs.
-fn renderer(gpu: &Validated, prepared: &Prepared) -> Renderer {
+fn renderer(gpu: &Validated, prepared: &Prepared) -> DeviceScene {
     gpu.renderer(prepared)
 }
 

@@ -3,12 +3,12 @@ mod common;
 
 use common::{Validated, model, ready, sphere};
 use tempfile::TempDir;
-use threadlight::evaluate::expected::{TrueSample, prepare_within};
-use threadlight::evaluate::metrics::{Comparable, Display, compare};
-use threadlight::evaluate::reference::{ReferenceSettings, reference};
-use threadlight::output::{ExrHeader, write_exr};
-use threadlight::pipeline::Wanted;
-use threadlight::scene::{Background, Scene, Source};
+use threadlight::low_level::evaluate::expected::{TrueSample, prepare_within};
+use threadlight::low_level::evaluate::metrics::{Comparable, Display, compare};
+use threadlight::low_level::evaluate::reference::{ReferenceSettings, reference};
+use threadlight::low_level::output::{ExrHeader, write_exr};
+use threadlight::low_level::pipeline::Wanted;
+use threadlight::low_level::scene::{Background, Scene, Source};
 
 /// A glossy sphere in an uneven environment with a lamp, small so that little has to be blurred; it is put into `folder`.
 fn glossy(folder: &TempDir) -> Scene {

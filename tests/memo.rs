@@ -3,21 +3,21 @@ mod common;
 use common::{Validated, sphere};
 use std::path::Path;
 use std::sync::Mutex;
-use threadlight::memo::Memo;
-use threadlight::pipeline::{Renderer, Wanted};
-use threadlight::prepare::{key_of, prepare};
-use threadlight::progress::Observer;
-use threadlight::scene::{Background, Camera, MaterialSource, ObjectSettings, Scene, Source};
+use threadlight::low_level::memo::Memo;
+use threadlight::low_level::pipeline::{DeviceScene, Wanted};
+use threadlight::low_level::prepare::{key_of, prepare};
+use threadlight::low_level::progress::Observer;
+use threadlight::low_level::scene::{Background, Camera, MaterialSource, ObjectSettings, Scene, Source};
 
 fn small() -> Scene {
     sphere(MaterialSource::Builtin("clay".into()), "white", 4, (32, 24))
 }
 
 /// Asks for all that a frame of `scene` needs; gives what had to be made for it, by name.
-fn ask(gpu: &Validated, scene: &Scene) -> (Renderer, Vec<&'static str>) {
+fn ask(gpu: &Validated, scene: &Scene) -> (DeviceScene, Vec<&'static str>) {
     let round = gpu.round();
     let prepared = prepare(scene, &round).expect("a scene that can be prepared");
-    let renderer = Renderer::new(&gpu.device, &prepared, &round).expect("a renderer");
+    let renderer = DeviceScene::new(&gpu.device, &prepared, &round).expect("a renderer");
     (renderer, round.made())
 }
 
@@ -71,7 +71,7 @@ fn each_change_makes_what_it_needs_and_nothing_else() {
         assert!(expected.is_empty() || keys[0] != keys[1], "{name}");
     }
     let mut unused = before.clone();
-    unused.materials.push(threadlight::scene::MaterialSettings { name: "unused".into(), source: silver });
+    unused.materials.push(threadlight::low_level::scene::MaterialSettings { name: "unused".into(), source: silver });
     assert_eq!(ask(&gpu, &unused).1, Vec::<&str>::new());
     assert_eq!(key_of(&unused, &gpu.memo).unwrap(), key_of(&before, &gpu.memo).unwrap());
     drop(renderer);
@@ -96,7 +96,7 @@ fn files_count_by_content() {
 
     let (renderer, _) = ask(&gpu, &scene);
     let picture =
-        |renderer: &Renderer| renderer.render(Wanted { radiance: true, ..Wanted::default() }, 1).unwrap().radiance;
+        |renderer: &DeviceScene| renderer.render(Wanted { radiance: true, ..Wanted::default() }, 1).unwrap().radiance;
     let first = picture(&renderer);
     assert_eq!(
         ask(&gpu, &other_name).1,
@@ -204,7 +204,7 @@ fn every_slow_step_says_what_it_is_and_how_far_it_is() {
         let mut scene = small();
         scene.environment.source = Source::Builtin("studio".into());
         let prepared = prepare(&scene, &round).unwrap();
-        Renderer::new(&gpu.device, &prepared, &round).unwrap();
+        DeviceScene::new(&gpu.device, &prepared, &round).unwrap();
     };
     ask(folder.path(), &notes);
     let notes = notes.0.into_inner().unwrap();

@@ -2,7 +2,7 @@
 #[path = "common/graphs.rs"]
 mod graphs;
 use graphs::*;
-use threadlight::graph::*;
+use threadlight::low_level::graph::*;
 
 fn error(graph: Graph<()>) -> String {
     compile(graph).expect_err("an invalid graph").to_string()

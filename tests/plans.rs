@@ -6,8 +6,8 @@ mod common;
 mod graphs;
 use ash::vk;
 use graphs::*;
-use threadlight::graph::*;
-use threadlight::pipeline::Wanted;
+use threadlight::low_level::graph::*;
+use threadlight::low_level::pipeline::Wanted;
 
 fn plan(graph: Graph<()>) -> Plan<()> {
     compile(graph).expect("a valid graph")

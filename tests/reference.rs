@@ -4,13 +4,13 @@ mod common;
 use common::{Validated, model, ready, sphere};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
-use threadlight::evaluate::Display;
-use threadlight::evaluate::reference::{Integrator, Processor, ReferenceSettings, TOLERANCE, reference};
-use threadlight::output::read_image;
-use threadlight::pipeline::{Wanted, render_geometry};
-use threadlight::prepare::Prepared;
-use threadlight::scene::{Background, MaterialSource, Scene, Source};
-use threadlight::shading::display_value;
+use threadlight::low_level::evaluate::Display;
+use threadlight::low_level::evaluate::reference::{Integrator, Processor, ReferenceSettings, TOLERANCE, reference};
+use threadlight::low_level::output::read_image;
+use threadlight::low_level::pipeline::{Wanted, render_geometry};
+use threadlight::low_level::prepare::Prepared;
+use threadlight::low_level::scene::{Background, MaterialSource, Scene, Source};
+use threadlight::low_level::shading::display_value;
 
 /// RMS of display values over the sphere's pixels in `found`, leaving out those within two pixels of its rim.
 fn rms_inside(found: &[[f32; 4]], reference: &[[f32; 4]], width: usize) -> f64 {

@@ -3,10 +3,10 @@ mod common;
 
 use common::{EVERYTHING, Validated, analytic_materials, model, pixels, ready, sphere, texels_of};
 use glam::{UVec2, Vec3, Vec4};
-use threadlight::geometry_texel::GeometryTexel;
-use threadlight::memo::Memo;
-use threadlight::scene::{Scene, Source};
-use threadlight::shading;
+use threadlight::low_level::geometry_texel::GeometryTexel;
+use threadlight::low_level::memo::Memo;
+use threadlight::low_level::scene::{Scene, Source};
+use threadlight::low_level::shading;
 
 #[test]
 fn the_shader_agrees_with_its_cpu_twin() {
@@ -25,7 +25,7 @@ fn the_shader_agrees_with_its_cpu_twin() {
     let folder = tempfile::tempdir().unwrap();
     let table = folder.path().join("table.binary");
     std::fs::write(&table, common::merl_like_table()).unwrap();
-    materials.push(("table", threadlight::scene::MaterialSource::File(table)));
+    materials.push(("table", threadlight::low_level::scene::MaterialSource::File(table)));
     // Small, as a pyramid of kernels is made from it for each material.
     let map = folder.path().join("map.exr");
     let texels: Vec<_> =
@@ -38,7 +38,7 @@ fn the_shader_agrees_with_its_cpu_twin() {
                 }
             })
             .collect();
-    threadlight::output::write_exr(&map, 64, 32, &texels, false, &Default::default()).unwrap();
+    threadlight::low_level::output::write_exr(&map, 64, 32, &texels, false, &Default::default()).unwrap();
     let builtin = |name: &str| Source::Builtin(name.to_owned());
     let cases =
         [("paper", builtin("studio"), 100, 2), ("paper", builtin("sky"), 7, 3), ("fitted", Source::File(map), 4, 2)];
@@ -49,7 +49,7 @@ fn the_shader_agrees_with_its_cpu_twin() {
             scene.environment.source = environment.clone();
             scene.shading.method = (*method).to_owned();
             scene.image.subpixels = *subpixels;
-            scene.image.background = threadlight::scene::Background::None;
+            scene.image.background = threadlight::low_level::scene::Background::None;
             scene.environment.rotation_deg = 73.0;
             scene.environment.intensity = 1.7;
             let prepared = ready(&scene);
@@ -115,11 +115,11 @@ fn a_white_furnace_shows_the_albedo() {
     let folder = tempfile::tempdir().unwrap();
     let table = folder.path().join("table.binary");
     std::fs::write(&table, common::merl_like_table()).unwrap();
-    materials.push(("table", threadlight::scene::MaterialSource::File(table)));
+    materials.push(("table", threadlight::low_level::scene::MaterialSource::File(table)));
     if let Some(bytes) = common::alumina_oxide() {
         let table = folder.path().join("alumina-oxide.binary");
         std::fs::write(&table, bytes).unwrap();
-        materials.push(("alumina-oxide", threadlight::scene::MaterialSource::File(table)));
+        materials.push(("alumina-oxide", threadlight::low_level::scene::MaterialSource::File(table)));
     }
     for (name, material) in materials {
         // Weights of fitted threads sum to the albedo, and it is linear between rows but for what rounds it off there: 1e-3.
@@ -142,7 +142,7 @@ fn a_sun_of_a_million_stays_finite() {
     let path = folder.path().join("sun.exr");
     let mut texels = vec![[0.25, 0.25, 0.25, 1.0]; 64 * 32];
     texels[64 * 10 + 20] = [1e6, 1e6, 1e6, 1.0];
-    threadlight::output::write_exr(&path, 64, 32, &texels, false, &Default::default()).unwrap();
+    threadlight::low_level::output::write_exr(&path, 64, 32, &texels, false, &Default::default()).unwrap();
     for (name, material) in analytic_materials() {
         let mut scene = sphere(material, "white", 16, (48, 36));
         scene.environment.source = Source::File(path.clone());

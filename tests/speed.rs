@@ -3,14 +3,14 @@ mod common;
 
 use common::{Validated, analytic_materials, ready, sphere};
 use threadlight::Error;
-use threadlight::environment::Pyramid;
-use threadlight::evaluate::Cases;
-use threadlight::evaluate::speed::{self, Growth, Speed, Timings};
-use threadlight::method::Method;
-use threadlight::passes::BareLookups;
-use threadlight::pipeline::time_bare_lookups;
-use threadlight::scene::{Camera, Scene, Source};
-use threadlight::vulkan::PipelineCache;
+use threadlight::low_level::environment::Pyramid;
+use threadlight::low_level::evaluate::Cases;
+use threadlight::low_level::evaluate::speed::{self, Growth, Speed, Timings};
+use threadlight::low_level::method::Method;
+use threadlight::low_level::passes::BareLookups;
+use threadlight::low_level::pipeline::time_bare_lookups;
+use threadlight::low_level::scene::{Camera, Scene, Source};
+use threadlight::low_level::vulkan::PipelineCache;
 
 /// A small sphere of one material under white light.
 fn speed() -> Speed {

@@ -4,17 +4,17 @@ mod common;
 use common::{Validated, model, ready, sphere};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use tempfile::TempDir;
-use threadlight::evaluate::sweep::{self, Measured};
-use threadlight::evaluate::{Cases, ReferencePicture, Sweep, gallery};
-use threadlight::memo::Round;
-use threadlight::method::Method;
-use threadlight::output::{ExrHeader, write_exr};
-use threadlight::pipeline::Wanted;
-use threadlight::prepare::Prepared;
-use threadlight::progress::Observer;
-use threadlight::scene::{MaterialSource, Scene, Source};
-use threadlight::steps::FitThreads;
-use threadlight::threads::{ThreadKind, ThreadSettings};
+use threadlight::low_level::evaluate::sweep::{self, Measured};
+use threadlight::low_level::evaluate::{Cases, ReferencePicture, Sweep, gallery};
+use threadlight::low_level::memo::Round;
+use threadlight::low_level::method::Method;
+use threadlight::low_level::output::{ExrHeader, write_exr};
+use threadlight::low_level::pipeline::Wanted;
+use threadlight::low_level::prepare::Prepared;
+use threadlight::low_level::progress::Observer;
+use threadlight::low_level::scene::{MaterialSource, Scene, Source};
+use threadlight::low_level::steps::FitThreads;
+use threadlight::low_level::threads::{ThreadKind, ThreadSettings};
 use threadlight::{Error, Result};
 
 fn grey() -> MaterialSource {

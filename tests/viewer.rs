@@ -7,7 +7,7 @@ use std::process::{Child, Command, Stdio};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
-use threadlight::output::{Picture, read_image};
+use threadlight::low_level::output::{PictureFile, read_image};
 
 /// A virtual X server, ended when dropped.
 struct Display {
@@ -104,13 +104,13 @@ impl Viewer {
     }
 
     /// `name`, rendered without a window out of the scene file `scene`.
-    fn render(&self, scene: &str, name: &str) -> Picture {
+    fn render(&self, scene: &str, name: &str) -> PictureFile {
         let status = self.threadlight(&["render", scene, "-o", name]).status().expect("a rendering");
         assert!(status.success());
         self.picture(name)
     }
 
-    fn picture(&self, name: &str) -> Picture {
+    fn picture(&self, name: &str) -> PictureFile {
         read_image(&self.path(name)).expect("a picture")
     }
 }

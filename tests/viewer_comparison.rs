@@ -2,8 +2,8 @@
 #![cfg(feature = "viewer")]
 mod common;
 use common::{Validated, ready, sphere};
-use threadlight::scene::{MaterialSource, ShadingSettings};
-use threadlight::viewer::comparison::{Compared, Other, compare_with};
+use threadlight::low_level::scene::{MaterialSource, ShadingSettings};
+use threadlight::low_level::viewer::comparison::{Compared, Other, compare_with};
 
 #[test]
 fn a_picture_is_compared_with_another_method_with_itself_and_with_the_reference() {

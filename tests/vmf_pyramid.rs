@@ -4,9 +4,9 @@ mod common;
 use common::Validated;
 use glam::{DVec3, Vec3};
 use std::f64::consts::TAU;
-use threadlight::environment::{Environment, Pyramid, VmfPyramid};
-use threadlight::passes::vmf_pyramid;
-use threadlight::vulkan::PipelineCache;
+use threadlight::low_level::environment::{Environment, Pyramid, VmfPyramid};
+use threadlight::low_level::passes::vmf_pyramid;
+use threadlight::low_level::vulkan::PipelineCache;
 
 /// Smooth in red, full of detail in green, dark but for one bright pixel in blue.
 fn environment() -> Environment {
@@ -20,7 +20,8 @@ fn environment() -> Environment {
             [1.0 + (row as f32 / 6.0).sin(), ((column * 7 + row * 3) % 13) as f32, spot, 1.0]
         })
         .collect();
-    threadlight::output::write_exr(&path, width as u32, height as u32, &texels, false, &Default::default()).unwrap();
+    threadlight::low_level::output::write_exr(&path, width as u32, height as u32, &texels, false, &Default::default())
+        .unwrap();
     Environment::load(&path).unwrap()
 }
 

@@ -3,9 +3,9 @@ use super::number;
 use anyhow::Context;
 use std::io::Write;
 use std::path::PathBuf;
-use threadlight::evaluate::{Comparable, Display, Metrics, compare, difference_picture};
-use threadlight::output::{self, Format};
-use threadlight::scene::{EXPOSURE, GAMMA};
+use threadlight::low_level::evaluate::{Comparable, Display, Metrics, compare, difference_picture};
+use threadlight::low_level::output::{self, Format};
+use threadlight::low_level::scene::{EXPOSURE, GAMMA};
 use threadlight::{Error, Result};
 
 const EXAMPLES: &str = "\

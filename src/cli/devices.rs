@@ -1,7 +1,7 @@
 //! `threadlight devices`: the Vulkan devices of this machine.
 use std::io::Write;
 use threadlight::Error;
-use threadlight::vulkan::{Instance, describe_devices};
+use threadlight::low_level::vulkan::{Instance, describe_devices};
 
 /// Lists the Vulkan devices that --device can name.
 #[derive(clap::Args)]

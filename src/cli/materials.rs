@@ -1,9 +1,9 @@
 //! `threadlight materials`: what --material, --environment and --mesh can name without a file.
 use std::io::Write;
-use threadlight::brdf::Brdf;
-use threadlight::environment::{self, Environment};
-use threadlight::method::Method;
-use threadlight::scene::{Mesh, mesh};
+use threadlight::low_level::brdf::Brdf;
+use threadlight::low_level::environment::{self, Environment};
+use threadlight::low_level::method::Method;
+use threadlight::low_level::scene::{Mesh, mesh};
 
 /// Lists what can be named: materials, models, environments, meshes, methods.
 #[derive(clap::Args)]

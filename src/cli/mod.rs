@@ -95,7 +95,7 @@ pub fn start_logging(verbose: u8) {
 
 /// The folder that threads, blurred environments and pipelines are cached in; none with `--no-cache`.
 fn cache_folder(no_cache: bool) -> Option<PathBuf> {
-    (!no_cache).then(threadlight::memo::default_folder).flatten()
+    (!no_cache).then(threadlight::low_level::memo::default_folder).flatten()
 }
 
 /// Parses a number in `range`; the error is that it must be `what`.

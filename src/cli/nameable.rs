@@ -1,8 +1,8 @@
 //! Help texts of what flags can name: they follow from the tables of formats and methods.
-use threadlight::brdf::Brdf;
-use threadlight::environment::Environment;
-use threadlight::method::{DEFAULT_SAMPLES, Method};
-use threadlight::scene::{MAX_SAMPLES, Mesh, Scene};
+use threadlight::low_level::brdf::Brdf;
+use threadlight::low_level::environment::Environment;
+use threadlight::low_level::method::{DEFAULT_SAMPLES, Method};
+use threadlight::low_level::scene::{MAX_SAMPLES, Mesh, Scene};
 
 /// `what` and how a material is named.
 pub fn material(what: &str) -> String {

@@ -2,7 +2,7 @@
 use indicatif::{ProgressBar, ProgressStyle};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use threadlight::progress::Observer;
+use threadlight::low_level::progress::Observer;
 
 /// A bar on a terminal (nothing elsewhere); Ctrl-C cancels what it shows.
 pub struct TerminalProgress {

@@ -8,16 +8,16 @@ use clap::value_parser;
 use std::io::Write;
 use std::path::PathBuf;
 use threadlight::Error;
-use threadlight::evaluate::expected::prepare_within;
-use threadlight::evaluate::reference::{self, Processor, ReferenceImage, ReferenceSettings};
-use threadlight::memo::{Asked, Memo, Origin, Step};
-use threadlight::method::Method;
-use threadlight::output::{self, Format};
-use threadlight::pipeline::{Renderer, Rendering, Wanted};
-use threadlight::prepare::{Prepared, prepare};
-use threadlight::scene::Background;
-use threadlight::steps::FitThreads;
-use threadlight::vulkan::{Device, Instance};
+use threadlight::low_level::evaluate::expected::prepare_within;
+use threadlight::low_level::evaluate::reference::{self, Processor, ReferenceSettings};
+use threadlight::low_level::memo::{Asked, Memo, Origin, Step};
+use threadlight::low_level::method::Method;
+use threadlight::low_level::output::{self, Format};
+use threadlight::low_level::pipeline::{DeviceScene, Rendering, Wanted};
+use threadlight::low_level::prepare::{Prepared, prepare};
+use threadlight::low_level::scene::Background;
+use threadlight::low_level::steps::FitThreads;
+use threadlight::low_level::vulkan::{Device, Instance};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -166,9 +166,10 @@ impl Render {
                 max_error_estimate: image.max_error_estimate,
                 reference_cache: if image.cached { "hit" } else { "miss" },
             };
-            (rendering_of(&image, &prepared, device.allocated_bytes()), Some(reference))
+            let device_memory_bytes = device.allocated_bytes();
+            (Rendering { device_memory_bytes, ..image.rendering(&prepared) }, Some(reference))
         } else {
-            let renderer = Renderer::new(&device, &prepared, &round)?;
+            let renderer = DeviceScene::new(&device, &prepared, &round)?;
             progress.finish();
             let radiance = format == Some(Format::Exr);
             let wanted = Wanted { radiance, display: !radiance, ..Wanted::default() };
@@ -246,21 +247,6 @@ fn stats<'a>(
         expected_rms: None,
         reference: None,
     }
-}
-
-/// A reference as the other methods' results are.
-fn rendering_of(image: &ReferenceImage, prepared: &Prepared, device_memory_bytes: u64) -> Rendering {
-    let radiance = image.over_background(prepared);
-    let mut rendering = Rendering {
-        display: reference::tone_map(&radiance, &prepared.view),
-        radiance,
-        lookups: image.evaluations,
-        frame_ms: image.seconds * 1e3,
-        device_memory_bytes,
-        ..Rendering::default()
-    };
-    rendering.counters.covered_subpixels = image.covered_subpixels as u32;
-    rendering
 }
 
 /// `cpu` or `gpu`.

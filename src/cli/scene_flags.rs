@@ -3,9 +3,9 @@ use super::{cache_folder, nameable, number};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::value_parser;
 use std::path::PathBuf;
-use threadlight::environment;
-use threadlight::method::Method;
-use threadlight::scene::{
+use threadlight::low_level::environment;
+use threadlight::low_level::method::Method;
+use threadlight::low_level::scene::{
     Background, EXPOSURE, GAMMA, MAX_SAMPLES, MAX_SIZE_PX, MAX_SUBPIXELS, MaterialSource, Scene, Source, mesh,
 };
 

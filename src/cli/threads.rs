@@ -3,12 +3,12 @@ use super::progress::TerminalProgress;
 use super::{cache_folder, nameable, stem};
 use std::path::PathBuf;
 use threadlight::Error;
-use threadlight::memo::{Asked, Memo, Origin, Step};
-use threadlight::method::Method;
-use threadlight::output;
-use threadlight::scene::MaterialSource;
-use threadlight::steps::{FitThreads, LoadMaterial};
-use threadlight::threads::{self, ThreadKind, ThreadSettings};
+use threadlight::low_level::memo::{Asked, Memo, Origin, Step};
+use threadlight::low_level::method::Method;
+use threadlight::low_level::output;
+use threadlight::low_level::scene::MaterialSource;
+use threadlight::low_level::steps::{FitThreads, LoadMaterial};
+use threadlight::low_level::threads::{self, ThreadKind, ThreadSettings};
 
 const EXAMPLES: &str = "\
 Examples:

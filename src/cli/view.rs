@@ -3,9 +3,9 @@ use super::scene_flags::{MachineFlags, SceneFlags};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::value_parser;
 use std::path::PathBuf;
-use threadlight::output::{self, Format};
-use threadlight::viewer::{self, ViewerSettings, input};
-use threadlight::vulkan::PresentMode;
+use threadlight::low_level::output::{self, Format};
+use threadlight::low_level::viewer::{self, ViewerSettings, input};
+use threadlight::low_level::vulkan::PresentMode;
 use threadlight::{Error, Result};
 
 const EXAMPLES: &str = "\

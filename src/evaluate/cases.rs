@@ -6,7 +6,7 @@ use crate::error::Result;
 use crate::memo::{Keyed, Memo, Round};
 use crate::method::Method;
 use crate::passes::Sampling;
-use crate::pipeline::Renderer;
+use crate::pipeline::DeviceScene;
 use crate::prepare::{Prepared, PreparedMaterial, ask_threads, prepare};
 use crate::progress::{Observer, OnlyCancels};
 use crate::scene::{Background, MaterialSettings, MaterialSource, Scene, Source};
@@ -154,7 +154,7 @@ pub struct Place<'a> {
     /// The threads made for the material so far.
     tables: &'a mut Vec<Keyed<Threads>>,
     /// The last renderer in the environment: what the next one has in common with it is filtered, uploaded and compiled once.
-    renderer: &'a mut Option<Renderer>,
+    renderer: &'a mut Option<DeviceScene>,
     observer: &'a dyn Observer,
 }
 
@@ -182,9 +182,9 @@ impl Place<'_> {
     /// What renders it.
     ///
     /// # Errors
-    /// As for [`Renderer::new`].
-    pub fn renderer(&mut self, device: &Arc<Device>) -> Result<Renderer> {
-        let renderer = Renderer::new(device, self.prepared, &self.round())?;
+    /// As for [`DeviceScene::new`].
+    pub fn renderer(&mut self, device: &Arc<Device>) -> Result<DeviceScene> {
+        let renderer = DeviceScene::new(device, self.prepared, &self.round())?;
         *self.renderer = Some(renderer.clone());
         Ok(renderer)
     }

@@ -8,7 +8,7 @@ use super::reference::{Integrator, TOLERANCE};
 use crate::error::{Error, Result};
 use crate::memo::Round;
 use crate::method::Method;
-use crate::pipeline::{Renderer, Wanted, render_geometry};
+use crate::pipeline::{DeviceScene, Wanted, render_geometry};
 use crate::prepare::{Prepared, check_count, prepare};
 use crate::scene::Scene;
 use crate::threads::MAX_COUNT;
@@ -86,7 +86,7 @@ pub fn prepare_within(scene: &Scene, most: f64, device: &Arc<Device>, round: &Ro
         let prepared = prepare(&scene, round)?;
         // Only surfaces are looked at.
         let alone = Prepared { show_environment: false, ..prepared.clone() };
-        let renderer = Renderer::new(device, &alone, round)?;
+        let renderer = DeviceScene::new(device, &alone, round)?;
         let sample = match &sample {
             Some(sample) => sample,
             None => sample.insert(TrueSample::new(&alone, device, round)?),

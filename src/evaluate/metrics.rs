@@ -3,7 +3,7 @@ use serde::{Deserialize, Serialize};
 
 use super::ssim::{RADIUS, WINDOW, ssim_map};
 use crate::error::{Error, Result};
-use crate::output::{Format, Picture};
+use crate::output::{Format, PictureFile};
 use crate::passes::View;
 
 /// How radiance L is displayed: clamp(exposure L, 0, 1)^(1/gamma).
@@ -87,7 +87,7 @@ impl Comparable {
 
     /// A picture from a file. A PNG's values are display values already, taken to be made with `display`; where it is
     /// transparent, they are laid over black.
-    pub fn from_picture(picture: &Picture, display: Display) -> Self {
+    pub fn from_picture(picture: &PictureFile, display: Display) -> Self {
         let (width, height) = (picture.width as usize, picture.height as usize);
         match picture.format {
             Format::Exr => Self::from_radiance(width, height, &picture.rgba, picture.alpha, display),

@@ -7,7 +7,7 @@ use super::cases::{Cases, Estimator, Place};
 use crate::error::{Error, Result};
 use crate::memo::{Key, Keyed, Memo};
 use crate::passes::{BareLookups, PlacedMesh};
-use crate::pipeline::{Renderer, Rendering, Wanted, median, time_bare_lookups};
+use crate::pipeline::{DeviceScene, Rendering, Wanted, median, time_bare_lookups};
 use crate::progress::Observer;
 use crate::steps::{BoxFilter, pipelines};
 use crate::vulkan::{Device, PassTime};
@@ -212,7 +212,7 @@ impl Growing {
 /// Something whose time is compared with that of others.
 struct Entrant {
     frame: TimedFrame,
-    renderer: Renderer,
+    renderer: DeviceScene,
     floor: BareLookups,
     renderings: Vec<Rendering>,
     floor_ms: Vec<f64>,
@@ -286,7 +286,7 @@ impl TimedFrame {
     }
 }
 
-fn render(renderer: &Renderer) -> Result<Rendering> {
+fn render(renderer: &DeviceScene) -> Result<Rendering> {
     renderer.render(Wanted { display: true, ..Wanted::default() }, 1)
 }
 

@@ -10,7 +10,7 @@ use exr::prelude::{
     Vec2, WritableImage,
 };
 
-use super::{Format, Picture, write_whole};
+use super::{Format, PictureFile, write_whole};
 use crate::error::{Error, Result};
 
 /// More pixels than any picture of use, few enough for memory: a damaged header must not ask for all of it.
@@ -129,7 +129,7 @@ fn sort_attributes(bytes: &mut [u8]) {
 
 /// Reads an EXR: the first layer with channels R, G and B (perhaps with a common prefix, such as `beauty.R`), or with
 /// only Y, which then stands for all three. Half, float and integer samples, any compression that the crate knows.
-pub fn parse_exr(path: &Path, bytes: &[u8]) -> Result<Picture> {
+pub fn parse_exr(path: &Path, bytes: &[u8]) -> Result<PictureFile> {
     let broken = |cause: exr::error::Error| {
         Error::in_file(
             path,
@@ -169,7 +169,7 @@ pub fn parse_exr(path: &Path, bytes: &[u8]) -> Result<Picture> {
             rgba.iter_mut().zip(channel.sample_data.values_as_f32()).for_each(|(pixel, value)| pixel[index] = value);
         }
     }
-    Ok(Picture {
+    Ok(PictureFile {
         width: layer.size.0 as u32,
         height: layer.size.1 as u32,
         rgba,

@@ -34,7 +34,7 @@ impl Format {
 
 /// A picture as read from a file, row by row from the top left.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Picture {
+pub struct PictureFile {
     /// Columns.
     pub width: u32,
     /// Rows.
@@ -50,7 +50,7 @@ pub struct Picture {
 }
 
 /// Reads the PNG or EXR at `path`. EXR may have R, G, B or only Y, with or without A.
-pub fn read_image(path: &Path) -> Result<Picture> {
+pub fn read_image(path: &Path) -> Result<PictureFile> {
     let parse = match Format::of(path)? {
         Format::Png => png_file::parse,
         Format::Exr => parse_exr,

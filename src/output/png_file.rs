@@ -4,7 +4,7 @@ use std::path::Path;
 use image::codecs::png::PngEncoder;
 use image::{ExtendedColorType, ImageEncoder};
 
-use super::{Format, Picture, write_whole};
+use super::{Format, PictureFile, write_whole};
 use crate::error::{Error, Result};
 
 /// The bytes of a PNG before its first optional chunk: signature (8) and the IHDR chunk (25).
@@ -32,10 +32,10 @@ pub fn write_png(path: &Path, width: u32, height: u32, rgba8: &[u8], alpha: bool
 }
 
 /// Reads the bytes of the PNG at `path` as display values in [0, 1].
-pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Picture> {
+pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<PictureFile> {
     let decoded = image::load_from_memory_with_format(bytes, image::ImageFormat::Png)
         .map_err(|cause| Error::in_file(path, format!("is not a whole PNG ({cause})"), "give another picture"))?;
-    Ok(Picture {
+    Ok(PictureFile {
         width: decoded.width(),
         height: decoded.height(),
         alpha: decoded.color().has_alpha(),

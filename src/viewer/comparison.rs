@@ -12,7 +12,7 @@ use crate::evaluate::reference::{Estimate, ReferenceImage, STAGES, progressive, 
 use crate::evaluate::{Comparable, Display, Metrics, compare};
 use crate::memo::{Memo, Round};
 use crate::method::Method;
-use crate::pipeline::{Renderer, Wanted, render_geometry};
+use crate::pipeline::{DeviceScene, Wanted, render_geometry};
 use crate::prepare::{Prepared, prepare};
 use crate::progress::Observer;
 use crate::scene::{Scene, ShadingSettings};
@@ -111,7 +111,7 @@ pub fn compare_with(
 /// Linear radiance times coverage of the objects alone, and coverage.
 fn render(prepared: &Prepared, device: &Arc<Device>, round: &Round) -> Result<Vec<[f32; 4]>> {
     let objects = Prepared { show_environment: false, ..prepared.clone() };
-    let renderer = Renderer::new(device, &objects, round)?;
+    let renderer = DeviceScene::new(device, &objects, round)?;
     Ok(renderer.render(Wanted { radiance: true, ..Wanted::default() }, 1)?.radiance)
 }
 

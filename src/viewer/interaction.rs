@@ -12,8 +12,10 @@ use super::session::Session;
 use crate::memo::{Key, Memo};
 use crate::output::{self, Format};
 use crate::passes::{Area, Counters, View};
-use crate::pipeline::{Renderer, Wanted};
+use crate::pipeline::{DeviceScene, Wanted};
 use crate::prepare::{key_of, prepare, view_of};
+#[cfg(feature = "hot-reload")]
+use crate::progress::Observer;
 use crate::scene::{Background, Scene};
 use crate::vulkan::{Device, PassTime, UiFrame};
 use crate::{Error, Result};
@@ -292,7 +294,7 @@ impl Viewer {
         self.loading.request(move |task| {
             let round = memo.round(task);
             let prepared = prepare(&scene, &round)?;
-            let renderer = Renderer::new(&device, &prepared, &round)?;
+            let renderer = DeviceScene::new(&device, &prepared, &round)?;
             Ok(Loaded { prepared: Arc::new(prepared), renderer: Arc::new(renderer), key })
         });
     }
@@ -305,10 +307,10 @@ impl Viewer {
         self.requested = key;
         let (device, memo) = (self.device.clone(), self.memo.clone());
         self.loading.request(move |task| {
-            task.begin("shaders");
+            Observer::begin(task, "shaders");
             let round = memo.round(task);
             let prepared = prepare(&scene, &round)?;
-            let renderer = crate::vulkan::hot_reload::reload(|| Renderer::new(&device, &prepared, &round))?;
+            let renderer = crate::vulkan::hot_reload::reload(|| DeviceScene::new(&device, &prepared, &round))?;
             Ok(Loaded { prepared: Arc::new(prepared), renderer: Arc::new(renderer), key })
         });
     }

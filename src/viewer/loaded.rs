@@ -1,6 +1,6 @@
 //! What frames are made of.
 use crate::memo::Key;
-use crate::pipeline::Renderer;
+use crate::pipeline::DeviceScene;
 use crate::prepare::Prepared;
 use std::sync::Arc;
 
@@ -10,7 +10,7 @@ pub struct Loaded {
     /// In memory.
     pub prepared: Arc<Prepared>,
     /// On the device.
-    pub renderer: Arc<Renderer>,
+    pub renderer: Arc<DeviceScene>,
     /// What it was made of.
     pub key: Option<Key>,
 }

@@ -2,7 +2,7 @@
 use crate::Result;
 use crate::graph::{Access, DeviceResource, Executable, FrameGraph, ImageDesc, ImageHandle, Store};
 use crate::passes::{Area, Counters, Readbacks, View, present, texels, ui};
-use crate::pipeline::{Frame, Renderer, declare};
+use crate::pipeline::{DeviceScene, Frame, declare};
 use crate::vulkan::{Device, Frames, PassTime, PresentMode, Presented, Surface, Swapchain, UiFrame, UiPainter};
 use egui::TexturesDelta;
 use std::sync::Arc;
@@ -14,7 +14,7 @@ const FRAMES: usize = 2;
 /// What a frame shows.
 pub struct ShownPicture<'a> {
     /// Of what.
-    pub renderer: &'a Renderer,
+    pub renderer: &'a DeviceScene,
     /// From where, and in which resolution: scaled to `area` where that is not its size.
     pub view: &'a View,
     /// Where it is in the window.

@@ -16,7 +16,7 @@ fn memory(info: &ResourceInfo) -> MemoryRequirement {
 
 /// What frames are drawn with.
 struct Stage {
-    renderer: Renderer,
+    renderer: DeviceScene,
     painter: UiPainter,
     panel: UiFrame,
 }
@@ -33,14 +33,14 @@ impl Stage {
         let round = memo.round(&());
         let prepared = prepare(&scene, &round).expect("a scene that can be prepared");
         Self {
-            renderer: Renderer::new(&device, &prepared, &round).expect("a renderer"),
+            renderer: DeviceScene::new(&device, &prepared, &round).expect("a renderer"),
             painter: UiPainter::new(&device, Swapchain::FORMAT, FRAMES).expect("a painter"),
             panel: UiFrame::default(),
         }
     }
 
     /// The plan of a frame of `renderer` as `view` sees it, after others, which left `kept`.
-    fn plan<'a>(&'a self, renderer: &'a Renderer, view: &'a View, kept: Option<&Kept>) -> Plan<Work<'a>> {
+    fn plan<'a>(&'a self, renderer: &'a DeviceScene, view: &'a View, kept: Option<&Kept>) -> Plan<Work<'a>> {
         let mut graph = FrameGraph::new();
         let area = Area { left: 0, top: 0, width: view.width, height: view.height };
         let picture = ShownPicture { renderer, view, area };

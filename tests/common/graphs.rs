@@ -1,6 +1,6 @@
 //! What the tests of graphs without a device have in common.
 use ash::vk;
-use threadlight::graph::*;
+use threadlight::low_level::graph::*;
 
 /// Memory as a plain device would ask for it: images in multiples of 64 KiB, buffers of 256 bytes.
 pub fn memory(info: &ResourceInfo) -> MemoryRequirement {

@@ -3,11 +3,11 @@
 use glam::UVec2;
 use std::path::PathBuf;
 use std::sync::Arc;
-use threadlight::memo::{Memo, Round};
-use threadlight::pipeline::{Renderer, Rendering, Wanted};
-use threadlight::prepare::{Prepared, prepare};
-use threadlight::scene::{MaterialSettings, MaterialSource, Scene, Source};
-use threadlight::vulkan::{Device, Instance, Messages};
+use threadlight::low_level::memo::{Memo, Round};
+use threadlight::low_level::pipeline::{DeviceScene, Rendering, Wanted};
+use threadlight::low_level::prepare::{Prepared, prepare};
+use threadlight::low_level::scene::{MaterialSettings, MaterialSource, Scene, Source};
+use threadlight::low_level::vulkan::{Device, Instance, Messages};
 
 /// A device with validation on; `finish` fails the test if validation said anything, from first call to last.
 pub struct Validated {
@@ -29,8 +29,8 @@ impl Validated {
         self.renderer(prepared).render(wanted, 1).expect("a rendering")
     }
 
-    pub fn renderer(&self, prepared: &Prepared) -> Renderer {
-        Renderer::new(&self.device, prepared, &self.round()).expect("a renderer")
+    pub fn renderer(&self, prepared: &Prepared) -> DeviceScene {
+        DeviceScene::new(&self.device, prepared, &self.round()).expect("a renderer")
     }
 
     pub fn round(&self) -> Round<'_> {

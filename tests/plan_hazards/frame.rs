@@ -1,6 +1,6 @@
 //! Random frames, valid by construction.
 use ash::vk;
-use threadlight::graph::*;
+use threadlight::low_level::graph::*;
 
 /// A small linear congruential generator (Knuth's MMIX constants): the same frames on every machine.
 pub struct Random(u64);

@@ -2,7 +2,7 @@
 use super::frame::Frame;
 use ash::vk;
 use std::collections::HashMap;
-use threadlight::graph::*;
+use threadlight::low_level::graph::*;
 
 /// Something that touched memory: an access in one stage, or a change of layout (no stage).
 pub struct Event {

@@ -9,7 +9,7 @@ mod machine;
 use ash::vk;
 use frame::Frame;
 use machine::{Machine, WRITES, bits};
-use threadlight::graph::*;
+use threadlight::low_level::graph::*;
 
 fn memory(info: &ResourceInfo) -> MemoryRequirement {
     let (size_bytes, alignment) = match info.kind {

@@ -6,17 +6,18 @@ use anyhow::Context;
 use clap::value_parser;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use threadlight::evaluate::reference::{Processor, ReferenceSettings};
-use threadlight::evaluate::sweep::Measured;
-use threadlight::evaluate::{Cases, Sweep, reference_picture, sweep};
-use threadlight::memo::{Memo, Round};
-use threadlight::method::Method;
-use threadlight::output;
-use threadlight::progress::Observer;
-use threadlight::scene::{MAX_SUBPIXELS, MaterialSource, ObjectSettings, Scene, Source, mesh};
-use threadlight::threads::MAX_COUNT;
-use threadlight::vulkan::{Device, Instance};
-use threadlight::{Error, Result, environment};
+use threadlight::low_level::environment;
+use threadlight::low_level::evaluate::reference::{Processor, ReferenceSettings};
+use threadlight::low_level::evaluate::sweep::Measured;
+use threadlight::low_level::evaluate::{Cases, Sweep, reference_picture, sweep};
+use threadlight::low_level::memo::{Memo, Round};
+use threadlight::low_level::method::Method;
+use threadlight::low_level::output;
+use threadlight::low_level::progress::Observer;
+use threadlight::low_level::scene::{MAX_SUBPIXELS, MaterialSource, ObjectSettings, Scene, Source, mesh};
+use threadlight::low_level::threads::MAX_COUNT;
+use threadlight::low_level::vulkan::{Device, Instance};
+use threadlight::{Error, Result};
 
 /// What to measure. Where a flag is left out, the command says what is taken: see [`Defaults`].
 #[derive(clap::Args)]

@@ -4,9 +4,9 @@ use crate::cli::progress::TerminalProgress;
 use clap::value_parser;
 use std::io::Write;
 use threadlight::Error;
-use threadlight::evaluate::sweep::Measured;
-use threadlight::evaluate::{Sweep, plots, reference, tables};
-use threadlight::method::Method;
+use threadlight::low_level::evaluate::sweep::Measured;
+use threadlight::low_level::evaluate::{Sweep, plots, reference, tables};
+use threadlight::low_level::method::Method;
 
 const EXAMPLES: &str = "\
 Without --materials, gold is measured; without --methods, all of them; without --counts, 1,4,16,32,64,100,512; without

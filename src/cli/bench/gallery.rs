@@ -4,15 +4,15 @@ use crate::cli::progress::TerminalProgress;
 use clap::value_parser;
 use std::io::Write;
 use std::path::Path;
-use threadlight::brdf::Brdf;
-use threadlight::evaluate::gallery::{self, Named};
-use threadlight::evaluate::sweep::Measured;
-use threadlight::evaluate::{Cases, Estimator, Sweep, tables};
-use threadlight::method::Method;
-use threadlight::output;
-use threadlight::progress::Observer;
-use threadlight::scene::MaterialSource;
-use threadlight::threads::MAX_COUNT;
+use threadlight::low_level::brdf::Brdf;
+use threadlight::low_level::evaluate::gallery::{self, Named};
+use threadlight::low_level::evaluate::sweep::Measured;
+use threadlight::low_level::evaluate::{Cases, Estimator, Sweep, tables};
+use threadlight::low_level::method::Method;
+use threadlight::low_level::output;
+use threadlight::low_level::progress::Observer;
+use threadlight::low_level::scene::MaterialSource;
+use threadlight::low_level::threads::MAX_COUNT;
 use threadlight::{Error, Result};
 
 const EXAMPLES: &str = "\

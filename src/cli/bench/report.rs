@@ -4,17 +4,17 @@ use crate::cli::progress::TerminalProgress;
 use clap::value_parser;
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use threadlight::brdf::Brdf;
-use threadlight::evaluate::report::Report;
-use threadlight::evaluate::speed::{self, Speed};
-use threadlight::evaluate::sweep::Measured;
-use threadlight::evaluate::{Cases, Estimator, Row, Sweep, gallery};
-use threadlight::method::Method;
-use threadlight::output;
-use threadlight::progress::Observer;
-use threadlight::scene::MaterialSource;
-use threadlight::threads::MAX_COUNT;
-use threadlight::vulkan::Device;
+use threadlight::low_level::brdf::Brdf;
+use threadlight::low_level::evaluate::report::Report;
+use threadlight::low_level::evaluate::speed::{self, Speed};
+use threadlight::low_level::evaluate::sweep::Measured;
+use threadlight::low_level::evaluate::{Cases, Estimator, Row, Sweep, gallery};
+use threadlight::low_level::method::Method;
+use threadlight::low_level::output;
+use threadlight::low_level::progress::Observer;
+use threadlight::low_level::scene::MaterialSource;
+use threadlight::low_level::threads::MAX_COUNT;
+use threadlight::low_level::vulkan::Device;
 use threadlight::{Error, Result};
 
 const EXAMPLES: &str = "\

@@ -4,10 +4,10 @@ use crate::cli::progress::TerminalProgress;
 use clap::value_parser;
 use std::io::Write;
 use threadlight::Error;
-use threadlight::evaluate::speed::{self, Speed, Timings};
-use threadlight::evaluate::{plots, tables};
-use threadlight::method::Method;
-use threadlight::threads::MAX_COUNT;
+use threadlight::low_level::evaluate::speed::{self, Speed, Timings};
+use threadlight::low_level::evaluate::{plots, tables};
+use threadlight::low_level::method::Method;
+use threadlight::low_level::threads::MAX_COUNT;
 
 const EXAMPLES: &str = "\
 Without --materials, gold is measured; without --methods, fitted and paper; without --counts, 16,32,64,100,200,512; without --size,

@@ -10,7 +10,7 @@ use crate::error::Error;
 use crate::memo::Round;
 use crate::method::Method;
 use crate::passes::Sampling;
-use crate::pipeline::{Renderer, Wanted};
+use crate::pipeline::{DeviceScene, Wanted};
 use crate::prepare::Prepared;
 use crate::vulkan::Device;
 
@@ -31,7 +31,7 @@ pub fn reference_on_gpu(
     let start = Instant::now();
     let sampling = Sampling { count: FRAME_SAMPLES, seed: 0 };
     let objects = Prepared { method: Method::Mis, sampling, show_environment: false, ..prepared.clone() };
-    let (mut renderer, observer) = (Renderer::new(device, &objects, round)?, round.observer());
+    let (mut renderer, observer) = (DeviceScene::new(device, &objects, round)?, round.observer());
     let display = Display::of(&prepared.view);
     let mut evaluations = 0;
     let mut sums: Vec<Sums> = Vec::new();

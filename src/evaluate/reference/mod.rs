@@ -20,7 +20,7 @@ use crate::evaluate::metrics::Display;
 use crate::geometry_texel::GeometryTexel;
 use crate::memo::{Origin, Round, Step};
 use crate::passes::View;
-use crate::pipeline::render_geometry;
+use crate::pipeline::{Rendering, render_geometry};
 use crate::prepare::Prepared;
 use crate::progress::Observer;
 use crate::shading::display_value;
@@ -118,6 +118,22 @@ impl ReferenceImage {
             sum.min(DVec3::splat(f32::MAX.into())).as_vec3().extend(1.0).to_array()
         });
         pixels.collect()
+    }
+}
+
+impl ReferenceImage {
+    /// It as the other methods' results are.
+    pub fn rendering(&self, prepared: &Prepared) -> Rendering {
+        let radiance = self.over_background(prepared);
+        let mut rendering = Rendering {
+            display: tone_map(&radiance, &prepared.view),
+            radiance,
+            lookups: self.evaluations,
+            frame_ms: self.seconds * 1e3,
+            ..Rendering::default()
+        };
+        rendering.counters.covered_subpixels = self.covered_subpixels as u32;
+        rendering
     }
 }
 

@@ -91,7 +91,7 @@ impl FittedTable {
     }
 
     /// Words of an element of the shader's buffer: its array is of words.
-    pub(in crate::threads) const DEVICE_ELEMENT_WORDS: usize = 1;
+    pub(in super::super) const DEVICE_ELEMENT_WORDS: usize = 1;
 
     /// The buffer of the shader. Row by row: the cosine part, then the kernels.
     pub fn device_words(&self) -> Vec<u32> {
@@ -103,17 +103,17 @@ impl FittedTable {
     }
 
     /// Words of a row in a file, besides its threads.
-    pub(in crate::threads) const FILE_ROW_WORDS: usize = 4;
+    pub(in super::super) const FILE_ROW_WORDS: usize = 4;
 
     /// The words of a file: cosine part and relative error of each row, then the kernels.
-    pub(in crate::threads) fn file_words(&self) -> Vec<u32> {
+    pub(in super::super) fn file_words(&self) -> Vec<u32> {
         let rows = self.cosine_part.iter().zip(&self.relative_error);
         let rows = rows.flat_map(|([red, green, blue], error)| [*red, *green, *blue, *error]).map(f32::to_bits);
         rows.chain(self.kernels.iter().flat_map(|kernel| kernel.0)).collect()
     }
 
     /// Rows and kernels of such words. A foreign writer can get the checksum right and a number wrong.
-    pub(in crate::threads) fn from_file_words(of_rows: &[u32], of_threads: &[u32]) -> Result<Self, String> {
+    pub(in super::super) fn from_file_words(of_rows: &[u32], of_threads: &[u32]) -> Result<Self, String> {
         let (of_rows, kernels) = (of_rows.as_chunks::<4>().0, of_threads.as_chunks().0);
         let kernels: Vec<_> = kernels.iter().copied().map(PackedKernel).collect();
         let cosine_part: Vec<[f32; 3]> = of_rows.iter().map(|&[r, g, b, _]| [r, g, b].map(f32::from_bits)).collect();

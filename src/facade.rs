@@ -1,0 +1,229 @@
+//! What a program needs to render: a renderer, scenes, pictures.
+use crate::evaluate::reference::{ReferenceSettings, reference};
+use crate::memo::Memo;
+use crate::method::Method;
+use crate::output::{self, ExrHeader, Format};
+use crate::pipeline::{DeviceScene, Rendering, Wanted};
+use crate::prepare::prepare;
+use crate::progress::Observer;
+use crate::scene::{Background, MaterialSource, Scene, Source, mesh};
+use crate::steps::{FitThreads, LoadMaterial};
+use crate::threads::{ThreadSettings, Threads};
+use crate::vulkan::{Device, Instance};
+use crate::{Result, environment};
+use std::path::Path;
+use std::sync::Arc;
+
+/// Renders scenes on one Vulkan device.
+///
+/// What a scene has in common with the one before is neither loaded, nor made, nor uploaded again; what it has not is let go.
+///
+/// ```
+/// use threadlight::{Renderer, Scene};
+///
+/// let mut renderer = Renderer::new()?;
+/// let mut scene = Scene::default().with_material("clay").with_environment("white").with_size(32, 24).with_threads(4);
+/// let first = renderer.render(&scene)?;
+/// scene.image.exposure = 0.5;
+/// let darker = renderer.render(&scene)?; // Runs the frame, and nothing else.
+/// assert_eq!(first.radiance(), darker.radiance());
+/// assert!(first.display()[0] > darker.display()[0]);
+/// # Ok::<(), threadlight::Error>(())
+/// ```
+pub struct Renderer {
+    device: Arc<Device>,
+    memo: Memo,
+    /// Holds what the next scene may have in common with it.
+    last: Option<DeviceScene>,
+}
+
+impl Renderer {
+    /// A renderer on the device that is likely to be the fastest.
+    ///
+    /// # Errors
+    /// No Vulkan, or no device that is good enough.
+    pub fn new() -> Result<Self> {
+        Self::open(None)
+    }
+
+    /// A renderer on the device of this index, or with this in its name, as `threadlight devices` lists them.
+    ///
+    /// # Errors
+    /// No Vulkan, or no such device.
+    pub fn on(device: &str) -> Result<Self> {
+        Self::open(Some(device))
+    }
+
+    fn open(device: Option<&str>) -> Result<Self> {
+        let instance = Instance::new(false)?;
+        Ok(Self { device: Device::new(&instance, device)?, memo: Memo::default(), last: None })
+    }
+
+    /// The same, which keeps on disk what takes long to make: in `folder`, from one run of the program to the next.
+    pub fn with_cache(self, folder: impl AsRef<Path>) -> Self {
+        Self { memo: Memo::new(Some(folder.as_ref())), ..self }
+    }
+
+    /// Name of the device.
+    pub fn device_name(&self) -> &str {
+        &self.device.description().name
+    }
+
+    /// The picture of `scene`.
+    ///
+    /// # Errors
+    /// The first file or setting that cannot be used; whatever Vulkan refuses.
+    pub fn render(&mut self, scene: &Scene) -> Result<Picture> {
+        self.render_watched(scene, &())
+    }
+
+    /// The same, watched by `observer`: it hears of what is made, and may end it.
+    ///
+    /// # Errors
+    /// As for [`Self::render`]; [`Error::Cancelled`](crate::Error::Cancelled).
+    pub fn render_watched(&mut self, scene: &Scene, observer: &dyn Observer) -> Result<Picture> {
+        for path in scene.files() {
+            self.memo.look_again(path);
+        }
+        let round = self.memo.round(observer);
+        let prepared = prepare(scene, &round)?;
+        let rendering = if prepared.method == Method::Reference {
+            reference(&prepared, &self.device, &ReferenceSettings::default(), &round)?.rendering(&prepared)
+        } else {
+            let on_device = DeviceScene::new(&self.device, &prepared, &round)?;
+            let wanted = Wanted { radiance: true, display: true, ..Wanted::default() };
+            self.last.insert(on_device).render(wanted, 1)?
+        };
+        let header = rendering.exr_header(&prepared, self.device_name());
+        let Rendering { radiance, display, .. } = rendering;
+        Ok(Picture {
+            width: prepared.view.width,
+            height: prepared.view.height,
+            has_alpha: scene.image.background == Background::None,
+            header,
+            radiance,
+            display,
+        })
+    }
+
+    /// The threads of a material: a built-in, a file, or a [`Custom`](crate::Custom) BRDF.
+    ///
+    /// ```
+    /// # let renderer = threadlight::Renderer::new()?;
+    /// let threads = renderer.threads("clay", 4)?;
+    /// assert_eq!(threads.size()[1], 4);
+    /// # Ok::<(), threadlight::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// A material that there is not; a number of threads from 1 to 128 it is not.
+    pub fn threads(&self, material: impl Into<MaterialSource>, count: usize) -> Result<Threads> {
+        let round = self.memo.round(&());
+        let brdf = round.ask(&LoadMaterial(&material.into()))?;
+        let threads =
+            round.ask(&FitThreads { brdf: &brdf, settings: ThreadSettings { count, ..Default::default() } })?;
+        Ok((*threads).clone())
+    }
+}
+
+/// A rendered picture.
+#[derive(Clone, Debug)]
+pub struct Picture {
+    width: u32,
+    height: u32,
+    has_alpha: bool,
+    header: ExrHeader,
+    radiance: Vec<[f32; 4]>,
+    display: Vec<u8>,
+}
+
+impl Picture {
+    /// Columns and rows.
+    pub fn size(&self) -> [u32; 2] {
+        [self.width, self.height]
+    }
+
+    /// Linear radiance times coverage, Rec. 709, and coverage: row by row from the top left.
+    pub fn radiance(&self) -> &[[f32; 4]] {
+        &self.radiance
+    }
+
+    /// As a display shows it: clamp(exposure L, 0, 1)^(1/gamma), 8 bits each of red, green, blue and alpha.
+    pub fn display(&self) -> &[u8] {
+        &self.display
+    }
+
+    /// Writes it: display values to a `.png`, linear radiance to an `.exr`.
+    ///
+    /// # Errors
+    /// Another extension, or a place that cannot be written to.
+    pub fn save(&self, path: impl AsRef<Path>) -> Result<()> {
+        let path = path.as_ref();
+        match Format::of(path)? {
+            Format::Png => output::write_png(path, self.width, self.height, &self.display, self.has_alpha),
+            Format::Exr => {
+                output::write_exr(path, self.width, self.height, &self.radiance, self.has_alpha, &self.header)
+            }
+        }
+    }
+}
+
+/// Scenes of one material, step by step.
+impl Scene {
+    /// The scene in a file.
+    ///
+    /// # Errors
+    /// A file that cannot be read or is no scene.
+    pub fn open(path: impl AsRef<Path>) -> Result<Self> {
+        Self::load(path.as_ref())
+    }
+
+    /// The same with this material on all objects: a built-in's name, the path of a file, or a [`Custom`](crate::Custom) BRDF.
+    pub fn with_material(mut self, material: impl Into<MaterialSource>) -> Self {
+        self.use_material("material", material.into());
+        self
+    }
+
+    /// The same in this environment: a built-in's name, or the path of a file.
+    pub fn with_environment(mut self, environment: &str) -> Self {
+        self.environment.source = Source::named(environment, environment::builtin_names());
+        self
+    }
+
+    /// The same with this mesh in the place of all objects: a built-in's name, or the path of a file.
+    pub fn with_mesh(mut self, name: &str) -> Self {
+        self.use_mesh(Source::named(name, mesh::builtin_names()));
+        self
+    }
+
+    /// The same with an image of this size, in pixels.
+    pub fn with_size(mut self, width: u32, height: u32) -> Self {
+        (self.image.width, self.image.height) = (width, height);
+        self
+    }
+
+    /// The same by this method, with as many threads or samples as suit it.
+    pub fn with_method(mut self, method: Method) -> Self {
+        (self.shading.method, self.shading.threads) = (method.name().to_owned(), None);
+        self
+    }
+
+    /// The same with so many threads, or samples of methods that have none.
+    pub fn with_threads(mut self, count: u32) -> Self {
+        self.shading.threads = Some(count);
+        self
+    }
+}
+
+/// A built-in's name, or the path of a file.
+impl From<&str> for MaterialSource {
+    fn from(name: &str) -> Self {
+        Self::named(name)
+    }
+}
+
+impl From<crate::Custom> for MaterialSource {
+    fn from(custom: crate::Custom) -> Self {
+        Self::Custom(custom)
+    }
+}
