@@ -8,6 +8,7 @@ mod materials;
 mod nameable;
 mod progress;
 mod render;
+mod render_stats;
 mod scene_flags;
 mod threads;
 #[cfg(feature = "viewer")]

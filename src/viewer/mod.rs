@@ -11,6 +11,7 @@
 //! | another picture of the same view, and the difference | [`comparison`] | |
 //! | when that is made anew | [`comparer`] | |
 //! | the threads of what is under the cursor | [`threads_seen`] | egui |
+//! | what frames have shown of themselves | [`measured`] | pure |
 //! | what inputs do, and the frames that follow | [`interaction`] | |
 //! | what is shown and set beside the picture | `panel` | egui |
 //! | frames into the window | [`presenter`] | Vulkan, by the frame graph |
@@ -24,6 +25,7 @@ pub mod input;
 pub mod interaction;
 pub mod latest_job;
 pub mod loaded;
+pub mod measured;
 pub mod orbit;
 mod panel;
 pub mod presenter;

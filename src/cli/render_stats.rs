@@ -1,0 +1,98 @@
+//! What `threadlight render --stats` writes: times, counts, memory.
+use super::render::Rendered;
+use threadlight::low_level::evaluate::reference::ReferenceImage;
+use threadlight::low_level::memo::Origin;
+
+/// What `--stats` writes.
+#[derive(serde::Serialize)]
+pub struct Stats<'a> {
+    version: &'a str,
+    device: &'a str,
+    method: &'a str,
+    threads: u32,
+    subpixels: u32,
+    width: u32,
+    height: u32,
+    /// Sub-pixels that see a surface.
+    covered_subpixels: u32,
+    /// Pixels that share one sum over the threads among their sub-pixels.
+    interior_pixels: u32,
+    /// Pixels that sum over all threads in each covered sub-pixel.
+    edge_pixels: u32,
+    /// Lookups in the environment that shading made.
+    lookups: u64,
+    passes: Vec<Pass<'a>>,
+    frame_ms: f64,
+    thread_generation_ms: f64,
+    thread_cache: &'a str,
+    device_memory_bytes: u64,
+    validation_messages: usize,
+    /// Only with `--error`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    expected_rms: Option<f64>,
+    /// Only for method `reference`.
+    #[serde(flatten)]
+    reference: Option<&'a ReferenceStats>,
+}
+
+/// What is known of the error of a reference.
+#[derive(serde::Serialize)]
+pub struct ReferenceStats {
+    tolerance: f64,
+    /// RMS over covered pixels of the estimated error of display values.
+    error_estimate: f64,
+    /// The largest of a pixel.
+    max_error_estimate: f64,
+    reference_cache: &'static str,
+}
+
+#[derive(serde::Serialize)]
+struct Pass<'a> {
+    name: &'a str,
+    gpu_ms: f64,
+}
+
+impl<'a> Stats<'a> {
+    pub fn new(rendered: &'a Rendered, validation_messages: usize) -> Self {
+        let Rendered { prepared, rendering, reference, expected_rms, threads, device } = rendered;
+        let counters = &rendering.counters;
+        Self {
+            version: env!("CARGO_PKG_VERSION"),
+            device,
+            method: prepared.method.name(),
+            threads: prepared.sampling.count,
+            subpixels: prepared.view.subpixels,
+            width: prepared.view.width,
+            height: prepared.view.height,
+            covered_subpixels: counters.covered_subpixels,
+            interior_pixels: counters.interior_pixels,
+            edge_pixels: counters.edge_pixels,
+            lookups: rendering.lookups,
+            passes: rendering.passes.iter().map(|pass| Pass { name: &pass.name, gpu_ms: pass.gpu_ms }).collect(),
+            frame_ms: rendering.frame_ms,
+            thread_generation_ms: 1e3 * threads.iter().map(|asked| asked.time.as_secs_f64()).sum::<f64>(),
+            thread_cache: if threads.iter().all(|asked| asked.origin != Origin::Made) { "hit" } else { "miss" },
+            device_memory_bytes: rendering.device_memory_bytes,
+            validation_messages,
+            expected_rms: *expected_rms,
+            reference: reference.as_ref(),
+        }
+    }
+}
+
+impl ReferenceStats {
+    pub fn new(tolerance: f64, image: &ReferenceImage) -> Self {
+        Self {
+            tolerance,
+            error_estimate: image.error_estimate,
+            max_error_estimate: image.max_error_estimate,
+            reference_cache: if image.cached { "hit" } else { "miss" },
+        }
+    }
+
+    /// What the header of an EXR file says of it.
+    pub fn header(&self) -> [(String, String); 2] {
+        let number = |name: &str, value: f64| (name.to_owned(), value.to_string());
+        [number("tolerance", self.tolerance), number("error_estimate", self.error_estimate)]
+    }
+}

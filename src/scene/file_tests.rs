@@ -1,0 +1,222 @@
+//! Scene files: all keys are read, written and checked.
+use glam::{DVec3, Vec3};
+
+use super::super::Background;
+use super::*;
+
+const FULL: &str = r#"
+    [image]
+    width = 320
+    height = 200
+    subpixels = 3
+    exposure = 0.5
+    gamma = 1
+    background = "none"
+    [camera]
+    eye = [1.5, 1.0, 3]
+    target = [0, 0.5, 0]
+    up = [0, 1, 0]
+    fov_y_deg = 40
+    [environment]
+    file = "maps/x.hdr"
+    rotation_deg = -30.0
+    intensity = 2
+    [shading]
+    method = "paper"
+    threads = 64
+    seed = 7
+    [[material]]
+    name = "measured"
+    file = "x.binary"
+    [[material]]
+    name = "metal"
+    model = "conductor"
+    distribution = "ggx"
+    alpha = 0.1
+    eta = [0.2, 0.9, 1.1]
+    k = [3.9, 2.4, 2.1]
+    [[material]]
+    name = "named"
+    builtin = "gold"
+    [[object]]
+    mesh = "/absolute/y.obj"
+    material = "metal"
+    translate = [0.1, 0, 0]
+    rotate_deg = [0, 90, 0]
+    scale = 0.5
+    [[object]]
+    builtin = "sphere"
+"#;
+
+fn error(text: &str) -> String {
+    let error = Scene::parse(text, Path::new("")).unwrap_err().to_string();
+    assert!(!error.contains('\n'), "{error}");
+    error
+}
+
+#[test]
+fn every_key_is_read_and_paths_start_at_the_file() {
+    let scene = Scene::parse(FULL, Path::new("/base")).unwrap();
+    let expected = ImageSettings {
+        width: 320,
+        height: 200,
+        subpixels: 3,
+        exposure: 0.5,
+        gamma: 1.0,
+        background: Background::None,
+    };
+    assert_eq!(scene.image, expected);
+    let expected =
+        Camera { eye: DVec3::new(1.5, 1.0, 3.0), target: DVec3::new(0.0, 0.5, 0.0), up: DVec3::Y, fov_y_deg: 40.0 };
+    assert_eq!(scene.camera, Some(expected));
+    let expected =
+        EnvironmentSettings { source: Source::File("/base/maps/x.hdr".into()), rotation_deg: -30.0, intensity: 2.0 };
+    assert_eq!(scene.environment, expected);
+    assert_eq!(scene.shading, ShadingSettings { method: "paper".into(), threads: Some(64), seed: 7 });
+    assert_eq!(scene.materials[0].source, MaterialSource::File("/base/x.binary".into()));
+    let MaterialSource::Model { model, parameters } = &scene.materials[1].source else { panic!("not a model") };
+    assert_eq!((model.as_str(), parameters["alpha"].as_float(), parameters.len()), ("conductor", Some(0.1), 4));
+    assert_eq!(scene.materials[2].source, MaterialSource::Builtin("gold".into()));
+    assert_eq!(scene.objects[0].mesh, Source::File("/absolute/y.obj".into()));
+    assert_eq!((scene.objects[0].translate, scene.objects[0].scale), (Vec3::new(0.1, 0.0, 0.0), 0.5));
+    assert_eq!(scene.objects[1], ObjectSettings::new(Source::Builtin("sphere".into()), "measured"));
+}
+
+#[test]
+fn an_empty_file_is_the_default_scene() {
+    let scene = Scene::parse("", Path::new("")).unwrap();
+    assert_eq!(scene, Scene::default());
+    assert_eq!(
+        (scene.image.width, scene.image.height, scene.shading.threads, scene.image.subpixels),
+        (640, 480, None, 2)
+    );
+}
+
+#[test]
+fn what_is_saved_reads_back_the_same() {
+    let mut odd = Scene::default();
+    odd.image = ImageSettings { exposure: 0.1 + 0.2, gamma: f64::from(f32::MIN_POSITIVE), ..odd.image };
+    odd.environment.rotation_deg = -1e-300;
+    odd.environment.intensity = f64::from(f32::MAX);
+    odd.shading = ShadingSettings { seed: u64::MAX, ..odd.shading };
+    odd.camera = Some(Camera::framing(DVec3::new(1.0 / 3.0, 1e9, -1e-9), 0.7, 1.1));
+    odd.objects[0].translate = Vec3::new(f32::MAX, f32::MIN_POSITIVE, 1.0 / 3.0);
+    odd.objects[0].rotate_deg = Vec3::new(0.1, -0.2, 1e-30);
+    odd.materials[0].name = "\"quoted\"\n[image]\twith = '\u{e9}'".into();
+    odd.objects[0].material.clone_from(&odd.materials[0].name);
+    odd.materials[0].source = MaterialSource::Model {
+        model: "lambert".into(),
+        parameters: "reflectance = [0.1, 1, 0.30000000000000004]".parse().unwrap(),
+    };
+    for scene in [Scene::default(), odd, Scene::parse(FULL, Path::new("/base")).unwrap()] {
+        for (folder, base) in
+            [(None, "/elsewhere"), (Some("/base"), "/base"), (Some("/"), "/"), (Some("/other"), "/there")]
+        {
+            let text = scene.to_toml(folder.map(Path::new)).unwrap();
+            assert_eq!(Scene::parse(&text, Path::new(base)).unwrap(), scene, "{text}");
+        }
+    }
+}
+
+#[test]
+fn files_beside_a_saved_scene_are_named_relative_to_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("saved.toml");
+    let mut scene = Scene::default();
+    scene.environment.source = Source::File(folder.path().join("maps/x.hdr"));
+    scene.objects[0].mesh = Source::File("/elsewhere/y.obj".into());
+    scene.save(&path).unwrap();
+    let text = std::fs::read_to_string(&path).unwrap();
+    assert!(text.contains("\"maps/x.hdr\"") && text.contains("\"/elsewhere/y.obj\""), "{text}");
+    assert_eq!(Scene::load(&path).unwrap(), scene);
+}
+
+#[test]
+fn what_toml_cannot_say_is_an_error_and_leaves_the_old_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("saved.toml");
+    std::fs::write(&path, "old").unwrap();
+    #[cfg(unix)]
+    {
+        use std::os::unix::ffi::OsStrExt;
+        let name = std::ffi::OsStr::from_bytes(b"/maps/\xff.hdr");
+        let mut scene = Scene::default();
+        scene.environment.source = Source::File(name.into());
+        assert!(scene.save(&path).unwrap_err().to_string().contains("UTF-8"));
+    }
+    assert_eq!(std::fs::read_to_string(&path).unwrap(), "old");
+    let nowhere = folder.path().join("absent/saved.toml");
+    assert!(Scene::default().save(&nowhere).unwrap_err().to_string().contains("absent"));
+}
+
+#[test]
+fn unknown_keys_are_errors_that_name_the_key_and_its_line() {
+    for (text, key, line) in [
+        ("[image]\nwidth = 3\nwidht = 4", "widht", "line 3"),
+        ("[camera]\neye = [1, 2, 3]\nfov = 4", "fov", "line 3"),
+        ("[environment]\n\nrotation = 4", "rotation", "line 3"),
+        ("[shading]\nthread = 4", "thread", "line 2"),
+        ("[[material]]\nname = 'm'\nfile = 'x'\nalpha = 4", "alpha", "line 1"),
+        ("[[object]]\nbuiltin = 'sphere'\nsize = 4", "size", "line 3"),
+        ("[scene]", "scene", "line 1"),
+    ] {
+        let error = error(text);
+        assert!(error.contains(&format!("`{key}`")) && error.contains(line), "{error}");
+    }
+}
+
+#[test]
+fn bad_values_are_errors_that_name_the_key_and_its_line() {
+    for (text, key, line) in [
+        ("[image]\nwidth = 0", "width", "line 2"),
+        ("[image]\nheight = -1", "height", "line 2"),
+        ("[image]\nheight = 100000", "height", "line 2"),
+        ("[image]\nwidth = 3.5", "width", "line 2"),
+        ("[image]\nwidth = '3'", "width", "line 2"),
+        ("[image]\nsubpixels = 5", "subpixels", "line 2"),
+        ("[image]\nexposure = -0.1", "exposure", "line 2"),
+        ("[image]\nexposure = inf", "exposure", "line 2"),
+        ("[image]\ngamma = 0", "gamma", "line 2"),
+        ("[image]\nbackground = 'black'", "environment", "line 2"),
+        ("[camera]\neye = [0, 0, 0]", "target", "line 1"),
+        ("[camera]\neye = [0, 0]", "eye", "line 2"),
+        ("[camera]\neye = [0, 1, 0]", "up", "line 1"),
+        ("[camera]\neye = [0, 0, 1]\nfov_y_deg = 180", "fov_y_deg", "line 1"),
+        ("[camera]\nfov_y_deg = 30", "eye", "line 1"),
+        ("[environment]\nintensity = nan", "intensity", "line 2"),
+        ("[environment]\nrotation_deg = inf", "rotation_deg", "line 2"),
+        ("[environment]\nfile = 'x'\nbuiltin = 'y'", "builtin", "line 1"),
+        ("[shading]\nthreads = 0", "threads", "line 2"),
+        ("[shading]\nthreads = 10001", "threads", "line 2"),
+        ("[shading]\nseed = -1", "seed", "line 2"),
+        ("[[material]]\nname = 'm'", "model", "line 1"),
+        ("[[material]]\nname = 'm'\nfile = 'x'\nmodel = 'y'", "model", "line 1"),
+        ("[[material]]\nfile = 'x'", "name", "line 1"),
+        ("[[material]]\nname = 3\nfile = 'x'", "name", "line 1"),
+        ("[[material]]\nname = 'm'\nfile = 'x'\n[[material]]\nname = 'm'\nfile = 'x'", "name", "line 4"),
+        ("[[object]]\nmaterial = 'gold'", "mesh", "line 1"),
+        ("[[object]]\nbuiltin = 'sphere'\nscale = 0", "scale", "line 3"),
+        ("[[object]]\nbuiltin = 'sphere'\nscale = nan", "scale", "line 3"),
+        ("[[object]]\nbuiltin = 'sphere'\ntranslate = [0, inf, 0]", "translate", "line 3"),
+        ("[image]\nwidth = ", "width", "line 2"),
+        ("[image\nwidth = 3", "image", "line 1"),
+    ] {
+        let error = error(text);
+        assert!(error.contains(key) && error.contains(line), "{text:?}: {error}");
+    }
+    let error = error("[[material]]\nname = 'red'\nfile = 'x'\n[[object]]\nbuiltin = 'sphere'\nmaterial = 'blue'");
+    assert!(error.contains("\"blue\"") && error.contains("red") && error.contains("line 4"), "{error}");
+}
+
+#[test]
+fn errors_of_files_name_the_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("bad.toml");
+    std::fs::write(&path, "[image]\nwidth = 0").unwrap();
+    assert!(Scene::load(&path).unwrap_err().to_string().contains("bad.toml"));
+    std::fs::write(&path, b"\xff\xfe").unwrap();
+    assert!(Scene::load(&path).unwrap_err().to_string().contains("bad.toml"));
+    assert!(Scene::load(&folder.path().join("none.toml")).unwrap_err().to_string().contains("none.toml"));
+    std::fs::write(&path, "[environment]\nfile = 'x.hdr'").unwrap();
+    assert_eq!(Scene::load(&path).unwrap().environment.source, Source::File(folder.path().join("x.hdr")));
+}
