@@ -4,6 +4,9 @@ use std::path::{Path, PathBuf};
 /// Result of everything in the library that can fail.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
+/// An error of a layer above this file, which knows none of them.
+pub type Cause = Box<dyn std::error::Error + Send + Sync>;
+
 /// Why the library could not do as asked.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
@@ -17,12 +20,12 @@ pub enum Error {
         /// What the user can do about it, in half a sentence.
         remedy: String,
     },
-    /// The frame that was declared contradicts itself.
+    /// The frame that was declared contradicts itself: a `GraphError`.
     #[error("frame graph: {0}")]
-    Graph(#[from] crate::graph::GraphError),
-    /// Vulkan refused something.
+    Graph(#[source] Cause),
+    /// Vulkan refused something: a `VulkanError`.
     #[error(transparent)]
-    Vulkan(#[from] crate::vulkan::VulkanError),
+    Vulkan(Cause),
     /// The window system refused something, or there is none.
     #[error("no window: {cause}; `threadlight render` needs none")]
     Window {

@@ -145,3 +145,35 @@ fn the_first_stages_of_a_large_reference_come_soon() {
     .unwrap();
     gpu.finish();
 }
+
+#[test]
+#[cfg(unix)]
+fn an_interrupted_rendering_ends_soon_and_leaves_no_file() {
+    let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
+    let folder = tempfile::tempdir().unwrap();
+    // As wide as captured maps are: blurring it takes seconds.
+    let (width, height) = (1024, 512);
+    let texels: Vec<[f32; 4]> = (0..width * height).map(|i| [(i % 97) as f32, (i % 31) as f32, 1.0, 1.0]).collect();
+    let map = folder.path().join("map.exr");
+    threadlight::low_level::output::write_exr(&map, width, height, &texels, false, &Default::default()).unwrap();
+    for after in [300, 1500, 3000].map(Duration::from_millis) {
+        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_threadlight"));
+        command.args(["render", "--no-cache", "--environment", "map.exr", "--size", "64x48", "-o", "picture.png"]);
+        if let Ok(device) = std::env::var("THREADLIGHT_TEST_DEVICE") {
+            command.args(["--device", &device]);
+        }
+        let mut child = command.current_dir(folder.path()).stderr(std::process::Stdio::piped()).spawn().unwrap();
+        std::thread::sleep(after);
+        let start = Instant::now();
+        let sent = std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+        let status = child.wait().unwrap();
+        println!("render, interrupted after {after:?}: {:?}", start.elapsed());
+        // Before the handler is there, and after the work is done, there is nothing to say.
+        if sent.success() && status.code() == Some(130) {
+            assert!(start.elapsed() < SOON, "{:?}", start.elapsed());
+            let left: Vec<_> =
+                std::fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+            assert_eq!(left, ["map.exr"], "interrupted after {after:?}");
+        }
+    }
+}

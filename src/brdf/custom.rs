@@ -43,6 +43,33 @@ use super::{Brdf, MerlTable, Model, Parameters};
 use crate::error::{Error, Result};
 
 /// What a user of the crate has to give.
+///
+/// ```
+/// use glam::DVec3;
+/// use threadlight::{Custom, CustomBrdf, Renderer, Scene};
+///
+/// /// Lambert's, half as bright at grazing angles.
+/// struct Dusty;
+///
+/// impl CustomBrdf for Dusty {
+///     fn name(&self) -> &str {
+///         "dusty"
+///     }
+///     fn key(&self) -> Vec<u8> {
+///         vec![1]
+///     }
+///     fn evaluate(&self, w_i: DVec3, w_o: DVec3) -> DVec3 {
+///         DVec3::splat(0.2 * (0.5 + 0.5 * w_i.z * w_o.z))
+///     }
+/// }
+///
+/// let scene = Scene::default().with_material(Custom::new(Dusty)).with_environment("white").with_size(32, 24).with_threads(4);
+/// let picture = Renderer::new()?.render(&scene)?;
+/// // A white furnace: the ball is darker than the light behind it.
+/// let [middle, corner] = [12 * 32 + 16, 0].map(|pixel| picture.radiance()[pixel][0]);
+/// assert!(middle > 0.3 && middle < 0.7 && corner > 0.99, "{middle} {corner}");
+/// # Ok::<(), threadlight::Error>(())
+/// ```
 pub trait CustomBrdf: Send + Sync {
     /// What to call it.
     fn name(&self) -> &str;

@@ -52,3 +52,9 @@ pub enum GraphError {
     #[error("cycle: {}; read the newer version, or copy the older one first", steps.join(", "))]
     Cycle { steps: Vec<String> },
 }
+
+impl From<GraphError> for crate::Error {
+    fn from(error: GraphError) -> Self {
+        Self::Graph(Box::new(error))
+    }
+}

@@ -12,13 +12,13 @@ use super::presenter::{Drawn, Extras, Presenter, ShownPicture};
 use super::session::Session;
 use crate::memo::{Key, Memo};
 use crate::output::{self, Format};
-use crate::passes::{Area, Counters, View};
+use crate::passes::{Area, View};
 use crate::pipeline::{DeviceScene, Wanted};
 use crate::prepare::{key_of, prepare, view_of};
 #[cfg(feature = "hot-reload")]
 use crate::progress::Observer;
 use crate::scene::{Background, Scene};
-use crate::vulkan::{Device, PassTime, UiFrame};
+use crate::vulkan::{Device, UiFrame};
 use crate::{Error, Result};
 use egui::TexturesDelta;
 use glam::DVec2;

@@ -82,6 +82,12 @@ pub enum VulkanError {
     },
 }
 
+impl From<VulkanError> for crate::Error {
+    fn from(error: VulkanError) -> Self {
+        Self::Vulkan(Box::new(error))
+    }
+}
+
 impl VulkanError {
     /// A [`VulkanError::Unfit`] about the object of this name.
     pub(super) fn unfit(object: &str, problem: impl ToString) -> Self {
