@@ -2,7 +2,7 @@
 #ifndef PACKING_GLSL
 #define PACKING_GLSL
 
-// Octahedral map of a unit vector to [-1, 1]^2 (Meyer et al. 2010); two 16-bit numbers hold it to 5e-5 rad.
+// Octahedral map of a unit vector to [-1, 1]^2 (Meyer et al. 2010); two 16-bit numbers hold it to 7e-5 rad.
 vec2 octahedral_encode(vec3 n) {
     n /= abs(n.x) + abs(n.y) + abs(n.z);
     vec2 folded = (1.0 - abs(n.yx)) * vec2(n.x >= 0.0 ? 1.0 : -1.0, n.y >= 0.0 ? 1.0 : -1.0);
