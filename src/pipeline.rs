@@ -6,7 +6,7 @@ use crate::passes::*;
 use crate::prepare::Prepared;
 use crate::scene::Mesh;
 use crate::steps::{
-    CompileCompute, CompileGeometryCache, UploadBackground, UploadLight, UploadMaterials, UploadMesh, light,
+    CompileCompute, CompileGeometryCache, UploadBackground, UploadLight, UploadMaterials, UploadMesh, light, pipelines,
 };
 use crate::vulkan::{Device, Frames, PassTime, Shader, compiled};
 use crate::{Error, Result};
@@ -94,6 +94,8 @@ impl DeviceScene {
             round.ask(&CompileCompute { device, shader, constants })
         };
         let shader = method.shader()?;
+        // Held, so that it is opened once for all that is compiled.
+        pipelines(round, device)?;
         let geometry_cache = ask_geometry_cache(device, prepared, round)?;
         let materials: Vec<_> = prepared.materials.iter().map(|m| (&m.brdf, m.threads.as_ref())).collect();
         let evaluates_brdf = method.evaluates_brdf(environment);

@@ -128,7 +128,7 @@ impl Memo {
 
     /// Begins to ask for what belongs together, such as all that a frame needs. `observer` sees what is made, and may end it.
     pub fn round<'r>(&'r self, observer: &'r dyn Observer) -> Round<'r> {
-        Round { memo: self, observer, held: RefCell::default(), asked: RefCell::default() }
+        Round { memo: self, observer, within: None, held: RefCell::default(), asked: RefCell::default() }
     }
 
     /// The key of the contents of the file at `path`, as they were when this was first asked, or after [`Self::look_again`].
@@ -174,6 +174,8 @@ impl Memo {
 pub struct Round<'r> {
     memo: &'r Memo,
     observer: &'r dyn Observer,
+    /// The step that asks for others while it is made.
+    within: Option<&'static str>,
     held: RefCell<HashMap<Key, Output>>,
     asked: RefCell<Vec<Asked>>,
 }
@@ -211,7 +213,10 @@ impl<'r> Round<'r> {
         }
         self.observer.begin(S::NAME);
         // What is only needed on the way is let go at its end.
-        let output = step.make(&self.memo.round(self.observer))?;
+        let output = step.make(&Round { within: Some(S::NAME), ..self.memo.round(self.observer) })?;
+        if let Some(name) = self.within {
+            self.observer.begin(name);
+        }
         if let Some((stored, folder)) = stored {
             stored.write(folder, key, &output);
         }
