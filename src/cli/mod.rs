@@ -8,7 +8,7 @@ mod materials;
 mod nameable;
 mod progress;
 mod render;
-mod render_stats;
+mod rendered;
 mod scene_flags;
 mod threads;
 #[cfg(feature = "viewer")]

@@ -1,22 +1,22 @@
 //! `threadlight render`: a picture of a scene.
 use super::number;
 use super::progress::TerminalProgress;
-use super::render_stats::{ReferenceStats, Stats};
+use super::rendered::{ReferenceStats, Rendered, Stats};
 use super::scene_flags::{MachineFlags, SceneFlags};
 use anyhow::Context;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::value_parser;
 use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 use threadlight::low_level::evaluate::expected::prepare_within;
 use threadlight::low_level::evaluate::reference::{self, Processor, ReferenceSettings};
-use threadlight::low_level::memo::{Asked, Memo, Step};
+use threadlight::low_level::memo::{Memo, Step};
 use threadlight::low_level::method::Method;
 use threadlight::low_level::output::{self, Format};
 use threadlight::low_level::pipeline::{DeviceScene, Rendering, Wanted};
-use threadlight::low_level::prepare::{Prepared, prepare};
-use threadlight::low_level::scene::{Background, Scene};
+use threadlight::low_level::prepare::prepare;
+use threadlight::low_level::scene::Scene;
 use threadlight::low_level::steps::FitThreads;
 use threadlight::low_level::vulkan::{Device, Instance};
 
@@ -64,19 +64,6 @@ pub struct Render {
     /// Picture to write: .png (8 bit, display values) or .exr (32-bit float, linear radiance).
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
-}
-
-/// All that a rendering leaves.
-pub struct Rendered {
-    pub prepared: Prepared,
-    pub rendering: Rendering,
-    /// Only for method `reference`.
-    pub reference: Option<ReferenceStats>,
-    /// Only with `--error`.
-    pub expected_rms: Option<f64>,
-    /// How each material's threads were come by.
-    pub threads: Vec<Asked>,
-    pub device: String,
 }
 
 impl Render {
@@ -173,24 +160,6 @@ impl Render {
         let threads = threads[threads.len().saturating_sub(prepared.materials.len())..].to_vec();
         let device = device.description().name.clone();
         Ok(Rendered { prepared, rendering, reference, expected_rms, threads, device })
-    }
-}
-
-impl Rendered {
-    /// Writes the picture.
-    fn write(&self, path: &Path, format: Option<Format>) -> Result<()> {
-        let Self { prepared, rendering, .. } = self;
-        let (width, height) = (prepared.view.width, prepared.view.height);
-        let transparent = prepared.scene.image.background == Background::None;
-        if format != Some(Format::Exr) {
-            return output::write_png(path, width, height, &rendering.display, transparent);
-        }
-        let mut header = rendering.exr_header(prepared, &self.device);
-        if let Some(reference) = &self.reference {
-            header.more.extend(reference.header());
-        }
-        header.more.extend(self.expected_rms.map(|rms| ("expected_rms".to_owned(), rms.to_string())));
-        output::write_exr(path, width, height, &rendering.radiance, transparent, &header)
     }
 }
 

@@ -1,21 +1,9 @@
 //! Reads environments from files of any format and repairs pixels that are no radiance.
 use std::path::Path;
 
-use super::{Environment, FORMATS, procedural};
+use super::{Environment, FORMATS, RepairCounts, procedural};
 use crate::error::{Error, Result};
 use crate::file_format::FileKind;
-
-/// How many pixels of a file were no radiance, by the worst that was wrong with each.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct RepairCounts {
-    /// Pixels with a NaN: replaced by the mean of those of their eight neighbours that were whole, or by black.
-    pub nan: usize,
-    /// Pixels with an infinite channel: set to the largest finite value in the file.
-    pub infinite: usize,
-    /// Pixels with a negative channel (colours outside Rec. 709, or ringing): set to 0, and what they lacked taken from
-    /// their surroundings, so that the light stays the same as a whole.
-    pub negative: usize,
-}
 
 impl Environment {
     /// The formats of environment files.

@@ -18,13 +18,24 @@ mod vmf_pyramid;
 
 pub use irradiance::irradiance_map;
 pub use light_map::{Alias, LightMap};
-pub use load::RepairCounts;
 pub use procedural::builtin_names;
 pub use pyramid::Pyramid;
 pub use sources::{LightSource, MAX_SOURCES, SmallSources, SourceRecord};
 pub use vmf_pyramid::{BlurKernel, BlurStep, VmfPyramid};
 
 file_formats!(Environment: hdr_file, exr_file);
+
+/// How many pixels of a file were no radiance, by the worst that was wrong with each.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct RepairCounts {
+    /// Pixels with a NaN: replaced by the mean of those of their eight neighbours that were whole, or by black.
+    pub nan: usize,
+    /// Pixels with an infinite channel: set to the largest finite value in the file.
+    pub infinite: usize,
+    /// Pixels with a negative channel (colours outside Rec. 709, or ringing): set to 0, and what they lacked taken from
+    /// their surroundings, so that the light stays the same as a whole.
+    pub negative: usize,
+}
 
 /// Radiance from every direction, as a lat-long picture: linear, Rec. 709.
 ///

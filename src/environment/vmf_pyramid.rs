@@ -54,7 +54,7 @@ pub struct BlurStep {
 }
 
 impl VmfPyramid {
-    /// How its maps are made for faces of `finest` texels: levels (kernel [`Kernel::Vmf`]) from fine to coarse, and means of 2 x 2
+    /// How its maps are made for faces of `finest` texels: levels (kernel [`BlurKernel::Vmf`]) from fine to coarse, and means of 2 x 2
     /// texels of them.
     ///
     /// Level 0 is made from the box-filtered one, and each other from means of a finer level of its own: that is so smooth that nothing is

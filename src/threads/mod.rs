@@ -182,7 +182,7 @@ pub fn generate(brdf: &Brdf, settings: &ThreadSettings, observer: &dyn Observer)
 pub struct ThreadSettings {
     /// Which they are.
     pub kind: ThreadKind,
-    /// Number of threads m, 1 to [`Kind::max_count`].
+    /// Number of threads m, 1 to [`ThreadKind::max_count`].
     pub count: usize,
     /// Number of view angles, evenly spaced from 0 to just below 90 degrees; at least 1, the paper's is 90.
     pub rows: usize,
