@@ -11,6 +11,9 @@ use threadlight::low_level::shading;
 #[test]
 fn the_shader_agrees_with_its_cpu_twin() {
     let gpu = Validated::new();
+    // A folder of its own: what the CPU blurs is compared with what the device does.
+    let folder = tempfile::tempdir().unwrap();
+    let cpu = Memo::new(Some(folder.path()));
     let mut materials = analytic_materials();
     materials.push((
         "blinn-phong",
@@ -54,7 +57,7 @@ fn the_shader_agrees_with_its_cpu_twin() {
             scene.environment.intensity = 1.7;
             let prepared = ready(&scene);
             let rendering = gpu.render(&prepared, EVERYTHING);
-            let twin = shading::CpuShader::new(&prepared, &Memo::default().round(&())).unwrap();
+            let twin = shading::CpuShader::new(&prepared, &cpu.round(&())).unwrap();
             let (mut interior, mut edge, mut covered) = (0, 0, 0);
             for pixel in pixels(&prepared) {
                 let texels = texels_of(&prepared, &rendering, pixel);

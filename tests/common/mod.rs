@@ -2,7 +2,7 @@
 #![allow(dead_code)]
 use glam::UVec2;
 use std::path::PathBuf;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 use threadlight::low_level::memo::{Memo, Round};
 use threadlight::low_level::pipeline::{DeviceScene, Rendering, Wanted};
 use threadlight::low_level::prepare::{Prepared, prepare};
@@ -14,6 +14,8 @@ pub struct Validated {
     pub device: Arc<Device>,
     /// In memory only.
     pub memo: Memo,
+    /// Holds what the next renderer may have in common with it.
+    last: Mutex<Option<DeviceScene>>,
     messages: Messages,
 }
 
@@ -22,7 +24,7 @@ impl Validated {
         let instance = Instance::new(true).expect("an instance with validation");
         let wanted = std::env::var("THREADLIGHT_TEST_DEVICE").ok();
         let device = Device::new(&instance, wanted.as_deref()).expect("a device");
-        Self { device, memo: Memo::default(), messages: instance.messages() }
+        Self { device, memo: Memo::default(), last: Mutex::default(), messages: instance.messages() }
     }
 
     pub fn render(&self, prepared: &Prepared, wanted: Wanted) -> Rendering {
@@ -30,7 +32,9 @@ impl Validated {
     }
 
     pub fn renderer(&self, prepared: &Prepared) -> DeviceScene {
-        DeviceScene::new(&self.device, prepared, &self.round()).expect("a renderer")
+        let renderer = DeviceScene::new(&self.device, prepared, &self.round()).expect("a renderer");
+        *self.last.lock().expect("no test panics here") = Some(renderer.clone());
+        renderer
     }
 
     pub fn round(&self) -> Round<'_> {
@@ -38,7 +42,8 @@ impl Validated {
     }
 
     pub fn finish(self) {
-        let Self { device, messages, .. } = self;
+        let Self { device, messages, memo, last } = self;
+        drop((last, memo));
         assert_eq!(Arc::strong_count(&device), 1, "something still holds the device");
         drop(device);
         assert_eq!(messages.all(), Vec::<String>::new());
