@@ -2,7 +2,7 @@
 //!
 //! ```
 //! use glam::DVec3;
-//! use threadlight::brdf::{Brdf, CustomBrdf};
+//! use threadlight::{Brdf, CustomBrdf};
 //!
 //! struct Chalk(f64);
 //!

@@ -56,6 +56,8 @@ pub struct Environment {
     pub repaired: RepairCounts,
     /// Made when first asked for.
     small_sources: OnceLock<SmallSources>,
+    /// Made when first asked for.
+    fingerprint: OnceLock<blake3::Hash>,
 }
 
 impl Environment {
@@ -67,7 +69,18 @@ impl Environment {
         texels: Vec<[f32; 3]>,
         repaired: RepairCounts,
     ) -> Self {
-        Self { name, width, height, texels, repaired, small_sources: OnceLock::new() }
+        Self { name, width, height, texels, repaired, small_sources: OnceLock::new(), fingerprint: OnceLock::new() }
+    }
+
+    /// Digest of its size and pixels: of equal ones are only equal environments, but for their names.
+    pub fn fingerprint(&self) -> blake3::Hash {
+        *self.fingerprint.get_or_init(|| {
+            let mut hasher = blake3::Hasher::new();
+            for size in [self.width, self.height] {
+                hasher.update(&(size as u64).to_le_bytes());
+            }
+            hasher.update(bytemuck::cast_slice(&self.texels)).finalize()
+        })
     }
 
     /// Its small bright sources.

@@ -11,6 +11,11 @@ impl Key {
         KeyBuilder(blake3::Hasher::new()).text(name)
     }
 
+    /// The key of something with this digest of its contents.
+    pub fn of_digest(digest: blake3::Hash) -> Self {
+        Self(digest.into())
+    }
+
     /// The key of these bytes.
     pub fn of_bytes(bytes: &[u8]) -> Self {
         Self(blake3::hash(bytes).into())

@@ -45,6 +45,12 @@ pub trait Step {
     /// Whatever goes wrong; [`crate::Error::Cancelled`] if the round's observer has had enough.
     fn make(&self, round: &Round) -> Result<Self::Output>;
 
+    /// What other steps know the output by, where that is not [`Self::key`]: its contents. So what is kept on disk is made again when
+    /// another version of the program reads the same file otherwise, or makes other built-ins.
+    fn content_key(&self, _output: &Self::Output) -> Option<Key> {
+        None
+    }
+
     /// How the output is kept on disk; none for what is as quickly made.
     fn stored(&self) -> Option<Stored<'_, Self::Output>> {
         None
@@ -54,7 +60,7 @@ pub trait Step {
 /// An output and its key.
 #[derive(Debug)]
 pub struct Keyed<T> {
-    /// What it is a function of.
+    /// Of equal key are only equal outputs.
     pub key: Key,
     output: Arc<T>,
 }
@@ -203,7 +209,7 @@ impl<'r> Round<'r> {
         }
         self.held.borrow_mut().insert(key, held);
         self.asked.borrow_mut().push(Asked { step: S::NAME, origin, time: start.elapsed() });
-        Ok(Keyed { key, output })
+        Ok(Keyed { key: step.content_key(&output).unwrap_or(key), output })
     }
 
     fn load_or_make<S: Step>(&self, step: &S, key: Key) -> Result<(S::Output, Origin)> {

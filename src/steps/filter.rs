@@ -72,6 +72,10 @@ impl Step for Part<'_> {
         Ok(Key::builder("part").key(self.environment.key).number(u64::from(self.of_sources)).build())
     }
 
+    fn content_key(&self, part: &Environment) -> Option<Key> {
+        Some(Key::of_digest(part.fingerprint()))
+    }
+
     fn make(&self, _: &Round) -> Result<Environment> {
         Ok(self.environment.part(self.of_sources))
     }

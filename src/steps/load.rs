@@ -53,6 +53,10 @@ impl Step for LoadEnvironment<'_> {
         Ok(Key::builder(&self.0.to_string()).key(key_of(memo, &Environment::FILES, self.0)?).build())
     }
 
+    fn content_key(&self, environment: &Environment) -> Option<Key> {
+        Some(Key::of_digest(environment.fingerprint()))
+    }
+
     fn make(&self, round: &Round) -> Result<Environment> {
         match self.0 {
             Source::File(path) => Environment::FILES.parse(path, &round.memo().file_bytes(path)?),
@@ -74,6 +78,10 @@ impl Step for LoadMaterial<'_> {
             // Models are made at once, so they are known by what they are.
             source => Key::builder("model").bytes(load(memo, source)?.fingerprint().as_bytes()).build(),
         })
+    }
+
+    fn content_key(&self, brdf: &Brdf) -> Option<Key> {
+        Some(Key::of_digest(brdf.fingerprint()))
     }
 
     fn make(&self, round: &Round) -> Result<Brdf> {
