@@ -166,9 +166,10 @@ fn two_hundred_changes_do_not_grow_memory() {
     ] {
         let (early, late) = (most(of, 40..120), most(of, 120..200));
         println!("{name}: at most {early} in changes 40 to 120, {late} in changes 120 to 200");
-        // The allocator of the system keeps some of what is freed, and alignment moves some on the device.
+        // The system's allocator and the validation layer keep some of what is freed (measured: a twenty-fifth; without the layer a
+        // hundredth), and alignment moves some on the device.
         let slack = match name {
-            "resident bytes" => early / 20,
+            "resident bytes" => early / 10,
             "bytes on the device" => 1 << 16,
             _ => 0,
         };
