@@ -32,13 +32,17 @@ impl Step for BoxFilter<'_> {
     const NAME: &'static str = "environment";
 
     fn key(&self, _: &Memo) -> Result<Key> {
-        let key = Key::builder("box").key(self.environment.key);
-        Ok(key.number(self.face_size.unwrap_or_default() as u64).build())
+        Ok(Key::builder("box").key(self.environment.key).number(self.face_size() as u64).build())
     }
 
     fn make(&self, round: &Round) -> Result<Pyramid> {
-        let face_size = self.face_size.unwrap_or_else(|| Pyramid::face_size_for(self.environment));
-        Pyramid::box_filtered_to(self.environment, face_size, round.observer())
+        Pyramid::box_filtered_to(self.environment, self.face_size(), round.observer())
+    }
+}
+
+impl BoxFilter<'_> {
+    fn face_size(&self) -> usize {
+        self.face_size.unwrap_or_else(|| Pyramid::face_size_for(self.environment))
     }
 }
 
@@ -98,8 +102,7 @@ impl Step for Blur<'_> {
     }
 
     fn make(&self, round: &Round) -> Result<VmfPyramid> {
-        let face_size = face_size_before_blur(self.environment);
-        let face_size = (face_size != Pyramid::face_size_for(self.environment)).then_some(face_size);
+        let face_size = Some(face_size_before_blur(self.environment));
         let source = round.ask(&BoxFilter { environment: self.environment, face_size })?;
         match self.device {
             Some(device) => vmf_pyramid(device, &*pipelines(round, device)?, &source, round.observer()),
