@@ -28,8 +28,10 @@ layout(set = 0, binding = 3, rgba32f) uniform writeonly image2D radiance;
 
 layout(push_constant) uniform Push {
     uvec2 size_px;
-    // Sub-pixels whose normals lie within this angle of the first one's count as one smooth surface.
+    // Sub-pixels whose normals lie within this angle of the first one's count as one smooth surface,
     float cos_smooth;
+    // if their variance along each of two axes, in rad^2, is below this.
+    float smooth_variance;
 } push;
 
 shared uint listed[2];
@@ -52,18 +54,22 @@ void main() {
     if (inside) {
         uvec2 reference = uvec2(0);
         vec3 reference_normal = vec3(0.0);
+        vec3 normals = vec3(0.0);
         for (uint j = 0; j < SUBPIXELS * SUBPIXELS; ++j) {
             uvec2 texel = texelFetch(geometry, ivec2(pixel * SUBPIXELS + uvec2(j % SUBPIXELS, j / SUBPIXELS)), 0).xy;
             if (!is_covered(texel)) {
                 continue;
             }
             vec3 normal = geometry_normal(texel);
+            normals += normal;
             if (covered++ == 0) {
                 reference = texel;
                 reference_normal = normal;
             }
             smooth_surface = smooth_surface && texel.y == reference.y && dot(normal, reference_normal) >= push.cos_smooth;
         }
+        // With R the length of the mean normal, 1 - R is the variance.
+        smooth_surface = smooth_surface && 1.0 - length(normals) / float(covered) < push.smooth_variance;
         if (covered == 0) {
             imageStore(radiance, ivec2(pixel), vec4(0.0));
         }

@@ -1,7 +1,32 @@
-// For methods that divide their samples among the sub-pixels of a pixel that lies on one smooth surface: see shade.comp.
+// For methods that divide their samples among the sub-pixels of a pixel that lies on one smooth surface, as the paper does with its
+// threads (section 4.2). Of another pixel, each covered sub-pixel takes all samples. Twin: shade_partition in src/shading/mod.rs.
 
-const bool SHARES_SURFACE = false;
+// The sum over samples first, first + stride, ... of weight times environment.
+vec3 estimate(Surface surface, Material material, uint first, uint stride);
 
-bool needs_subpixels(Surface surface, Material material) {
-    return false;
+vec4 shade_pixel(uvec2 pixel, bool interior) {
+    const uint subpixel_count = SUBPIXELS * SUBPIXELS;
+    vec3 normals = vec3(0.0);
+    if (interior) {
+        for (uint j = 0; j < subpixel_count; ++j) {
+            uvec2 place = pixel * SUBPIXELS + uvec2(j % SUBPIXELS, j / SUBPIXELS);
+            normals += geometry_normal(texelFetch(geometry, ivec2(place), 0).xy);
+        }
+    }
+    // With R the length of the mean normal, 1 - R is the variance along each of two axes.
+    float normal_variance = interior ? max(1.0 - length(normals) / float(subpixel_count), 0.0) : 0.0;
+    uint stride = interior ? subpixel_count : 1;
+    vec3 sum = vec3(0.0);
+    uint covered = 0;
+    for (uint j = 0; j < subpixel_count; ++j) {
+        subpixel = pixel * SUBPIXELS + uvec2(j % SUBPIXELS, j / SUBPIXELS);
+        uvec2 texel = texelFetch(geometry, ivec2(subpixel), 0).xy;
+        if (is_covered(texel)) {
+            ++covered;
+            Surface surface = surface_at((vec2(subpixel) + 0.5) / vec2(push.size_px * SUBPIXELS), geometry_normal(texel));
+            surface.normal_variance = stride > 1 ? normal_variance : 0.0;
+            sum += estimate(surface, materials[geometry_material(texel)], stride > 1 ? j : 0, stride);
+        }
+    }
+    return vec4(stride > 1 ? sum : sum / float(subpixel_count), float(covered) / float(subpixel_count));
 }

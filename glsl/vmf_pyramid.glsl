@@ -2,6 +2,9 @@
 // Twin: src/environment/vmf_pyramid.rs; of what looks it up, src/shading/fitted.rs.
 #include "environment_map.glsl"
 
+layout(constant_id = 3) const uint HAS_SHARP_KERNELS = 1;    // 0: no kernel is sharper than the pyramid
+layout(constant_id = 4) const uint HAS_MIRRORED_SOURCES = 1; // 0: no kernel looks up sources
+
 layout(set = 0, binding = 4) uniform samplerCube environment_pyramid;
 layout(set = 0, binding = 13) uniform samplerCube irradiance_map;
 layout(set = 0, binding = 15) uniform samplerCube source_pyramid;
@@ -15,19 +18,25 @@ float finest_level(float face_size) {
     return log2(FINEST_FACE_SIZE / face_size);
 }
 
+// Exactly, for -63 <= n <= 63.
+float power_of_4(int n) {
+    return intBitsToFloat((127 + 2 * n) << 23);
+}
+
 // Variance along each axis of a kernel of `level`, over that of level 0: of whole levels 4^level, of level -1, the environment as it
 // is, none; between them kernels blend, and so do their variances.
 float variance_of_level(float level) {
     float whole = floor(level);
-    return level < 0.0 ? level + 1.0 : exp2(2.0 * whole) * (1.0 + 3.0 * (level - whole));
+    return level < 0.0 ? level + 1.0 : power_of_4(int(whole)) * (1.0 + 3.0 * (level - whole));
 }
 
 float level_of_variance(float variance) {
     if (variance < 1.0) {
         return variance - 1.0;
     }
-    float whole = floor(0.5 * log2(variance));
-    return whole + (variance * exp2(-2.0 * whole) - 1.0) / 3.0;
+    // Half the exponent of the number.
+    int whole = ((floatBitsToInt(variance) >> 23) - 127) >> 1;
+    return float(whole) + (variance * power_of_4(-whole) - 1.0) / 3.0;
 }
 
 // The level of a kernel that is blurred by normals of this variance along each axis, in rad^2: mirrored directions turn
@@ -37,7 +46,7 @@ float level_within_pixel(float level, float normal_variance) {
     return added > 0.0 ? level_of_variance(variance_of_level(level) + added) : level;
 }
 
-// The environment as it is, with so much of its sources.
+// The environment as it is, with so much of its sources. `d` need not be a unit vector, as for cube maps.
 vec3 sharp_radiance(vec3 d, float sources) {
     ++lookups;
     Corners c = environment_corners(d);
@@ -56,18 +65,21 @@ vec3 sharp_radiance(vec3 d, float sources) {
 vec3 blurred_radiance(vec3 d, float level, float sources) {
     float finest = finest_level(push.face_size);
     // Sharper than the pyramid: its finest level and the environment as it is, with the variance of the kernel.
-    float sharp = level < finest ? 1.0 - variance_of_level(level) / variance_of_level(finest) : 0.0;
+    float sharp = 0.0;
+    if (HAS_SHARP_KERNELS != 0 && level < finest) {
+        sharp = 1.0 - variance_of_level(level) / variance_of_level(finest);
+    }
     vec3 radiance = vec3(0.0);
     if (sharp < 1.0) {
         ++lookups;
         float pyramid_level = max(level - finest, 0.0);
         radiance = (1.0 - sharp) * textureLod(environment_pyramid, d, pyramid_level).rgb;
-        if (sources > 0.0) {
+        if (HAS_MIRRORED_SOURCES != 0 && sources > 0.0) {
             ++lookups;
             radiance += (1.0 - sharp) * sources * textureLod(source_pyramid, d, pyramid_level).rgb;
         }
     }
-    if (sharp > 0.0) {
+    if (HAS_SHARP_KERNELS != 0 && sharp > 0.0) {
         radiance += sharp * sharp_radiance(d, sources);
     }
     return radiance;

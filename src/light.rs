@@ -33,8 +33,10 @@ pub struct BlurredLight {
 pub struct KernelNeeds {
     /// The environment as it is, for kernels sharper than the pyramid.
     pub map: bool,
-    /// The small sources, for lobes in which they are mirrored.
+    /// That there are small sources at all: they are shaded by the BRDF.
     pub sources: bool,
+    /// The small sources alone, blurred, for lobes in which they are mirrored.
+    pub mirrored_sources: bool,
 }
 
 /// Level 0 of `pyramid` on the scale of kernels, whose level 0 has the finest width.
@@ -57,7 +59,17 @@ impl KernelNeeds {
         };
         Self {
             map: materials.iter().any(|(_, threads)| is_sharp(threads)),
-            sources: materials.iter().any(|(brdf, _)| mirrors(brdf)),
+            sources: !sources.is_empty(),
+            mirrored_sources: materials.iter().any(|(brdf, _)| mirrors(brdf)),
         }
+    }
+
+    /// The constants of glsl/methods/fitted.glsl that compile out what is not needed.
+    pub fn constants(self) -> [(&'static str, u32); 3] {
+        [
+            ("HAS_SHARP_KERNELS", self.map.into()),
+            ("HAS_SOURCES", self.sources.into()),
+            ("HAS_MIRRORED_SOURCES", self.mirrored_sources.into()),
+        ]
     }
 }

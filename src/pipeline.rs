@@ -101,9 +101,11 @@ impl DeviceScene {
         let evaluates_brdf = method.evaluates_brdf(environment);
         let materials = round.ask(&UploadMaterials { device, method, materials: &materials, evaluates_brdf })?;
         let light = light(round, Some(device), method, environment, &prepared.shaded())?;
-        let light = round.ask(&UploadLight { device, method, environment, light: &light })?;
         let subpixels = ("SUBPIXELS", view.subpixels);
-        let pipeline = compile(shader, &[subpixels, ("MODELS_USED", materials.models_used)])?;
+        let mut constants = vec![subpixels, ("MODELS_USED", materials.models_used)];
+        constants.extend(light.blurred.iter().flat_map(|blurred| blurred.needs.constants()));
+        let pipeline = compile(shader, &constants)?;
+        let light = round.ask(&UploadLight { device, method, environment, light: &light })?;
         let background = match prepared.show_environment {
             true => Some(Background {
                 pipeline: compile(&compiled::BACKGROUND, &[])?,
@@ -114,7 +116,10 @@ impl DeviceScene {
         Ok(Self {
             view: view.clone(),
             geometry_cache,
-            classify: Classify { pipeline: compile(&compiled::CLASSIFY, &[subpixels])? },
+            classify: Classify {
+                pipeline: compile(&compiled::CLASSIFY, &[subpixels])?,
+                smooth_variance: smooth_variance(method),
+            },
             shade: Shade { pipeline, materials, light, sampling },
             background,
             tone_map: ToneMap { pipeline: compile(&compiled::TONE_MAP, &[])? },

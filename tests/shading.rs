@@ -71,7 +71,7 @@ fn the_shader_agrees_with_its_cpu_twin() {
                 );
                 let here = texels.iter().filter(|texel| GeometryTexel::unpack(**texel).is_some()).count();
                 covered += here;
-                match shading::is_interior(&texels) {
+                match shading::is_interior(prepared.method, &texels) {
                     true => interior += 1,
                     false => edge += usize::from(here > 0),
                 }

@@ -8,8 +8,10 @@
 #include "threads/fitted.glsl"
 #include "vmf_pyramid.glsl"
 
-// A pixel within one smooth surface is one sum over all threads, seen from its middle: see shade.comp.
-const bool SHARES_SURFACE = true;
+// What no kernel and no light of the scene needs is compiled out.
+layout(constant_id = 2) const uint HAS_SOURCES = 1;       // 0: the environment has none
+
+#include "shared_sum.glsl"
 
 // How far a source is from where the BRDF cannot be taken at a few points of it, because it is mirrored towards the eye and wider than
 // the lobe; in half standard deviations of the source. Within a half vector of lobe_width f loses a quarter, as a Gaussian does
@@ -48,7 +50,8 @@ bool needs_subpixels(Surface surface, Material material) {
     vec3 w_o = view_direction(surface);
     // Normals mirrored turn twice as far; three standard deviations of that.
     return deviation > material.lobe_width
-        || share_of_brdf(lobe_width_from(material, w_o), mirrored(surface, w_o), 3.0 * 2.0 * deviation) < 1.0;
+        || HAS_SOURCES != 0
+        && share_of_brdf(lobe_width_from(material, w_o), mirrored(surface, w_o), 3.0 * 2.0 * deviation) < 1.0;
 }
 
 // Powers of all sources times what is to be integrated over them.
@@ -93,7 +96,7 @@ AtSources at_sources(Surface surface, Material material, float lobe_width, vec3 
     return sum;
 }
 
-vec3 estimate(Surface surface, Material material, uint first, uint stride) {
+vec3 estimate(Surface surface, Material material) {
     // Rows stand at multiples of 90 degrees / row_count; beyond the last one it holds.
     float row = min(surface.theta_o * (float(material.row_count) / radians(90.0)), float(material.row_count - 1));
     uint below = material.first_thread + uint(row) * words_a_row(material);
@@ -102,22 +105,23 @@ vec3 estimate(Surface surface, Material material, uint first, uint stride) {
     vec3 cosine_part = mix(unpack_cosine_part(below), unpack_cosine_part(above), t);
     vec3 sum = vec3(0.0);
     float of_kernels = 0.0;
-    if (source_count > 0) {
+    if (HAS_SOURCES != 0) {
         vec3 w_o = view_direction(surface);
         vec3 mirror = mirrored(surface, w_o);
         float lobe_width = lobe_width_from(material, w_o);
-        of_kernels = 1.0 - share_of_brdf(lobe_width, mirror, 0.0);
+        of_kernels = HAS_MIRRORED_SOURCES != 0 ? 1.0 - share_of_brdf(lobe_width, mirror, 0.0) : 0.0;
         AtSources at = at_sources(surface, material, lobe_width, w_o, mirror);
         // The irradiance map has no sources.
         sum = mix(at.f_cos, at.cosine * cosine_part / radians(180.0), of_kernels);
     }
-    for (uint k = first; k < material.thread_count; k += stride) {
+    uint k = 0;
+    do {
         Kernel a = unpack_kernel(below, k);
         Kernel b = unpack_kernel(above, k);
-        vec3 direction = surface.frame * normalize(mix(a.direction, b.direction, t));
+        vec3 direction = surface.frame * mix(a.direction, b.direction, t);
         float level = level_within_pixel(mix(a.level, b.level, t), surface.normal_variance);
         sum += mix(a.weight, b.weight, t) * blurred_radiance(direction, level, of_kernels);
-    }
+    } while (++k < material.thread_count);
     ++lookups;
     sum += cosine_part * textureLod(irradiance_map, surface.frame[2], 0.0).rgb;
     return max(sum, vec3(0.0));

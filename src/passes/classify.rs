@@ -2,6 +2,7 @@
 use super::View;
 use crate::graph::{BufferDesc, BufferHandle, FrameGraph, ImageDesc, ImageHandle};
 use crate::memo::Keyed;
+use crate::method::Method;
 use crate::vulkan::ComputePipeline;
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
@@ -10,6 +11,10 @@ use bytemuck::{Pod, Zeroable};
 /// parts of a mesh count as edges and cost as much as all sub-pixels shaded alone; wider, and the parts of the sum
 /// belong to visibly different normals.
 pub const SMOOTH_DEG: f32 = 10.0;
+
+/// Variance of the normal along each of two axes, in rad^2, from which sub-pixels do not share one sum at their mean normal: normals
+/// 0.6 degrees from their mean, as at the rim of a sphere, where the view angle changes by more than a row of threads.
+pub const SHARED_VARIANCE: f32 = 1e-4;
 
 /// The tiles of one class: arguments of an indirect dispatch and a count. `TileClass` in glsl/tiles.glsl.
 #[repr(C)]
@@ -47,6 +52,8 @@ impl Counters {
 pub struct Classify {
     /// The shader, for a number of sub-pixels.
     pub pipeline: Keyed<ComputePipeline>,
+    /// From which variance of their normals on sub-pixels are no smooth surface to the method: see [`smooth_variance`].
+    pub smooth_variance: f32,
 }
 
 #[repr(C)]
@@ -54,6 +61,13 @@ pub struct Classify {
 struct Push {
     size_px: [u32; 2],
     cos_smooth: f32,
+    smooth_variance: f32,
+}
+
+/// From which variance of their normals on sub-pixels are no smooth surface to `method`: [`SHARED_VARIANCE`] if its sub-pixels share a
+/// sum; otherwise none that [`SMOOTH_DEG`] allows.
+pub fn smooth_variance(method: Method) -> f32 {
+    if method.shares_surface() { SHARED_VARIANCE } else { 1.0 }
 }
 
 /// What is to be shaded, and the image to shade into, already black where nothing is.
@@ -89,7 +103,11 @@ pub fn classify<'a>(graph: &mut FrameGraph<'a>, classify: &'a Classify, geometry
         .write("tile_list", &mut tiles)
         .write("pixel_list", &mut pixels)
         .write("radiance", &mut radiance)
-        .push(&Push { size_px: [width, height], cos_smooth: SMOOTH_DEG.to_radians().cos() })
+        .push(&Push {
+            size_px: [width, height],
+            cos_smooth: SMOOTH_DEG.to_radians().cos(),
+            smooth_variance: classify.smooth_variance,
+        })
         .cover([width, height, 1]);
     Tiles { counters, tiles, pixels, radiance }
 }

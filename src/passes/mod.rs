@@ -19,7 +19,7 @@ mod vmf_pyramid;
 
 pub use background::{Background, BackgroundMap, background};
 pub use bare_lookups::{BareLookups, bare_lookups};
-pub use classify::{Classify, Counters, SMOOTH_DEG, Tiles, classify};
+pub use classify::{Classify, Counters, SMOOTH_DEG, Tiles, classify, smooth_variance};
 pub use geometry_cache::{DeviceMesh, GeometryCache, PlacedMesh, geometry_cache, geometry_pipeline};
 pub use light::DeviceLight;
 #[cfg(feature = "viewer")]

@@ -16,10 +16,15 @@ fn finest_level(face_size: usize) -> f32 {
     (1024.0 / face_size as f32).log2()
 }
 
+/// Twin of `power_of_4` in glsl/vmf_pyramid.glsl.
+fn power_of_4(n: i32) -> f32 {
+    f32::from_bits(((127 + 2 * n) as u32) << 23)
+}
+
 /// Twin of `variance_of_level` in glsl/vmf_pyramid.glsl.
 fn variance_of_level(level: f32) -> f32 {
     let whole = level.floor();
-    if level < 0.0 { level + 1.0 } else { (2.0 * whole).exp2() * (1.0 + 3.0 * (level - whole)) }
+    if level < 0.0 { level + 1.0 } else { power_of_4(whole as i32) * (1.0 + 3.0 * (level - whole)) }
 }
 
 /// Twin of `level_of_variance` in glsl/vmf_pyramid.glsl.
@@ -27,8 +32,8 @@ fn level_of_variance(variance: f32) -> f32 {
     if variance < 1.0 {
         return variance - 1.0;
     }
-    let whole = (0.5 * variance.log2()).floor();
-    whole + (variance * (-2.0 * whole).exp2() - 1.0) / 3.0
+    let whole = (((variance.to_bits() >> 23) as i32) - 127) >> 1;
+    whole as f32 + (variance * power_of_4(-whole) - 1.0) / 3.0
 }
 
 /// Twin of `level_within_pixel` in glsl/vmf_pyramid.glsl.
@@ -175,9 +180,9 @@ pub(super) fn estimate(point: &Point) -> Vec3 {
         let (f_cos, cosine) = at_sources(point, sources, lobe_width, w_o, mirror);
         sum = f_cos.lerp(cosine * cosine_part / PI, of_kernels);
     }
-    for k in (point.first as usize..threads.count).step_by(point.stride) {
+    for k in 0..threads.count {
         let [a, b] = [below, above].map(|row| threads.row(row)[k].unpack());
-        let direction = surface.frame * a.direction.lerp(b.direction, t).normalize();
+        let direction = surface.frame * a.direction.lerp(b.direction, t);
         let level = level_within_pixel(a.level + t * (b.level - a.level), surface.normal_variance);
         sum += a.weight.lerp(b.weight, t) * blurred_radiance(point.twin, direction, level, of_kernels);
     }

@@ -9,7 +9,7 @@ use crate::geometry_texel::GeometryTexel;
 use crate::light::Light;
 use crate::memo::Round;
 use crate::method::{Lookups, Method};
-use crate::passes::SMOOTH_DEG;
+use crate::passes::{SMOOTH_DEG, View, smooth_variance};
 use crate::prepare::{Prepared, PreparedMaterial};
 use crate::steps::light;
 use crate::threads::SliceTable;
@@ -80,23 +80,26 @@ fn any_tangent(n: Vec3) -> Vec3 {
     Vec3::new(1.0 + s * n.x * n.x * a, s * n.x * n.y * a, -s * n.x)
 }
 
-/// Whether the sub-pixels of a pixel lie on one smooth surface. Twin of glsl/classify.comp.
-pub fn is_interior(texels: &[UVec2]) -> bool {
+/// Whether the sub-pixels of a pixel lie on one surface that is smooth to `method`. Twin of glsl/classify.comp.
+pub fn is_interior(method: Method, texels: &[UVec2]) -> bool {
     let Some(first) = texels.first().copied().and_then(GeometryTexel::unpack) else { return false };
-    texels.iter().all(|texel| {
+    let is_near = |texel: &UVec2| {
         GeometryTexel::unpack(*texel).is_some_and(|GeometryTexel { normal, material }| {
             material == first.material && normal.dot(first.normal) >= SMOOTH_DEG.to_radians().cos()
         })
-    })
+    };
+    texels.iter().all(is_near) && normal_variance(texels) < smooth_variance(method)
 }
 
-/// The sum of the normals of these sub-pixels. Twin of `normal_sum` in glsl/shade.comp.
+/// The sum of the normals of these sub-pixels.
 fn normal_sum(texels: &[UVec2]) -> Vec3 {
     texels.iter().filter_map(|texel| GeometryTexel::unpack(*texel)).map(|texel| texel.normal).sum()
 }
 
-/// Variance of the normal above which a pixel is a sum for each sub-pixel; why, says the shader.
-const SHARED_VARIANCE: f32 = 1e-4;
+/// Their variance along each of two axes, in rad^2: 1 less the length of the mean normal.
+fn normal_variance(texels: &[UVec2]) -> f32 {
+    (1.0 - normal_sum(texels).length() / texels.len() as f32).max(0.0)
+}
 
 /// The CPU twin of pass 2 for one scene.
 pub struct CpuShader<'a> {
@@ -141,48 +144,68 @@ impl<'a> CpuShader<'a> {
     }
 
     /// Linear radiance times coverage, and coverage, of the pixel that sees `texels`: its sub-pixels, row by row.
-    /// Twin of `main` in glsl/shade.comp.
+    /// Twin of glsl/shade.comp.
     pub fn shade(&self, pixel: UVec2, texels: &[UVec2]) -> Vec4 {
-        let view = &self.prepared.view;
-        let rays = view.camera_rays();
-        let size = UVec2::new(view.width, view.height) * view.subpixels;
-        let [cos, sin] = view.rotation();
-        let to_environment = |d: Vec3| Vec3::new(cos * d.x - sin * d.z, d.y, sin * d.x + cos * d.z);
-        let interior = is_interior(texels);
-        let normals = normal_sum(texels);
-        let normal_variance = if interior { (1.0 - normals.length() / texels.len() as f32).max(0.0) } else { 0.0 };
-        let may_share = self.prepared.method.shares_surface();
-        let surface_at = |position: Vec2, normal: Vec3, normal_variance: f32| {
-            let w_o = -rays.ray(position).normalize();
-            Surface { normal_variance, ..Surface::new(to_environment(normal), to_environment(w_o)) }
+        let interior = is_interior(self.prepared.method, texels);
+        let shaded = match self.prepared.method.shares_surface() {
+            true => self.shade_shared(pixel, texels, interior),
+            false => self.shade_partition(pixel, texels, interior),
         };
-        let axis = to_environment(rays.right());
-        let first_texel = texels.first().copied().and_then(GeometryTexel::unpack);
-        let middle = (interior && may_share && normal_variance < SHARED_VARIANCE).then_some(first_texel).flatten();
-        let middle = middle.map(|GeometryTexel { material, .. }| {
-            let position = (pixel.as_vec2() + 0.5) / UVec2::new(view.width, view.height).as_vec2();
-            let surface = surface_at(position, normals.normalize(), normal_variance);
-            Point { twin: self, surface, axis, material, subpixel: pixel * view.subpixels, first: 0, stride: 1 }
-        });
-        if let Some(middle) = middle.filter(|middle| !fitted::needs_subpixels(middle)) {
-            return (middle.estimate() * self.prepared.view.intensity as f32).extend(1.0);
-        }
-        let partitioned = interior && !may_share;
-        let normal_variance = if partitioned { normal_variance } else { 0.0 };
-        let mut sum = Vec3::ZERO;
-        let mut covered = 0;
+        (shaded.truncate() * self.prepared.view.intensity as f32).extend(shaded.w)
+    }
+
+    /// Twin of `shade_pixel` in glsl/partition.glsl.
+    fn shade_partition(&self, pixel: UVec2, texels: &[UVec2], interior: bool) -> Vec4 {
+        let normal_variance = if interior { normal_variance(texels) } else { 0.0 };
+        let stride = if interior { texels.len() } else { 1 };
+        let mut sum = Vec4::ZERO;
         for (j, texel) in texels.iter().enumerate() {
-            let Some(GeometryTexel { normal, material }) = GeometryTexel::unpack(*texel) else { continue };
-            covered += 1;
-            let subpixel = pixel * view.subpixels + UVec2::new(j as u32 % view.subpixels, j as u32 / view.subpixels);
-            let surface = surface_at((subpixel.as_vec2() + 0.5) / size.as_vec2(), normal, normal_variance);
-            let (first, stride) = if partitioned { (j as u32, texels.len()) } else { (0, 1) };
-            sum += Point { twin: self, surface, axis, material, subpixel, first, stride }.estimate();
+            let Some(mut point) = self.subpixel(pixel, j, *texel) else { continue };
+            point.surface.normal_variance = normal_variance;
+            (point.first, point.stride) = if interior { (j as u32, stride) } else { (0, 1) };
+            sum += point.estimate().extend(1.0);
         }
-        if !partitioned {
-            sum /= texels.len() as f32;
+        let count = texels.len() as f32;
+        if interior { sum.truncate().extend(sum.w / count) } else { sum / count }
+    }
+
+    /// Twin of `shade_pixel` in glsl/shared_sum.glsl.
+    fn shade_shared(&self, pixel: UVec2, texels: &[UVec2], interior: bool) -> Vec4 {
+        let mean = texels.first().filter(|_| interior).and_then(|texel| self.subpixel(pixel, 0, *texel));
+        if let Some(mut point) = mean {
+            let View { width, height, .. } = self.prepared.view;
+            let position = (pixel.as_vec2() + 0.5) / UVec2::new(width, height).as_vec2();
+            point.surface = self.surface_at(position, normal_sum(texels).normalize());
+            point.surface.normal_variance = normal_variance(texels);
+            if !fitted::needs_subpixels(&point) {
+                return point.estimate().extend(1.0);
+            }
         }
-        (sum * self.prepared.view.intensity as f32).extend(covered as f32 / texels.len() as f32)
+        let points = texels.iter().enumerate().filter_map(|(j, texel)| self.subpixel(pixel, j, *texel));
+        points.map(|point| point.estimate().extend(1.0)).sum::<Vec4>() / texels.len() as f32
+    }
+
+    /// The surface that is seen at a place in the picture, from 0 to 1. Twin of `surface_at` in glsl/shade.comp.
+    fn surface_at(&self, position: Vec2, normal: Vec3) -> Surface {
+        let w_o = -self.prepared.view.camera_rays().ray(position).normalize();
+        Surface::new(self.to_environment(normal), self.to_environment(w_o))
+    }
+
+    /// Twin of `to_environment`.
+    fn to_environment(&self, d: Vec3) -> Vec3 {
+        let [cos, sin] = self.prepared.view.rotation();
+        Vec3::new(cos * d.x - sin * d.z, d.y, sin * d.x + cos * d.z)
+    }
+
+    /// Sub-pixel `j` of `pixel`, which sees `texel`, by all threads or samples; none if it sees no surface.
+    fn subpixel(&self, pixel: UVec2, j: usize, texel: UVec2) -> Option<Point<'_>> {
+        let GeometryTexel { normal, material } = GeometryTexel::unpack(texel)?;
+        let view = &self.prepared.view;
+        let subpixel = pixel * view.subpixels + UVec2::new(j as u32 % view.subpixels, j as u32 / view.subpixels);
+        let size = UVec2::new(view.width, view.height) * view.subpixels;
+        let surface = self.surface_at((subpixel.as_vec2() + 0.5) / size.as_vec2(), normal);
+        let axis = self.to_environment(view.camera_rays().right());
+        Some(Point { twin: self, surface, axis, material, subpixel, first: 0, stride: 1 })
     }
 }
 

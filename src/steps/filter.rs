@@ -158,7 +158,7 @@ pub fn blurred_light(
     let irradiance = round.ask(&Irradiance(&rest))?;
     let rest = round.ask(&Blur { environment: &rest, device })?;
     let needs = KernelNeeds::of(environment, materials, &rest);
-    let sources = match has_sources && needs.sources {
+    let sources = match needs.mirrored_sources {
         true => Some(round.ask(&Blur { environment: &part(true)?, device })?),
         false => None,
     };

@@ -89,7 +89,7 @@ impl Step for UploadLight<'_> {
             key = key.number(u64::from(part));
         }
         if let Some(blurred) = &self.light.blurred {
-            key = key.number(u64::from(blurred.needs.map)).number(u64::from(blurred.needs.sources));
+            key = key.number(u64::from(blurred.needs.map)).number(u64::from(blurred.needs.mirrored_sources));
         }
         Ok(key.build())
     }

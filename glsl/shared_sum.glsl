@@ -1,0 +1,45 @@
+// For methods by which the sub-pixels of a pixel that lies on one smooth surface share one sum, at their mean normal. Of another pixel,
+// each covered sub-pixel is a sum of its own. Twin: shade_shared in src/shading/mod.rs.
+
+// The sum over all threads of weight times environment.
+vec3 estimate(Surface surface, Material material);
+
+// Whether one sum does not do for a pixel within one smooth surface, whose mean is this.
+bool needs_subpixels(Surface surface, Material material);
+
+// The mean of the surfaces that a pixel's sub-pixels see, all of them covered.
+Surface mean_surface(uvec2 pixel) {
+    vec3 normals = vec3(0.0);
+    for (uint j = 0; j < SUBPIXELS * SUBPIXELS; ++j) {
+        uvec2 place = pixel * SUBPIXELS + uvec2(j % SUBPIXELS, j / SUBPIXELS);
+        normals += geometry_normal(texelFetch(geometry, ivec2(place), 0).xy);
+    }
+    Surface mean = surface_at((vec2(pixel) + 0.5) / vec2(push.size_px), normalize(normals));
+    // With R the length of the mean normal, 1 - R is the variance along each of two axes.
+    mean.normal_variance = max(1.0 - length(normals) / float(SUBPIXELS * SUBPIXELS), 0.0);
+    return mean;
+}
+
+vec4 shade_pixel(uvec2 pixel, bool interior) {
+    uint parts = SUBPIXELS * SUBPIXELS;
+    Surface surface;
+    if (interior) {
+        surface = mean_surface(pixel);
+        uvec2 texel = texelFetch(geometry, ivec2(pixel * SUBPIXELS), 0).xy;
+        parts = needs_subpixels(surface, materials[geometry_material(texel)]) ? parts : 1;
+    }
+    bool shares = interior && parts == 1;
+    vec4 sum = vec4(0.0);
+    uint j = 0;
+    do {
+        uvec2 place = pixel * SUBPIXELS + uvec2(j % SUBPIXELS, j / SUBPIXELS);
+        uvec2 texel = texelFetch(geometry, ivec2(place), 0).xy;
+        if (is_covered(texel)) {
+            if (!shares) {
+                surface = surface_at((vec2(place) + 0.5) / vec2(push.size_px * SUBPIXELS), geometry_normal(texel));
+            }
+            sum += vec4(estimate(surface, materials[geometry_material(texel)]), 1.0);
+        }
+    } while (++j < parts);
+    return sum / float(parts);
+}
