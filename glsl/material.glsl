@@ -9,6 +9,7 @@ struct Material {
     uint row_count;
     uint first_slice;  // where its CDFs start in the buffer of slices
     float lobe_width;  // half_vector_width in src/brdf/lobe.rs, in radians
+    uint sharp_count;  // how many of its threads, the first ones, are sharper than the environment's pyramid in some row
 };
 
 layout(set = 0, binding = 5, std430) readonly buffer Materials {

@@ -2,9 +2,6 @@
 // Twin: src/environment/vmf_pyramid.rs; of what looks it up, src/shading/fitted.rs.
 #include "environment_map.glsl"
 
-layout(constant_id = 3) const uint HAS_SHARP_KERNELS = 1;    // 0: no kernel is sharper than the pyramid
-layout(constant_id = 4) const uint HAS_MIRRORED_SOURCES = 1; // 0: no kernel looks up sources
-
 layout(set = 0, binding = 4) uniform samplerCube environment_pyramid;
 layout(set = 0, binding = 13) uniform samplerCube irradiance_map;
 layout(set = 0, binding = 15) uniform samplerCube source_pyramid;
@@ -61,26 +58,20 @@ vec3 sharp_radiance(vec3 d, float sources) {
     return sum;
 }
 
-// The environment blurred by the kernel of `level`, with so much of its sources.
-vec3 blurred_radiance(vec3 d, float level, float sources) {
+// How much of a kernel of `level` is the environment as it is: of one sharper than the pyramid, that blends with the finest level to the
+// variance of the kernel.
+float sharp_part(float level) {
     float finest = finest_level(push.face_size);
-    // Sharper than the pyramid: its finest level and the environment as it is, with the variance of the kernel.
-    float sharp = 0.0;
-    if (HAS_SHARP_KERNELS != 0 && level < finest) {
-        sharp = 1.0 - variance_of_level(level) / variance_of_level(finest);
-    }
-    vec3 radiance = vec3(0.0);
-    if (sharp < 1.0) {
-        ++lookups;
-        float pyramid_level = max(level - finest, 0.0);
-        radiance = (1.0 - sharp) * textureLod(environment_pyramid, d, pyramid_level).rgb;
-        if (HAS_MIRRORED_SOURCES != 0 && sources > 0.0) {
-            ++lookups;
-            radiance += (1.0 - sharp) * sources * textureLod(source_pyramid, d, pyramid_level).rgb;
-        }
-    }
-    if (HAS_SHARP_KERNELS != 0 && sharp > 0.0) {
-        radiance += sharp * sharp_radiance(d, sources);
-    }
-    return radiance;
+    return level < finest ? 1.0 - variance_of_level(level) / variance_of_level(finest) : 0.0;
+}
+
+// The environment without its sources, and these alone, blurred by the kernel of `level` or the finest that there is.
+vec3 blurred_radiance(vec3 d, float level) {
+    ++lookups;
+    return textureLod(environment_pyramid, d, max(level - finest_level(push.face_size), 0.0)).rgb;
+}
+
+vec3 blurred_sources(vec3 d, float level) {
+    ++lookups;
+    return textureLod(source_pyramid, d, max(level - finest_level(push.face_size), 0.0)).rgb;
 }

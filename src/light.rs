@@ -54,7 +54,7 @@ impl KernelNeeds {
             sources.iter().any(|source| clearance(0.0, source.width_rad() as f32, lobe_width) < CLEAR[1])
         };
         let is_sharp = |threads: &Option<&Threads>| match threads {
-            Some(Threads::Fitted(table)) => table.sharpest_level() < finest_level,
+            Some(Threads::Fitted(table)) => table.sharp_count(finest_level) > 0,
             _ => false,
         };
         Self {

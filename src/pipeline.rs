@@ -1,4 +1,5 @@
 //! The method on one screen: the frame as a graph of passes, and the renderer that runs it.
+use crate::light::finest_level;
 use crate::graph::{BufferHandle, Executable, FrameGraph, ImageHandle};
 use crate::memo::{Held, Keyed, Round};
 use crate::output::ExrHeader;
@@ -99,8 +100,10 @@ impl DeviceScene {
         let geometry_cache = ask_geometry_cache(device, prepared, round)?;
         let materials: Vec<_> = prepared.materials.iter().map(|m| (&m.brdf, m.threads.as_ref())).collect();
         let evaluates_brdf = method.evaluates_brdf(environment);
-        let materials = round.ask(&UploadMaterials { device, method, materials: &materials, evaluates_brdf })?;
         let light = light(round, Some(device), method, environment, &prepared.shaded())?;
+        let finest_level = light.blurred.as_ref().map(|blurred| finest_level(&blurred.rest));
+        let upload = UploadMaterials { device, method, materials: &materials, evaluates_brdf, finest_level };
+        let materials = round.ask(&upload)?;
         let subpixels = ("SUBPIXELS", view.subpixels);
         let mut constants = vec![subpixels, ("MODELS_USED", materials.models_used)];
         constants.extend(light.blurred.iter().flat_map(|blurred| blurred.needs.constants()));

@@ -9,7 +9,9 @@
 #include "vmf_pyramid.glsl"
 
 // What no kernel and no light of the scene needs is compiled out.
-layout(constant_id = 2) const uint HAS_SOURCES = 1;       // 0: the environment has none
+layout(constant_id = 2) const uint HAS_SOURCES = 1;          // 0: the environment has none
+layout(constant_id = 3) const uint HAS_MIRRORED_SOURCES = 1; // 0: no lobe mirrors them
+layout(constant_id = 4) const uint HAS_SHARP_KERNELS = 1;    // 0: no kernel is sharper than the pyramid
 
 #include "shared_sum.glsl"
 
@@ -21,14 +23,15 @@ float clearance(Source source, float lobe_width, vec3 mirror) {
 }
 
 // How much of the answer to sources is the BRDF's: the rest is the kernels', which fit best where the mirrored view is. Sources count
-// as no narrower than `least_width`.
+// as no narrower than `least_width`. There is at least one.
 float share_of_brdf(float lobe_width, vec3 mirror, float least_width) {
     float share = 1.0;
-    for (uint s = 0; s < source_count; ++s) {
+    uint s = 0;
+    do {
         Source source = sources[s];
         source.direction.w = max(source.direction.w, least_width);
         share = min(share, smoothstep(1.25, 2.5, clearance(source, lobe_width, mirror)));
-    }
+    } while (++s < source_count);
     return share;
 }
 
@@ -74,12 +77,14 @@ vec2 risen(float z, float deviation) {
 
 AtSources at_sources(Surface surface, Material material, float lobe_width, vec3 w_o, vec3 mirror) {
     AtSources sum = AtSources(vec3(0.0), vec3(0.0));
-    for (uint s = 0; s < source_count; ++s) {
+    uint s = 0;
+    do {
         Source source = sources[s];
         // Gauss and Legendre's points on a square of the source's variance; from afar, where a lobe is four times wider, its middle.
         int side = clearance(source, lobe_width, mirror) > 8.0 ? 1 : 3;
         float deviation = length(vec2(dot(source.axis[0].xyz, surface.frame[2]), dot(source.axis[1].xyz, surface.frame[2])));
-        for (int i = 0; i < side * side; ++i) {
+        int i = 0;
+        do {
             ivec2 place = ivec2(i % side, i / side) - side / 2;
             vec2 at = sqrt(3.0 * 0.6) * vec2(place);
             vec2 weights = side == 1 ? vec2(1.0) : mix(vec2(4.0 / 9.0), vec2(2.5 / 9.0), notEqual(place, ivec2(0)));
@@ -91,38 +96,83 @@ AtSources at_sources(Surface surface, Material material, float lobe_width, vec3 
                 sum.f_cos += power * brdf(material, w_i, w_o);
                 sum.cosine += power;
             }
-        }
-    }
+        } while (++i < side * side);
+    } while (++s < source_count);
     return sum;
 }
 
-vec3 estimate(Surface surface, Material material) {
-    // Rows stand at multiples of 90 degrees / row_count; beyond the last one it holds.
-    float row = min(surface.theta_o * (float(material.row_count) / radians(90.0)), float(material.row_count - 1));
+// Between which rows a view angle is: where these start, and how far it is from the first to the second.
+struct Rows {
+    uint below;
+    uint above;
+    float t;
+};
+
+// Rows stand at multiples of 90 degrees / row_count; beyond the last one it holds.
+Rows rows_at(float theta_o, Material material) {
+    float row = min(theta_o * (float(material.row_count) / radians(90.0)), float(material.row_count - 1));
     uint below = material.first_thread + uint(row) * words_a_row(material);
     uint above = below + (uint(row) + 1 < material.row_count ? words_a_row(material) : 0);
-    float t = fract(row);
-    vec3 cosine_part = mix(unpack_cosine_part(below), unpack_cosine_part(above), t);
-    vec3 sum = vec3(0.0);
+    return Rows(below, above, fract(row));
+}
+
+// Thread k, in the environment's coordinates; its direction is no unit vector.
+Kernel kernel_at(Rows rows, uint k, Surface surface) {
+    Kernel a = unpack_kernel(rows.below, k);
+    Kernel b = unpack_kernel(rows.above, k);
+    vec3 direction = surface.frame * mix(a.direction, b.direction, rows.t);
+    float level = level_within_pixel(mix(a.level, b.level, rows.t), surface.normal_variance);
+    return Kernel(direction, level, mix(a.weight, b.weight, rows.t));
+}
+
+// Three loops, not one with three branches: where a driver masks lanes out, each pays for what none of its lanes does. For the same reason
+// tests are at the ends of loops.
+vec3 estimate(Surface surface, Material material) {
+    Rows rows = rows_at(surface.theta_o, material);
+    vec3 cosine_part = mix(unpack_cosine_part(rows.below), unpack_cosine_part(rows.above), rows.t);
+    ++lookups;
+    vec3 sum = cosine_part * textureLod(irradiance_map, surface.frame[2], 0.0).rgb;
+    uint k = material.sharp_count;
+    if (k < material.thread_count) {
+        do {
+            Kernel kernel = kernel_at(rows, k, surface);
+            sum += kernel.weight * blurred_radiance(kernel.direction, kernel.level);
+        } while (++k < material.thread_count);
+    }
     float of_kernels = 0.0;
     if (HAS_SOURCES != 0) {
         vec3 w_o = view_direction(surface);
         vec3 mirror = mirrored(surface, w_o);
         float lobe_width = lobe_width_from(material, w_o);
-        of_kernels = HAS_MIRRORED_SOURCES != 0 ? 1.0 - share_of_brdf(lobe_width, mirror, 0.0) : 0.0;
         AtSources at = at_sources(surface, material, lobe_width, w_o, mirror);
+        if (HAS_MIRRORED_SOURCES != 0) {
+            of_kernels = 1.0 - share_of_brdf(lobe_width, mirror, 0.0);
+        }
         // The irradiance map has no sources.
-        sum = mix(at.f_cos, at.cosine * cosine_part / radians(180.0), of_kernels);
+        sum += mix(at.f_cos, at.cosine * cosine_part / radians(180.0), of_kernels);
     }
-    uint k = 0;
-    do {
-        Kernel a = unpack_kernel(below, k);
-        Kernel b = unpack_kernel(above, k);
-        vec3 direction = surface.frame * mix(a.direction, b.direction, t);
-        float level = level_within_pixel(mix(a.level, b.level, t), surface.normal_variance);
-        sum += mix(a.weight, b.weight, t) * blurred_radiance(direction, level, of_kernels);
-    } while (++k < material.thread_count);
-    ++lookups;
-    sum += cosine_part * textureLod(irradiance_map, surface.frame[2], 0.0).rgb;
+    k = 0;
+    if (HAS_SHARP_KERNELS != 0 && k < material.sharp_count) {
+        do {
+            Kernel kernel = kernel_at(rows, k, surface);
+            float sharp = sharp_part(kernel.level);
+            if (sharp > 0.0) {
+                sum += kernel.weight * sharp * sharp_radiance(kernel.direction, of_kernels);
+            }
+            if (sharp < 1.0) {
+                sum += kernel.weight * (1.0 - sharp) * blurred_radiance(kernel.direction, kernel.level);
+            }
+        } while (++k < material.sharp_count);
+    }
+    k = 0;
+    if (HAS_MIRRORED_SOURCES != 0 && of_kernels > 0.0) {
+        do {
+            Kernel kernel = kernel_at(rows, k, surface);
+            float blurred = HAS_SHARP_KERNELS != 0 ? 1.0 - sharp_part(kernel.level) : 1.0;
+            if (blurred > 0.0) {
+                sum += kernel.weight * blurred * of_kernels * blurred_sources(kernel.direction, kernel.level);
+            }
+        } while (++k < material.thread_count);
+    }
     return max(sum, vec3(0.0));
 }

@@ -19,8 +19,10 @@ pub struct MaterialRecord {
     pub first_slice: u32,
     /// [`half_vector_width`].
     pub lobe_width: f32,
+    /// How many of its threads, the first ones, are sharper than the environment's pyramid in some row.
+    pub sharp_count: u32,
     /// The size of a structure in the buffer is a multiple of 16 bytes.
-    pub padding: [u32; 2],
+    pub padding: u32,
 }
 
 impl MaterialRecord {
@@ -34,7 +36,8 @@ impl MaterialRecord {
             row_count: 0,
             first_slice: 0,
             lobe_width: half_vector_width(brdf) as f32,
-            padding: [0; 2],
+            sharp_count: 0,
+            padding: 0,
         }
     }
 

@@ -24,7 +24,7 @@ pub struct DeviceMaterials {
 
 impl DeviceMaterials {
     /// Uploads what `method` looks up of `materials`, in the order of the indices that objects have; their BRDFs only if it
-    /// `evaluates_brdf`.
+    /// `evaluates_brdf`. `finest_level` is level 0 of the blurred environment on the scale of kernels, if that is looked up.
     ///
     /// # Errors
     /// No device memory left, or more measured tables than a 3D image of the device holds.
@@ -36,6 +36,7 @@ impl DeviceMaterials {
         method: Method,
         materials: impl IntoIterator<Item = (&'m Brdf, Option<&'m Threads>)>,
         evaluates_brdf: bool,
+        finest_level: Option<f32>,
     ) -> Result<Self> {
         let use_slices = method.lookups().slices;
         let mut records = Vec::new();
@@ -58,6 +59,9 @@ impl DeviceMaterials {
                 [record.row_count, record.thread_count] = table.size().map(|size| size as u32);
                 record.first_thread = (threads.len() / table.device_element_words()) as u32;
                 threads.extend(table.device_words());
+                if let (Threads::Fitted(table), Some(finest_level)) = (table, finest_level) {
+                    record.sharp_count = table.sharp_count(finest_level) as u32;
+                }
             }
             record.first_slice = slices.len() as u32;
             records.push(record);

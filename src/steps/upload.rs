@@ -48,6 +48,8 @@ pub struct UploadMaterials<'a> {
     pub materials: &'a [Shaded<'a>],
     /// Whether BRDFs are evaluated.
     pub evaluates_brdf: bool,
+    /// Level 0 of the blurred environment on the scale of kernels, if that is looked up.
+    pub finest_level: Option<f32>,
 }
 
 impl Step for UploadMaterials<'_> {
@@ -56,13 +58,14 @@ impl Step for UploadMaterials<'_> {
 
     fn key(&self, _: &Memo) -> Result<Key> {
         let key = on(self.device, self.method.name()).number(u64::from(self.evaluates_brdf));
+        let key = key.number(self.finest_level.map_or(u32::MAX, f32::to_bits));
         let of = |(brdf, threads): &Shaded| [Some(brdf.key), threads.map(|threads| threads.key)];
         Ok(key.keys(self.materials.iter().flat_map(of).flatten()).build())
     }
 
     fn make(&self, _: &Round) -> Result<DeviceMaterials> {
         let materials = self.materials.iter().map(|(brdf, threads)| (&***brdf, threads.map(|threads| &**threads)));
-        DeviceMaterials::new(self.device, self.method, materials, self.evaluates_brdf)
+        DeviceMaterials::new(self.device, self.method, materials, self.evaluates_brdf, self.finest_level)
     }
 }
 

@@ -85,18 +85,28 @@ impl FittedTable {
         if weights > 0.0 { (squares / weights).sqrt() } else { self.relative_error.first().copied().unwrap_or(0.0) }
     }
 
-    /// The level of the sharpest kernel.
-    pub fn sharpest_level(&self) -> f32 {
-        self.kernels.iter().map(|kernel| kernel.unpack().level).fold(f32::INFINITY, f32::min)
+    /// The sharpest level that each thread has in any row.
+    fn sharpest_levels(&self) -> Vec<f32> {
+        let levels = |thread| self.kernels.iter().skip(thread).step_by(self.count).map(|kernel| kernel.unpack().level);
+        (0..self.count).map(|thread| levels(thread).fold(f32::INFINITY, f32::min)).collect()
+    }
+
+    /// How many threads are sharper than `level` in some row: the first ones on the device.
+    pub fn sharp_count(&self, level: f32) -> usize {
+        self.sharpest_levels().into_iter().filter(|&sharpest| sharpest < level).count()
     }
 
     /// Words of an element of the shader's buffer: its array is of words.
     pub(in super::super) const DEVICE_ELEMENT_WORDS: usize = 1;
 
-    /// The buffer of the shader. Row by row: the cosine part, then the kernels.
+    /// The buffer of the shader. Row by row: the cosine part, then the kernels, those of threads that are sharp anywhere first.
     pub fn device_words(&self) -> Vec<u32> {
+        let levels = self.sharpest_levels();
+        let mut order: Vec<usize> = (0..self.count).collect();
+        order.sort_by(|&a, &b| levels[a].total_cmp(&levels[b]));
+        let order = &order;
         let row = |(row, cosine_part): (usize, &[f32; 3])| {
-            let kernels = self.row(row).iter().map(|kernel| kernel.0);
+            let kernels = order.iter().map(move |&thread| self.row(row)[thread].0);
             std::iter::once(cosine_part.map(f32::to_bits)).chain(kernels)
         };
         self.cosine_part.iter().enumerate().flat_map(row).flatten().collect()
