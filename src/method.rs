@@ -21,7 +21,7 @@ struct Properties {
     threads: Option<ThreadKind>,
     /// What its shader looks up.
     lookups: Lookups,
-    /// `SHARES_SURFACE` in its shader.
+    /// Whether its shader includes shared_sum.glsl.
     shares_surface: bool,
     is_unbiased: bool,
 }
@@ -157,7 +157,7 @@ impl Method {
     }
 
     /// Whether a pixel within one smooth surface is one sum at its mean normal, not a partition among its sub-pixels:
-    /// SHARES_SURFACE in the shader.
+    /// its shader includes glsl/shared_sum.glsl.
     pub fn shares_surface(self) -> bool {
         self.properties().shares_surface
     }

@@ -1,6 +1,6 @@
 //! The method on one screen: the frame as a graph of passes, and the renderer that runs it.
-use crate::light::finest_level;
 use crate::graph::{BufferHandle, Executable, FrameGraph, ImageHandle};
+use crate::light::finest_level;
 use crate::memo::{Held, Keyed, Round};
 use crate::output::ExrHeader;
 use crate::passes::*;

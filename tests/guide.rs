@@ -75,11 +75,11 @@ fn every_file_and_name_in_the_guide_exists() {
 #[test]
 fn what_does_not_exist_is_found_out() {
     let text =
-        "See `src/guide/mod.rs::method`, glsl/shade.comp::normal_sum (and src/no.rs, `glsl/shade.comp::nothing`).";
+        "See `src/guide/mod.rs::method`, glsl/shade.comp::surface_at (and src/no.rs, `glsl/shade.comp::nothing`).";
     let found: Vec<_> = places(text).map(|place| (place, problem(place).is_some())).collect();
     let expected = [
         ("src/guide/mod.rs::method", false),
-        ("glsl/shade.comp::normal_sum", false),
+        ("glsl/shade.comp::surface_at", false),
         ("src/no.rs", true),
         ("glsl/shade.comp::nothing", true),
     ];

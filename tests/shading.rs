@@ -2,11 +2,13 @@
 mod common;
 
 use common::{EVERYTHING, Validated, analytic_materials, model, pixels, ready, sphere, texels_of};
-use glam::{UVec2, Vec3, Vec4};
+use glam::{DVec3, UVec2, Vec3, Vec4};
+use rayon::prelude::*;
 use threadlight::low_level::geometry_texel::GeometryTexel;
 use threadlight::low_level::memo::Memo;
-use threadlight::low_level::scene::{Scene, Source};
+use threadlight::low_level::scene::{Camera, MaterialSource, Scene, Source};
 use threadlight::low_level::shading;
+use threadlight::low_level::steps::LoadMaterial;
 
 #[test]
 fn the_shader_agrees_with_its_cpu_twin() {
@@ -28,36 +30,47 @@ fn the_shader_agrees_with_its_cpu_twin() {
     let folder = tempfile::tempdir().unwrap();
     let table = folder.path().join("table.binary");
     std::fs::write(&table, common::merl_like_table()).unwrap();
-    materials.push(("table", threadlight::low_level::scene::MaterialSource::File(table)));
+    materials.push(("table", MaterialSource::File(table)));
     // Small, as a pyramid of kernels is made from it for each material.
-    let map = folder.path().join("map.exr");
-    let texels: Vec<_> =
-        (0..64 * 32)
-            .map(|i| {
-                if i == 64 * 9 + 20 {
-                    [90.0, 70.0, 50.0, 1.0]
-                } else {
-                    [(i % 7) as f32, (i / 64) as f32 / 8.0, 0.5, 1.0]
-                }
-            })
-            .collect();
-    threadlight::low_level::output::write_exr(&map, 64, 32, &texels, false, &Default::default()).unwrap();
+    let write = |name: &str, lamp: [f32; 4]| {
+        let path = folder.path().join(name);
+        let texel = |i: usize| if i == 64 * 9 + 20 { lamp } else { [(i % 7) as f32, (i / 64) as f32 / 8.0, 0.5, 1.0] };
+        let texels: Vec<_> = (0..64 * 32).map(texel).collect();
+        threadlight::low_level::output::write_exr(&path, 64, 32, &texels, false, &Default::default()).unwrap();
+        Source::File(path)
+    };
+    let (lamp, soft) = (write("lamp.exr", [90.0, 70.0, 50.0, 1.0]), write("soft.exr", [1.0; 4]));
     let builtin = |name: &str| Source::Builtin(name.to_owned());
-    let cases =
-        [("paper", builtin("studio"), 100, 2), ("paper", builtin("sky"), 7, 3), ("fitted", Source::File(map), 4, 2)];
-    for (name, material) in materials {
-        for (method, environment, threads, subpixels) in &cases {
+    let cases = [
+        ("paper", builtin("studio"), 100, 2),
+        ("paper", builtin("sky"), 7, 3),
+        ("fitted", lamp, 4, 2),
+        ("fitted", soft.clone(), 4, 3),
+    ];
+    // Case by case, so that what is filtered of its environment is held from material to material.
+    for (method, environment, threads, subpixels) in cases {
+        let mut _held = None;
+        for (name, material) in &materials {
+            // Without sources another shader runs; of one wide lobe and one narrow one, kernels both blurred and sharp.
+            if environment == soft && !["conductor 0.5", "narrow"].contains(name) {
+                continue;
+            }
             let name = format!("{name}, {method}, {environment:?}");
-            let mut scene = sphere(material.clone(), "white", *threads, (48, 36));
+            let mut scene = sphere(material.clone(), "white", threads, (48, 36));
             scene.environment.source = environment.clone();
-            scene.shading.method = (*method).to_owned();
-            scene.image.subpixels = *subpixels;
+            scene.shading.method = method.to_owned();
+            scene.image.subpixels = subpixels;
             scene.image.background = threadlight::low_level::scene::Background::None;
             scene.environment.rotation_deg = 73.0;
             scene.environment.intensity = 1.7;
+            // From so near that pixels share a sum, past the rim.
+            let (eye, target) = (DVec3::new(1.5, 1.0, 3.5), DVec3::new(-0.69, 0.0, 0.29));
+            scene.camera = Some(Camera { eye, target, up: DVec3::Y, fov_y_deg: 14.0 });
             let prepared = ready(&scene);
             let rendering = gpu.render(&prepared, EVERYTHING);
-            let twin = shading::CpuShader::new(&prepared, &cpu.round(&())).unwrap();
+            let round = cpu.round(&());
+            let twin = shading::CpuShader::new(&prepared, &round).unwrap();
+            _held = Some(round.held());
             let (mut interior, mut edge, mut covered) = (0, 0, 0);
             for pixel in pixels(&prepared) {
                 let texels = texels_of(&prepared, &rendering, pixel);
@@ -79,19 +92,23 @@ fn the_shader_agrees_with_its_cpu_twin() {
             let counters = rendering.counters;
             assert_eq!((counters.interior_pixels as usize, counters.edge_pixels as usize), (interior, edge), "{name}");
             assert_eq!(counters.covered_subpixels as usize, covered, "{name}");
-            assert!(interior > 300 && edge > 30, "{interior} interior and {edge} edge pixels are no test");
+            assert!(interior > 300 && edge > 15, "{interior} interior and {edge} edge pixels are no test");
         }
     }
     gpu.finish();
 }
 
+/// One albedo for each degree, by quadrature, which knows nothing of threads; the last row of threads is at 89.
+fn albedos(material: &MaterialSource) -> Vec<Vec3> {
+    let brdf = Memo::default().round(&()).ask(&LoadMaterial(material)).expect("a material");
+    let albedo = |degree: u32| brdf.albedo(f64::from(degree.min(89)).to_radians()).as_vec3();
+    (0..=90).into_par_iter().map(albedo).collect()
+}
+
 /// Largest relative deviation from the directional albedo over all view angles, in an environment of radiance 1.
-fn furnace_error(gpu: &Validated, scene: &Scene) -> (f32, f64) {
+fn furnace_error(gpu: &Validated, scene: &Scene, albedos: &[Vec3]) -> (f32, f64) {
     let prepared = ready(scene);
     let rendering = gpu.render(&prepared, EVERYTHING);
-    // One albedo for each degree, by quadrature, which knows nothing of threads; the last row of threads is at 89.
-    let brdf = &prepared.materials[0].brdf;
-    let albedos: Vec<Vec3> = (0..=90).map(|deg| brdf.albedo(f64::from(deg.min(89)).to_radians()).as_vec3()).collect();
     let rays = prepared.view.camera_rays();
     let size = UVec2::new(prepared.view.width, prepared.view.height);
     let mut worst = (0.0, 0.0);
@@ -118,19 +135,20 @@ fn a_white_furnace_shows_the_albedo() {
     let folder = tempfile::tempdir().unwrap();
     let table = folder.path().join("table.binary");
     std::fs::write(&table, common::merl_like_table()).unwrap();
-    materials.push(("table", threadlight::low_level::scene::MaterialSource::File(table)));
+    materials.push(("table", MaterialSource::File(table)));
     if let Some(bytes) = common::alumina_oxide() {
         let table = folder.path().join("alumina-oxide.binary");
         std::fs::write(&table, bytes).unwrap();
-        materials.push(("alumina-oxide", threadlight::low_level::scene::MaterialSource::File(table)));
+        materials.push(("alumina-oxide", MaterialSource::File(table)));
     }
-    for (name, material) in materials {
-        // Weights of fitted threads sum to the albedo, and it is linear between rows but for what rounds it off there: 1e-3.
-        for (method, threads, largest) in [("paper", 100, 0.02), ("fitted", 4, 1e-3)] {
+    let albedos: Vec<_> = materials.iter().map(|(_, material)| albedos(material)).collect();
+    // Weights of fitted threads sum to the albedo, and it is linear between rows but for what rounds it off there: 1e-3.
+    for (method, threads, largest) in [("paper", 100, 0.02), ("fitted", 4, 1e-3)] {
+        for ((name, material), albedos) in materials.iter().zip(&albedos) {
             let mut scene = sphere(material.clone(), "white", threads, (160, 120));
             scene.shading.method = method.to_owned();
             scene.image.subpixels = 1;
-            let (error, theta_o_deg) = furnace_error(&gpu, &scene);
+            let (error, theta_o_deg) = furnace_error(&gpu, &scene, albedos);
             println!("{name}, {method}: at most {:.3} % from its albedo, at {theta_o_deg:.1} degrees", 100.0 * error);
             assert!(error < largest, "{name}, {method}: {error} at {theta_o_deg} degrees");
         }
