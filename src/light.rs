@@ -53,9 +53,8 @@ impl KernelNeeds {
             let lobe_width = (MIN_COS_THETA_D * half_vector_width(brdf)) as f32;
             sources.iter().any(|source| clearance(0.0, source.width_rad() as f32, lobe_width) < CLEAR[1])
         };
-        let is_sharp = |threads: &Option<&Threads>| match threads {
-            Some(Threads::Fitted(table)) => table.sharp_count(finest_level) > 0,
-            _ => false,
+        let is_sharp = |threads: &Option<&Threads>| {
+            threads.and_then(Threads::fitted).is_some_and(|table| table.sharp_count(finest_level) > 0)
         };
         Self {
             map: materials.iter().any(|(_, threads)| is_sharp(threads)),

@@ -107,8 +107,8 @@ impl DeviceScene {
         let subpixels = ("SUBPIXELS", view.subpixels);
         let mut constants = vec![subpixels, ("MODELS_USED", materials.models_used)];
         constants.extend(light.blurred.iter().flat_map(|blurred| blurred.needs.constants()));
-        let pipeline = compile(shader, &constants)?;
         let light = round.ask(&UploadLight { device, method, environment, light: &light })?;
+        let pipeline = compile(shader, &constants)?;
         let background = match prepared.show_environment {
             true => Some(Background {
                 pipeline: compile(&compiled::BACKGROUND, &[])?,

@@ -59,9 +59,8 @@ impl DeviceMaterials {
                 [record.row_count, record.thread_count] = table.size().map(|size| size as u32);
                 record.first_thread = (threads.len() / table.device_element_words()) as u32;
                 threads.extend(table.device_words());
-                if let (Threads::Fitted(table), Some(finest_level)) = (table, finest_level) {
-                    record.sharp_count = table.sharp_count(finest_level) as u32;
-                }
+                let sharp_count = table.fitted().zip(finest_level).map(|(table, level)| table.sharp_count(level));
+                record.sharp_count = sharp_count.unwrap_or(0) as u32;
             }
             record.first_slice = slices.len() as u32;
             records.push(record);

@@ -58,9 +58,14 @@ impl Step for UploadMaterials<'_> {
 
     fn key(&self, _: &Memo) -> Result<Key> {
         let key = on(self.device, self.method.name()).number(u64::from(self.evaluates_brdf));
-        let key = key.number(self.finest_level.map_or(u32::MAX, f32::to_bits));
         let of = |(brdf, threads): &Shaded| [Some(brdf.key), threads.map(|threads| threads.key)];
-        Ok(key.keys(self.materials.iter().flat_map(of).flatten()).build())
+        let key = key.keys(self.materials.iter().flat_map(of).flatten());
+        // Of the light, only how many threads are sharper than it.
+        let sharp = self.finest_level.map(|level| {
+            let threads = self.materials.iter().filter_map(|(_, threads)| threads.and_then(|table| table.fitted()));
+            threads.map(|table| table.sharp_count(level) as u64).collect::<Vec<_>>()
+        });
+        Ok(sharp.into_iter().flatten().fold(key, |key, count| key.number(count)).build())
     }
 
     fn make(&self, _: &Round) -> Result<DeviceMaterials> {

@@ -99,6 +99,14 @@ impl Threads {
         }
     }
 
+    /// These, if they are fitted.
+    pub fn fitted(&self) -> Option<&FittedTable> {
+        match self {
+            Self::Fitted(table) => Some(table),
+            Self::Paper(_) => None,
+        }
+    }
+
     /// Number of view angles and of threads.
     pub fn size(&self) -> [usize; 2] {
         match self {
