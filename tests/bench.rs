@@ -56,6 +56,7 @@ fn speed_prints_tables_and_writes_json_and_plots() {
     let (frames, growths) = (timings["frames"].as_array().unwrap(), timings["growths"].as_array().unwrap());
     assert_eq!((frames.len(), growths.len()), (2, 12));
     let documented = [
+        "covered_pixels",
         "floor_ms",
         "frame_ms",
         "gpu_ms",

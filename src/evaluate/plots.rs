@@ -414,6 +414,7 @@ mod tests {
             subpixels: 2,
             triangles: 12,
             lookups: 1000,
+            covered_pixels: 100,
             passes: Vec::new(),
             gpu_ms: f64::from(threads),
             frame_ms: f64::from(threads),

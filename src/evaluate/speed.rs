@@ -46,6 +46,8 @@ pub struct TimedFrame {
     pub triangles: u64,
     /// Lookups in the environment that shading made.
     pub lookups: u64,
+    /// Pixels that see a surface.
+    pub covered_pixels: u64,
     /// Time on the GPU of each pass that makes the picture, in milliseconds.
     pub passes: Vec<Pass>,
     /// The sum of these.
@@ -223,7 +225,7 @@ impl Entrant {
     fn new(device: &Arc<Device>, place: &mut Place) -> Result<Self> {
         let renderer = place.renderer(device)?;
         let (prepared, round) = (&place.prepared, place.round());
-        let lookups = render(&renderer)?.lookups;
+        let Rendering { lookups, counters, .. } = render(&renderer)?;
         if lookups == 0 {
             let remedy = "point the camera at its objects, or leave the camera out";
             return Err(Error::input(place.scene, "shows no surface to shade", remedy));
@@ -246,6 +248,7 @@ impl Entrant {
             subpixels: prepared.view.subpixels,
             triangles: prepared.objects.iter().map(triangles).sum(),
             lookups,
+            covered_pixels: counters.covered_pixels(),
             passes: Vec::new(),
             gpu_ms: 0.0,
             frame_ms: 0.0,

@@ -66,9 +66,19 @@ pub struct Row {
     pub frame_ms: f64,
     /// Lookups in the environment that shading made.
     pub lookups: u64,
+    /// Pixels that see a surface; 0 in measurements that were written before this was counted.
+    #[serde(default)]
+    pub covered_pixels: u64,
     /// What `rms` was expected to be, where that was asked for: see [`TrueSample::expected_rms`].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub expected_rms: Option<f64>,
+}
+
+impl Row {
+    /// Lookups in the environment for each pixel that sees a surface; NaN if these were not counted.
+    pub fn lookups_a_pixel(&self) -> f64 {
+        if self.covered_pixels > 0 { self.lookups as f64 / self.covered_pixels as f64 } else { f64::NAN }
+    }
 }
 
 /// All measurements.
@@ -158,6 +168,7 @@ fn row(place: &Place, metrics: &Metrics, rendering: &Rendering) -> Row {
         gpu_ms: rendering.gpu_ms(),
         frame_ms: rendering.frame_ms,
         lookups: rendering.lookups,
+        covered_pixels: rendering.counters.covered_pixels(),
         expected_rms: None,
     }
 }

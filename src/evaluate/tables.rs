@@ -58,7 +58,7 @@ pub fn text(sections: &[Section]) -> String {
 /// Tables for each material where there are several (the paper's tables 2 and 3), and over all of them (table 4).
 ///
 /// Each has the mean RMS and SSIM over its environments and scenes; the last also FLIP, the largest RMS of any material,
-/// environment and scene, the mean time on the GPU, that of other methods at the error of fitted threads, and how good expectations were.
+/// environment and scene, lookups for each pixel that sees a surface, the mean time on the GPU, that of other methods at the error of fitted threads, and how good expectations were.
 pub fn error_tables(rows: &[Row]) -> Vec<Section> {
     let materials = in_order(rows.iter().map(|row| &row.material));
     let places = in_order(rows.iter().map(|row| (&row.environment, &row.scene))).len();
@@ -82,6 +82,7 @@ pub fn error_tables(rows: &[Row]) -> Vec<Section> {
     let mut tables = rms_and_ssim(&rows);
     tables.push(error_table("FLIP", &rows, mean, |row| row.flip, 5));
     tables.push(error_table("RMS, worst", &rows, largest, |row| row.rms, 5));
+    tables.push(error_table("lookups/pixel", &rows, mean, Row::lookups_a_pixel, 1));
     tables.push(error_table("GPU ms", &rows, mean, |row| row.gpu_ms, 3));
     tables.extend(equal_error_table(&rows));
     tables.extend(expectation_table(&rows));
@@ -215,12 +216,18 @@ fn pass_names<'a>(frames: &[&'a TimedFrame]) -> Vec<&'a str> {
 }
 
 fn cost_heads(frames: &[&TimedFrame]) -> Vec<String> {
-    ["ns/lookup"].into_iter().chain(pass_names(frames)).chain(["all passes"]).map(str::to_owned).collect()
+    ["lookups/pixel", "ns/lookup"]
+        .into_iter()
+        .chain(pass_names(frames))
+        .chain(["all passes"])
+        .map(str::to_owned)
+        .collect()
 }
 
 /// A cell for each of `cost_heads`.
 fn costs(frame: &TimedFrame) -> Vec<String> {
-    let mut cells = vec![format!("{:.2}", frame.ns_per_lookup)];
+    let lookups_a_pixel = frame.lookups as f64 / frame.covered_pixels as f64;
+    let mut cells = vec![format!("{lookups_a_pixel:.1}"), format!("{:.2}", frame.ns_per_lookup)];
     cells.extend(pass_names(&[frame]).into_iter().map(|name| format!("{:.2}", frame.pass_ms(name))));
     cells.push(format!("{:.2}", frame.gpu_ms));
     cells
@@ -282,6 +289,7 @@ pub(super) mod tests {
                             gpu_ms: 0.5 + cost * f64::from(threads),
                             frame_ms: 1.0 + cost * f64::from(threads),
                             lookups: u64::from(threads) * 1000,
+                            covered_pixels: 800,
                             expected_rms: None,
                         });
                     }
@@ -316,6 +324,9 @@ mean of 2 materials, mean over 2 lights and scenes
   RMS, worst             1        16       100
   paper            0.60000   0.08615   0.02389
   uniform          0.60000   0.15000   0.06000
+  lookups/pixel          1        16       100
+  paper                1.2      20.0     125.0
+  uniform              1.2      20.0     125.0
   GPU ms                 1        16       100
   paper              0.610     2.260    11.500
   uniform            0.570     1.620     7.500
@@ -398,6 +409,7 @@ mean of 2 materials, mean over 2 lights and scenes
             "gpu_ms",
             "frame_ms",
             "lookups",
+            "covered_pixels",
         ];
         let places: Vec<_> = names.iter().map(|name| json.find(&format!("\"{name}\":")).unwrap()).collect();
         assert!(places.is_sorted(), "{json}");

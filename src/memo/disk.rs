@@ -1,6 +1,7 @@
 //! Outputs on disk: a file each, named by its key.
 use super::Key;
 use crate::error::{Error, Result};
+use crate::output::make_way;
 use std::path::{Path, PathBuf};
 
 /// Reads an output from the file at a path.
@@ -53,13 +54,5 @@ impl<T> Stored<'_, T> {
         if let Err(error) = written {
             tracing::warn!("what was made is not kept on disk: {error}");
         }
-    }
-}
-
-/// Removes an empty folder from where a file is to be: a rename replaces anything else.
-fn make_way(path: &Path) -> Result<()> {
-    match path.symlink_metadata() {
-        Ok(metadata) if metadata.is_dir() => std::fs::remove_dir(path).map_err(|cause| Error::unwritable(path, cause)),
-        _ => Ok(()),
     }
 }

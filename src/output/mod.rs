@@ -75,6 +75,14 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
     Ok(())
 }
 
+/// Removes an empty folder from where a file of a cache is to be: [`write_whole`] replaces anything else.
+pub(crate) fn make_way(path: &Path) -> Result<()> {
+    match path.symlink_metadata() {
+        Ok(metadata) if metadata.is_dir() => std::fs::remove_dir(path).map_err(|cause| Error::unwritable(path, cause)),
+        _ => Ok(()),
+    }
+}
+
 /// An empty file in the folder of `path`, deleted when dropped.
 fn temporary_beside(path: &Path) -> Result<tempfile::NamedTempFile> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));

@@ -38,7 +38,7 @@ impl BareLookups {
         pixel_count: u32,
         lookup_count: u32,
     ) -> Result<Self> {
-        // Where texels are as large as a lookup's share of the hemisphere, and between two levels, so that both are fetched.
+        // About where texels are as large as a lookup's share of the hemisphere, and between two levels, so that both are fetched.
         let texel_sr = 2.0 * TAU / (6.0 * (pyramid.face_size * pyramid.face_size) as f64);
         let level = 0.5 * (TAU / f64::from(lookup_count) / texel_sr).log2();
         let level = level.clamp(0.0, (pyramid.levels.len() - 1) as f64 - 0.5).floor() + 0.5;

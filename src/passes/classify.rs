@@ -41,6 +41,11 @@ pub struct Counters {
 }
 
 impl Counters {
+    /// Pixels that see a surface.
+    pub fn covered_pixels(&self) -> u64 {
+        u64::from(self.interior_pixels) + u64::from(self.edge_pixels)
+    }
+
     /// Byte offset of the dispatch arguments of class `kind`: 0 interior, 1 edge.
     pub fn arguments_of(kind: u32) -> u64 {
         u64::from(kind) * size_of::<TileClass>() as u64
@@ -64,7 +69,7 @@ struct Push {
     smooth_variance: f32,
 }
 
-/// From which variance of their normals on sub-pixels are no smooth surface to `method`: [`SHARED_VARIANCE`] if its sub-pixels share a
+/// From which variance of their normals on, in rad^2, sub-pixels are no smooth surface to `method`: `SHARED_VARIANCE` if they share a
 /// sum; otherwise none that [`SMOOTH_DEG`] allows.
 pub fn smooth_variance(method: Method) -> f32 {
     if method.shares_surface() { SHARED_VARIANCE } else { 1.0 }

@@ -53,6 +53,28 @@ pub struct Device {
     pub(super) instance: Arc<Instance>,
 }
 
+/// What every device has of its own from the start.
+fn allocator_and_timeline(
+    instance: &Instance,
+    chosen: &Candidate,
+    raw: &ash::Device,
+) -> Result<(Allocator, vk::Semaphore)> {
+    let allocator = Allocator::new(&AllocatorCreateDesc {
+        instance: instance.raw.clone(),
+        device: raw.clone(),
+        physical_device: chosen.physical,
+        debug_settings: Default::default(),
+        buffer_device_address: false,
+        allocation_sizes: Default::default(),
+    })
+    .map_err(|cause| VulkanError::Memory { object: chosen.description.name.clone(), cause: cause.to_string() })?;
+    let mut kind = vk::SemaphoreTypeCreateInfo::default().semaphore_type(vk::SemaphoreType::TIMELINE).initial_value(0);
+    let info = vk::SemaphoreCreateInfo::default().push_next(&mut kind);
+    // SAFETY: the timeline feature was enabled with the device.
+    let timeline = unsafe { raw.create_semaphore(&info, None) }.during("vkCreateSemaphore", "timeline")?;
+    Ok((allocator, timeline))
+}
+
 impl Device {
     /// Opens the device that `asked` names (index, or part of its name), or the best one: discrete, then integrated,
     /// then CPU.
@@ -118,20 +140,14 @@ impl Device {
             .push_next(&mut dynamic_rendering);
         // SAFETY: the physical device is this instance's; `info` and all it points to outlive the call.
         let raw = unsafe { instance.raw.create_device(chosen.physical, &info, None) }.during("vkCreateDevice", name)?;
-        let allocator = Allocator::new(&AllocatorCreateDesc {
-            instance: instance.raw.clone(),
-            device: raw.clone(),
-            physical_device: chosen.physical,
-            debug_settings: Default::default(),
-            buffer_device_address: false,
-            allocation_sizes: Default::default(),
-        })
-        .map_err(|cause| VulkanError::Memory { object: name.clone(), cause: cause.to_string() })?;
-        let mut kind =
-            vk::SemaphoreTypeCreateInfo::default().semaphore_type(vk::SemaphoreType::TIMELINE).initial_value(0);
-        let info = vk::SemaphoreCreateInfo::default().push_next(&mut kind);
-        // SAFETY: the timeline feature was enabled above.
-        let timeline = unsafe { raw.create_semaphore(&info, None) }.during("vkCreateSemaphore", "timeline")?;
+        let (allocator, timeline) = match allocator_and_timeline(instance, &chosen, &raw) {
+            Ok(made) => made,
+            Err(error) => {
+                // SAFETY: nothing of the device is left, and nobody else has it yet.
+                unsafe { raw.destroy_device(None) };
+                return Err(error);
+            }
+        };
         // SAFETY: one queue of this family was asked for above.
         let queue = unsafe { raw.get_device_queue(chosen.queue_family, 0) };
         tracing::info!("device {}: {name}, {}", chosen.description.index, chosen.description.driver);

@@ -1,6 +1,7 @@
 //! The driver's cache of compiled pipelines, on disk.
 use super::device::Device;
 use super::error::{During, Result};
+use crate::output::{make_way, write_whole};
 use ash::vk;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -23,7 +24,8 @@ impl PipelineCache {
     pub fn new(device: &Arc<Device>, folder: Option<&Path>) -> Result<Self> {
         let uuid: String = device.properties.pipeline_cache_uuid.iter().map(|byte| format!("{byte:02x}")).collect();
         let file = folder.map(|folder| folder.join(format!("pipelines-{uuid}.bin")));
-        let contents = file.as_deref().and_then(|file| unwrapped(std::fs::read(file).ok()?)).unwrap_or_default();
+        let contents =
+            file.as_deref().and_then(|file| unwrapped(crate::file_format::read(file).ok()?)).unwrap_or_default();
         let info = vk::PipelineCacheCreateInfo::default().initial_data(&contents);
         // SAFETY: `contents` outlives the call; it is what a driver has made, whose header tells this one whether it is its own.
         let raw = unsafe { device.raw.create_pipeline_cache(&info, None) }
@@ -40,12 +42,12 @@ impl PipelineCache {
             Err(result) => return tracing::warn!("vkGetPipelineCacheData failed: {result}"),
         };
         let contents = [&blake3::hash(&contents).as_bytes()[..], &contents].concat();
-        if std::fs::read(file).is_ok_and(|old| old == contents) {
+        if crate::file_format::read(file).is_ok_and(|old| old == contents) {
             return;
         }
         // If the folder cannot be made, neither can the file, and that is what to say.
         let _ = file.parent().map(std::fs::create_dir_all);
-        if let Err(cause) = crate::output::write_whole(file, &contents) {
+        if let Err(cause) = make_way(file).and_then(|()| write_whole(file, &contents)) {
             tracing::warn!("the pipeline cache was not saved: {cause}");
         }
     }

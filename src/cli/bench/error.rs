@@ -19,7 +19,7 @@ Examples:
 
 Each picture is compared with the reference picture of its material, environment and scene, over the pixels that see a
 surface. Tables are printed: mean RMS and SSIM for each material (the paper's tables 2 and 3), and over all of them
-(table 4) with FLIP, the worst RMS, the time on the GPU and, where fitted threads were measured, how many times as long as they the
+(table 4) with FLIP, the worst RMS, lookups for each pixel that sees a surface, the time on the GPU and, where fitted threads were measured, how many times as long as they the
 other methods take for the same RMS.
 
 The JSON is a list of rows with these fields, in this order:
@@ -27,7 +27,7 @@ The JSON is a list of rows with these fields, in this order:
   rms, rms_linear, ssim, flip, max, nan             as `threadlight compare` has them, against the reference
   gpu_ms                                            time of the passes that make linear radiance
   frame_ms                                          from recording until the picture is read back
-  lookups                                           lookups in the environment
+  lookups, covered_pixels                           lookups in the environment, and pixels that see a surface
   expected_rms                                      only with --expected: what rms was expected to be
 
 The plots are SVG, log-log, a line a method: rms_over_threads.svg (the paper's figure 12) and rms_over_gpu_ms.svg, and

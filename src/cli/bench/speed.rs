@@ -19,7 +19,8 @@ Examples:
   threadlight bench speed --methods paper,filtered --counts 16,64 --size 320x240 --json speed.json --plot plots
 
 The first tables are the paper's table 1: for each number of threads the time on the GPU of each pass and of all of them, and
-the floor: what a compute pass takes that makes as many trilinear lookups in the same environment and nothing else.
+the floor: what a compute pass takes that makes as many trilinear lookups in the same environment, of levels that differ from
+lookup to lookup and from pixel to pixel, and nothing else.
 
 The others have what a frame costs as its pixels (a quarter, half, all of --size), its sub-pixels (1, 2 and 4 per axis), its
 threads (a quarter, half, all of --threads) and its triangles (each split into 4 and 16) grow; ratio is the time over that of
@@ -29,7 +30,8 @@ All that is compared takes turns, frame by frame; times are medians.
 
 The JSON is an object. `frames` is a list with these fields, in this order:
   method, threads, material, environment, scene     what was measured
-  width, height, subpixels, triangles, lookups      how much of it; sub-pixels are per axis
+  width, height, subpixels, triangles, lookups,     how much of it; sub-pixels are per axis,
+  covered_pixels                                    and these pixels see a surface
   passes                                            list of name and gpu_ms of each pass
   gpu_ms, frame_ms                                  all passes; from recording until the picture is read back
   floor_ms                                          as many bare lookups
