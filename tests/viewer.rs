@@ -237,6 +237,28 @@ fn a_broken_file_is_told_and_changes_nothing() {
 }
 
 #[test]
+fn a_replay_goes_on_while_the_turntable_turns() {
+    let Some(viewer) = Viewer::new() else { return };
+    let replay = r#"{"key": "t"}
+        "wait"
+        {"key": "t"}
+        "wait"
+        "quit""#;
+    viewer.play(&[&SMALL[..], &["--replay-limit", "120"]].concat(), replay).expect_success();
+}
+
+#[test]
+fn a_wait_has_a_limit() {
+    let Some(viewer) = Viewer::new() else { return };
+    let replay = r#""wait"
+        {"set": {"threads": 128}}
+        "wait""#;
+    let few = ["--material", "silver", "--environment", "white", "--no-cache", "--replay-limit", "20"];
+    let Ended { success, log } = viewer.play(&[&SMALL[..], &few].concat(), replay);
+    assert!(!success && log.iter().any(|line| line.contains("the replay waits for more than 20 s")), "{log:#?}");
+}
+
+#[test]
 fn closing_while_threads_are_made_takes_less_than_a_second() {
     let Some(viewer) = Viewer::new() else { return };
     // Minutes of work: more than anybody waits for.

@@ -3,6 +3,7 @@ use super::scene_flags::{MachineFlags, SceneFlags};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::value_parser;
 use std::path::PathBuf;
+use std::time::Duration;
 use threadlight::low_level::output::{self, Format};
 use threadlight::low_level::viewer::{self, ViewerSettings, input};
 use threadlight::low_level::vulkan::PresentMode;
@@ -43,6 +44,9 @@ pub struct ViewArguments {
     /// Do what this file says as if the user did it: one event a line, in JSON.
     #[arg(long, value_name = "FILE")]
     replay: Option<PathBuf>,
+    /// End with an error where one "wait" of the replay takes longer.
+    #[arg(long, value_name = "SECONDS", default_value_t = 600, value_parser = value_parser!(u64).range(1..))]
+    replay_limit: u64,
 }
 
 /// Size of the picture where neither scene nor flag names one: with the panel, 1280 x 720.
@@ -70,6 +74,7 @@ impl ViewArguments {
             frames: self.frames,
             screenshot: self.screenshot,
             replay: replay.into_iter().map(|(_, input)| input).collect(),
+            replay_limit: Duration::from_secs(self.replay_limit),
         })?;
         if let Some(first) = messages.first() {
             anyhow::bail!("validation: {} messages, the first: {}", messages.len(), first.replace('\n', " "));

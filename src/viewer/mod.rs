@@ -40,6 +40,7 @@ use crate::vulkan::PresentMode;
 use crate::{Error, Result};
 use input::Input;
 use std::path::PathBuf;
+use std::time::Duration;
 use winit::event_loop::EventLoop;
 
 /// What the viewer is started with.
@@ -61,6 +62,8 @@ pub struct ViewerSettings {
     pub screenshot: Option<PathBuf>,
     /// What is done as if the user did it.
     pub replay: Vec<Input>,
+    /// The longest that a `"wait"` of it may take.
+    pub replay_limit: Duration,
 }
 
 /// Opens a window and runs until it is closed. Gives the validation layer's messages.

@@ -70,6 +70,10 @@ struct Script {
     frames_left: Option<u64>,
     /// Until when the window may take to get this size.
     resizing: Option<([u32; 2], Instant)>,
+    /// Whether the last input has not been drawn yet: each is before the next.
+    is_undrawn: bool,
+    /// Until when a `"wait"` may take.
+    waiting: Option<Instant>,
 }
 
 impl App {
@@ -79,7 +83,7 @@ impl App {
     }
 
     fn open(&mut self, event_loop: &ActiveEventLoop) -> Result<Open> {
-        let ViewerSettings { scene, device, validate, cache, present_mode, frames, screenshot, replay } =
+        let ViewerSettings { scene, device, validate, cache, present_mode, frames, screenshot, replay, .. } =
             &self.settings;
         let image = &scene.image;
         let attributes = Window::default_attributes()
@@ -114,7 +118,8 @@ impl App {
             let _ = proxy.send_event(Wake);
         });
         let frames_left = frames.or(screenshot.is_some().then_some(1));
-        let script = Script { replay: replay.clone().into(), frames_left, resizing: None };
+        let script =
+            Script { replay: replay.clone().into(), frames_left, resizing: None, is_undrawn: true, waiting: None };
         let mut open = Open {
             viewer,
             stage,
@@ -168,6 +173,7 @@ impl Open {
     /// Draws a frame; gives whether the program is to end.
     fn draw(&mut self, settings: &ViewerSettings) -> Result<bool> {
         self.due = None;
+        self.script.is_undrawn = false;
         self.last_drawn = Instant::now();
         let raw = self.egui.take_egui_input(&self.window);
         let mut inputs = Vec::new();
@@ -221,23 +227,33 @@ impl Open {
     }
 
     /// Plays inputs of the script, up to one that has to be drawn or waited for. Gives whether the program is to end.
-    fn play(&mut self) -> bool {
+    ///
+    /// # Errors
+    /// A `"wait"` that takes longer than `limit`.
+    fn play(&mut self, limit: Duration) -> Result<bool> {
         if let Some((size, until)) = self.script.resizing {
             let area = self.viewer.area;
             if [area.width, area.height] != size && Instant::now() < until {
                 self.due_at(Instant::now() + Duration::from_millis(20));
-                return false;
+                return Ok(false);
             }
             self.script.resizing = None;
         }
-        // Each is drawn before the next.
-        if self.due.is_some_and(|due| due <= Instant::now()) {
-            return false;
+        if self.script.is_undrawn && self.due.is_some_and(|due| due <= Instant::now()) {
+            return Ok(false);
         }
-        let Some(input) = self.script.replay.front().cloned() else { return false };
+        let Some(input) = self.script.replay.front().cloned() else { return Ok(false) };
         match &input {
-            Input::Wait if self.viewer.is_busy() || self.due.is_some() => return false,
-            Input::Quit => return true,
+            // A turntable always has a next frame.
+            Input::Wait if self.viewer.is_busy() || (self.due.is_some() && !self.viewer.turntable) => {
+                let until = *self.script.waiting.get_or_insert_with(|| Instant::now() + limit);
+                if Instant::now() < until {
+                    return Ok(false);
+                }
+                let problem = format!("waits for more than {} s", limit.as_secs());
+                return Err(Error::input("the replay", problem, "raise --replay-limit, or ask for less"));
+            }
+            Input::Quit => return Ok(true),
             Input::Resize(width, height) => {
                 let size = window_size([*width, *height], self.window.scale_factor());
                 if let Some(size) = self.window.request_inner_size(size) {
@@ -259,8 +275,10 @@ impl Open {
             input => self.viewer.handle(input),
         }
         self.script.replay.pop_front();
+        self.script.waiting = None;
+        self.script.is_undrawn = true;
         self.redraw();
-        false
+        Ok(false)
     }
 
     fn drag(&mut self, to: [f64; 2]) {
@@ -395,16 +413,18 @@ impl ApplicationHandler<Wake> for App {
 
     fn about_to_wait(&mut self, event_loop: &ActiveEventLoop) {
         let Some(open) = &mut self.open else { return };
-        if open.play() {
-            return self.end(event_loop, Ok(()));
+        match open.play(self.settings.replay_limit) {
+            Ok(false) => {}
+            Ok(true) => return self.end(event_loop, Ok(())),
+            Err(error) => return self.end(event_loop, Err(error)),
         }
-        let flow = match open.due {
+        let flow = match open.due.into_iter().chain(open.script.waiting).min() {
             None => ControlFlow::Wait,
-            Some(due) if due <= Instant::now() => {
+            Some(until) if until <= Instant::now() => {
                 open.window.request_redraw();
                 ControlFlow::Wait
             }
-            Some(due) => ControlFlow::WaitUntil(due),
+            Some(until) => ControlFlow::WaitUntil(until),
         };
         event_loop.set_control_flow(flow);
     }
