@@ -255,7 +255,7 @@ fn a_wait_has_a_limit() {
         "wait""#;
     let few = ["--material", "silver", "--environment", "white", "--no-cache", "--replay-limit", "1"];
     let Ended { success, log } = viewer.play(&[&SMALL[..], &few].concat(), replay);
-    assert!(!success && log.iter().any(|line| line.contains("the replay waits for more than 1 s")), "{log:#?}");
+    assert!(!success && log.iter().any(|line| line.contains("the replay: waits for more than 1 s")), "{log:#?}");
 }
 
 #[test]
