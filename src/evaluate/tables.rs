@@ -58,7 +58,8 @@ pub fn text(sections: &[Section]) -> String {
 /// Tables for each material where there are several (the paper's tables 2 and 3), and over all of them (table 4).
 ///
 /// Each has the mean RMS and SSIM over its environments and scenes; the last also FLIP, the largest RMS of any material,
-/// environment and scene, lookups for each pixel that sees a surface, the mean time on the GPU, that of other methods at the error of fitted threads, and how good expectations were.
+/// environment and scene, lookups for each pixel that sees a surface, the mean time on the GPU, that of other methods at the error of
+/// fitted threads, and how good expectations were.
 pub fn error_tables(rows: &[Row]) -> Vec<Section> {
     let materials = in_order(rows.iter().map(|row| &row.material));
     let places = in_order(rows.iter().map(|row| (&row.environment, &row.scene))).len();

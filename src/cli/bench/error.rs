@@ -19,8 +19,8 @@ Examples:
 
 Each picture is compared with the reference picture of its material, environment and scene, over the pixels that see a
 surface. Tables are printed: mean RMS and SSIM for each material (the paper's tables 2 and 3), and over all of them
-(table 4) with FLIP, the worst RMS, lookups for each pixel that sees a surface, the time on the GPU and, where fitted threads were measured, how many times as long as they the
-other methods take for the same RMS.
+(table 4) with FLIP, the worst RMS, lookups for each pixel that sees a surface, the time on the GPU and, where fitted threads
+were measured, how many times as long as they the other methods take for the same RMS.
 
 The JSON is a list of rows with these fields, in this order:
   method, threads, material, environment, scene     what was measured
