@@ -29,6 +29,19 @@ pub struct Slice<'a> {
     peak: DVec3,
 }
 
+/// The middle of a step of x and phi_h.
+#[derive(Clone, Copy)]
+struct Cell {
+    /// The half vector.
+    h: DVec3,
+    /// w_o . h.
+    cos_theta_d: f64,
+    /// n . w_i.
+    cos_theta_i: f64,
+    /// f there.
+    f: DVec3,
+}
+
 /// The direction that the facet `h` mirrors `w_o` into.
 fn reflect(w_o: DVec3, h: DVec3) -> DVec3 {
     (2.0 * w_o.dot(h) * h - w_o).normalize()
@@ -40,10 +53,39 @@ fn above_base(f: DVec3, base: f64) -> DVec3 {
     if value > base { f * ((value - base) / value) } else { DVec3::ZERO }
 }
 
-/// Half vector at x in [0, 1] and phi in units of the circle, counted from -x.
-fn half_vector(x: f64, turn: f64) -> DVec3 {
+/// Half vector at x in [0, 1] and in the direction of phi_h.
+fn half_vector(x: f64, phi: DVec2) -> DVec3 {
     let (sin_theta, cos_theta) = (FRAC_PI_2 * x * x).sin_cos();
-    (DVec2::from_angle(2.0 * PI * turn - PI) * sin_theta).extend(cos_theta)
+    (phi * sin_theta).extend(cos_theta)
+}
+
+/// The direction of phi_h in units of the circle, counted from -x.
+fn direction_of_turn(turn: f64) -> DVec2 {
+    DVec2::from_angle(2.0 * PI * turn - PI)
+}
+
+/// Those of all steps of x and phi_h, ring by ring.
+fn cells(brdf: &Brdf, w_o: DVec3) -> Vec<Cell> {
+    let azimuths: Vec<_> = (0..PHI_STEPS).map(|j| direction_of_turn((j as f64 + 0.5) / PHI_STEPS as f64)).collect();
+    let mut cells = Vec::with_capacity(THETA_STEPS * PHI_STEPS);
+    let (mut seen, mut directions) = (Vec::new(), Vec::new());
+    for i in 0..THETA_STEPS {
+        let x = (i as f64 + 0.5) / THETA_STEPS as f64;
+        for phi in &azimuths {
+            let h = half_vector(x, *phi);
+            let cos_theta_d = w_o.dot(h);
+            let w_i = 2.0 * cos_theta_d * h - w_o;
+            if cos_theta_d > 0.0 && w_i.z > 0.0 {
+                seen.push(cells.len());
+                directions.push(w_i);
+            }
+            cells.push(Cell { h, cos_theta_d, cos_theta_i: w_i.z, f: DVec3::ZERO });
+        }
+    }
+    for (cell, f) in seen.into_iter().zip(brdf.evaluate_all(&directions, w_o)) {
+        cells[cell].f = f;
+    }
+    cells
 }
 
 impl<'a> Slice<'a> {
@@ -53,32 +95,34 @@ impl<'a> Slice<'a> {
     /// Tabulates `brdf` seen from `theta_o` (radians, less than pi / 2). Where it reflects nothing the pdf is that of a
     /// diffuse surface, cos / pi: a thread then still has a direction, and its samples add up to the zero they should.
     pub fn new(brdf: &'a Brdf, theta_o: f64) -> Self {
-        Self::above(brdf, dvec3(theta_o.sin(), 0.0, theta_o.cos()), 0.0)
+        let w_o = dvec3(theta_o.sin(), 0.0, theta_o.cos());
+        Self::above(brdf, w_o, &cells(brdf, w_o), 0.0)
     }
 
-    /// The slice of what is above the median of f, by luminance: lobes without the base that they stand on. A tenth of the mass of
-    /// a glossy plastic is in its lobe; this has all of its mass there.
-    pub fn lobes(&self) -> Self {
+    /// The same, and the slice of what is above the median of f, by luminance: lobes without the base that they stand on. A tenth of
+    /// the mass of a glossy plastic is in its lobe; the second slice has all of its mass there.
+    pub fn with_lobes(brdf: &'a Brdf, theta_o: f64) -> [Self; 2] {
         const POINTS: usize = 512;
-        let mut values: Vec<f64> = fibonacci_lattice(POINTS)
-            .map(|uv| {
-                let w_i = (DVec2::from_angle(2.0 * PI * uv.y) * uv.x.sqrt()).extend((1.0 - uv.x).sqrt());
-                luminance(self.brdf.evaluate(w_i, self.w_o))
-            })
+        let w_o = dvec3(theta_o.sin(), 0.0, theta_o.cos());
+        let directions: Vec<_> = fibonacci_lattice(POINTS)
+            .map(|uv| (DVec2::from_angle(2.0 * PI * uv.y) * uv.x.sqrt()).extend((1.0 - uv.x).sqrt()))
             .collect();
+        let mut values: Vec<f64> = brdf.evaluate_all(&directions, w_o).into_iter().map(luminance).collect();
         values.sort_by(f64::total_cmp);
-        Self::above(self.brdf, self.w_o, values[POINTS / 2])
+        let cells = cells(brdf, w_o);
+        [0.0, values[POINTS / 2]].map(|base| Self::above(brdf, w_o, &cells, base))
     }
 
-    fn above(brdf: &'a Brdf, w_o: DVec3, base: f64) -> Self {
-        let slice = Self::tabulate(brdf, w_o, base, |w_i| above_base(brdf.evaluate(w_i, w_o), base) * w_i.z);
+    fn above(brdf: &'a Brdf, w_o: DVec3, cells: &[Cell], base: f64) -> Self {
+        let slice = Self::tabulate(brdf, w_o, cells, base, |f| above_base(f, base));
         if slice.total > 0.0 {
             return slice;
         }
-        Self { albedo: DVec3::ZERO, ..Self::tabulate(brdf, w_o, base, |w_i| DVec3::splat(w_i.z * FRAC_1_PI)) }
+        Self { albedo: DVec3::ZERO, ..Self::tabulate(brdf, w_o, cells, base, |_| DVec3::splat(FRAC_1_PI)) }
     }
 
-    fn tabulate(brdf: &'a Brdf, w_o: DVec3, base: f64, density: impl Fn(DVec3) -> DVec3) -> Self {
+    fn tabulate(brdf: &'a Brdf, w_o: DVec3, cells: &[Cell], base: f64, counted: impl Fn(DVec3) -> DVec3) -> Self {
+        let density = |w_i: DVec3| counted(brdf.evaluate(w_i, w_o)) * w_i.z;
         let mut albedo = DVec3::ZERO;
         let mut ring_cdf = vec![0.0];
         let mut azimuth_cdf = Vec::with_capacity(THETA_STEPS * (PHI_STEPS + 1));
@@ -92,12 +136,9 @@ impl<'a> Slice<'a> {
             let start = azimuth_cdf.len();
             let mut sum = 0.0;
             azimuth_cdf.push(0.0);
-            for j in 0..PHI_STEPS {
-                let h = half_vector(x, (j as f64 + 0.5) / PHI_STEPS as f64);
-                let cos_theta_d = w_o.dot(h);
-                let w_i = 2.0 * cos_theta_d * h - w_o;
-                if cos_theta_d > 0.0 && w_i.z > 0.0 {
-                    let rgb = density(w_i);
+            for &Cell { h, cos_theta_d, cos_theta_i, f } in &cells[i * PHI_STEPS..(i + 1) * PHI_STEPS] {
+                if cos_theta_d > 0.0 && cos_theta_i > 0.0 {
+                    let rgb = counted(f) * cos_theta_i;
                     let value = luminance(rgb);
                     albedo += rgb * (cos_theta_d * ring);
                     sum += value * cos_theta_d * ring;
@@ -139,6 +180,12 @@ impl<'a> Slice<'a> {
         above_base(self.brdf.evaluate(w_i, self.w_o), self.base) * w_i.z
     }
 
+    /// The same for many directions: quicker for tables.
+    pub fn f_cos_all(&self, w_i: &[DVec3]) -> Vec<DVec3> {
+        let f = self.brdf.evaluate_all(w_i, self.w_o);
+        f.into_iter().zip(w_i).map(|(f, w_i)| above_base(f, self.base) * w_i.z).collect()
+    }
+
     /// Where the pdf is greatest.
     pub fn peak(&self) -> DVec3 {
         self.peak
@@ -148,7 +195,8 @@ impl<'a> Slice<'a> {
     pub fn direction(&self, uv: DVec2) -> DVec3 {
         let (i, x) = invert(&self.ring_cdf, uv.x);
         let (j, turn) = invert(self.azimuths(i), uv.y);
-        let h = half_vector((i as f64 + x) / THETA_STEPS as f64, (j as f64 + turn) / PHI_STEPS as f64);
+        let phi = direction_of_turn((j as f64 + turn) / PHI_STEPS as f64);
+        let h = half_vector((i as f64 + x) / THETA_STEPS as f64, phi);
         reflect(self.w_o, h)
     }
 
@@ -287,17 +335,17 @@ mod tests {
     #[test]
     fn lobes_are_the_slice_without_its_base() {
         let plastic = test_materials::glossy_plastic();
-        let slice = Slice::new(&plastic, 45f64.to_radians());
+        let [slice, lobes] = Slice::with_lobes(&plastic, 45f64.to_radians());
         let mirror = dvec3(-1.0, 0.0, 1.0).normalize();
         let near = |slice: &Slice| {
             let count = 1000;
             slice.points(count).filter(|w_i| w_i.angle_between(mirror) < 0.3).count() as f64 / count as f64
         };
-        let [of_all, of_lobes] = [near(&slice), near(&slice.lobes())];
+        let [of_all, of_lobes] = [near(&slice), near(&lobes)];
         assert!(of_all < 0.3 && of_lobes > 2.0 * of_all, "{of_all} {of_lobes}");
         // Nothing stands out of Lambert: anywhere will do.
         let lambert = Brdf::from_parameters("lambert", toml::toml! { reflectance = 0.5 }).unwrap();
-        let lobes = Slice::new(&lambert, 0.5).lobes();
+        let [_, lobes] = Slice::with_lobes(&lambert, 0.5);
         assert!(lobes.albedo() == DVec3::ZERO && lobes.direction(DVec2::splat(0.5)).z > 0.0);
     }
 

@@ -5,15 +5,14 @@ use super::kernel::{FINEST_WIDTH_RAD, SHARPEST_LEVEL, WIDEST_LEVEL};
 use super::solve::Kernel;
 use crate::threads::slice::Slice;
 
-/// Kernels at the centroids of `count` cells of the lobes of `slice`, as wide as their second moments say, with the mass of the cell.
+/// Kernels at the centroids of `count` cells of `lobes`, as wide as their second moments say, with the mass of the cell.
 /// What lobes stand on is left to the cosine kernel: started there, most kernels stay there, and a few cannot make out a lobe's core.
 ///
 /// Lloyd's relaxation (1982) of points of equal mass.
-pub fn cells(slice: &Slice, count: usize) -> Vec<Kernel> {
+pub fn cells(lobes: &Slice, count: usize) -> Vec<Kernel> {
     const POINTS_A_CELL: usize = 60;
     const ROUNDS: usize = 20;
     let total = (count * POINTS_A_CELL).max(600);
-    let lobes = slice.lobes();
     let points: Vec<(DVec3, DVec3)> = lobes
         .points(total)
         .map(|w| (w, lobes.f_cos(w) / (lobes.pdf(w).max(f64::MIN_POSITIVE) * total as f64)))

@@ -16,7 +16,7 @@ use crate::threads::{ThreadSettings, theta_o};
 
 /// Steps of the first row, which starts from cells, and of the others.
 const FIRST: Effort = Effort { steps: 300, least_gain: 1e-5 };
-const NEXT: Effort = Effort { steps: 40, least_gain: 3e-4 };
+const NEXT: Effort = Effort { steps: 40, least_gain: 3e-3 };
 
 /// All rows have the same lights where these are not placed by the slice: threads follow the BRDF, not the lights.
 const LIGHTS_SEED: usize = 0;
@@ -25,9 +25,10 @@ const LIGHTS_SEED: usize = 0;
 /// rows, threads turn from row to row by 2 to 4 times less than without, for errors up to a third larger.
 const TIED: f64 = 1e-6;
 
-/// Test lights of a row: so many for each unknown of a channel, and at least so many.
-const LIGHTS_A_THREAD: usize = 12;
-const FEWEST_LIGHTS: usize = 1200;
+/// Test lights of a row: so many, and so many more for each thread. Of too few, many threads answer each alone and err between them: with
+/// 64 threads 1536 lights leave a tenth less error than 1200.
+const FEWEST_LIGHTS: usize = 1000;
+const LIGHTS_A_THREAD: usize = 8;
 
 /// Kernels narrower than this, in radians, stay where a facet mirrors the view to; wider ones stay where they are.
 const FOLLOWS_BELOW_RAD: f64 = 0.15;
@@ -47,20 +48,23 @@ pub fn generate(brdf: &Brdf, settings: &ThreadSettings, observer: &dyn Observer)
         if observer.cancelled() {
             return Err(Error::Cancelled);
         }
-        let slice = Slice::new(brdf, theta_o(row, rows));
-        let lights = TestLights::new(&slice, (LIGHTS_A_THREAD * settings.count).max(FEWEST_LIGHTS), LIGHTS_SEED);
+        let slices = Slice::with_lobes(brdf, theta_o(row, rows));
+        let [slice, lobes] = &slices;
+        let lights = TestLights::new(&slices, FEWEST_LIGHTS + LIGHTS_A_THREAD * settings.count, LIGHTS_SEED);
         if observer.cancelled() {
             return Err(Error::Cancelled);
         }
-        let (mut kernels, effort) = match from {
+        let (start, effort) = match from {
             Some((before, kernels)) => (carried(kernels, theta_o(before, rows), theta_o(row, rows)), NEXT),
-            None => (cells(&slice, settings.count), FIRST),
+            None => (cells(lobes, settings.count), FIRST),
         };
-        let start = kernels.clone();
-        let fit = Fit::new(&lights, slice.albedo());
+        let start = scaled(&start, 1.0 / lights.unit);
+        let mut kernels = start.clone();
+        let fit = Fit::new(&lights, slice.albedo() / lights.unit);
         let fit = if from.is_some() { fit.tied(&start, TIED) } else { fit };
         fit.solve(&mut kernels, effort, observer)?;
         let error = fit.relative_error(&kernels);
+        let kernels = scaled(&kernels, lights.unit);
         observer.progress(done.fetch_add(1, Ordering::Relaxed) + 1, rows);
         Ok((kernels, slice.albedo(), error))
     };
@@ -83,6 +87,11 @@ pub fn generate(brdf: &Brdf, settings: &ThreadSettings, observer: &dyn Observer)
     all.push(first);
     all.extend(up?);
     Ok(FittedTable::pack(&all))
+}
+
+/// The same with `scale` times the weights.
+fn scaled(kernels: &[Kernel], scale: f64) -> Vec<Kernel> {
+    kernels.iter().map(|kernel| Kernel { weight: scale * kernel.weight, ..*kernel }).collect()
 }
 
 /// Kernels of the row for view angle `from` as a start for that of `to`.

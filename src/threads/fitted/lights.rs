@@ -1,9 +1,11 @@
 //! The lights that a fit is tested with, and how a slice answers them.
 use std::f64::consts::{FRAC_1_PI, PI, TAU};
+use std::ops::Range;
 use std::sync::OnceLock;
 
-use glam::{DVec3, dvec3};
+use glam::{DVec2, DVec3, Vec3, dvec2, dvec3};
 
+use super::answers::exp;
 use super::kernel::{vmf_direction, vmf_peak};
 use crate::brdf::luminance;
 use crate::threads::slice::{Slice, fibonacci_lattice};
@@ -22,14 +24,8 @@ const WIDTH_EXPONENT: f64 = 0.8;
 /// lobes a bright lamp is all that there is.
 const DIM_RESPONSE: f64 = 0.1;
 
-/// A light: radiance vMF(w; direction, kappa), so of unit power.
-#[derive(Clone, Copy, Debug)]
-pub struct Light {
-    /// Where it is, unit, in the shading frame.
-    pub direction: DVec3,
-    /// Which of the widths it has, 0 to [`SCALES`] - 1: see [`light_kappa`].
-    pub scale: usize,
-}
+/// Lights of a scale are a multiple of this, so that loops over them are made of whole vectors.
+pub const LANES: usize = 16;
 
 /// kappa of the lights of a scale.
 pub fn light_kappa(scale: usize) -> f64 {
@@ -40,111 +36,180 @@ fn light_width(scale: usize) -> f64 {
     NARROWEST_RAD * (WIDEST_RAD / NARROWEST_RAD).powf(scale as f64 / (SCALES - 1) as f64)
 }
 
-/// Lights, how strongly each counts, and what a slice makes of them.
+/// Lights, how strongly each counts, and what a slice makes of them. A light has radiance vMF(w; direction, kappa), so unit power.
+/// Arrays have an element a light, those of the first scale first; answers are times the weight.
 pub struct TestLights {
-    /// The lights.
-    pub lights: Vec<Light>,
+    /// Radiance that responses, and the weights of kernels that are fitted to them, are measured in: the mean of what the slice reflects,
+    /// so that single precision holds the darkest material as well as any.
+    pub unit: f64,
+    /// Unit directions in the shading frame: x, y, z.
+    pub direction: [Vec<f32>; 3],
     /// Factor on the residual of each.
-    pub weight: Vec<f64>,
+    pub weight: Vec<f32>,
     /// Irradiance over pi of each.
-    pub cosine: Vec<f64>,
-    /// The slice's answer to each: radiance per channel.
-    pub response: Vec<DVec3>,
+    pub cosine: Vec<f32>,
+    /// The slice's answer to each: radiance in units, red, green, blue.
+    pub response: [Vec<f32>; 3],
 }
 
 /// Points by which a slice is integrated over wide lights, and over each light.
 const SLICE_POINTS: usize = 1500;
-const LIGHT_POINTS: usize = 48;
+const LIGHT_POINTS: usize = 16;
 
 impl TestLights {
-    /// About `count` lights, half where `slice` has its lobes and half anywhere. `seed` turns them.
-    pub fn new(slice: &Slice, count: usize, seed: usize) -> Self {
-        let per_scale = count / SCALES / 2;
-        let lobes = slice.lobes();
-        let mut lights = Vec::with_capacity(count);
+    /// About `count` lights, half in the `lobes` of `slice` and half anywhere. `seed` turns them.
+    pub fn new([slice, lobes]: &[Slice; 2], count: usize, seed: usize) -> Self {
+        let per_scale = (count / SCALES / 2).next_multiple_of(LANES / 2);
+        let mut directions = Vec::with_capacity(count);
         for scale in 0..SCALES {
             // Sets of different scales, rows and seeds must not line up.
             let shift = |x: f64, by: usize| (x + 0.381_966 * by as f64).fract();
             let turn = scale + SCALES * seed;
-            for uv in fibonacci_lattice(per_scale) {
-                let near = lobes.direction(glam::dvec2(shift(uv.x, 3 * turn + 1), shift(uv.y, turn)));
-                lights.push(Light { direction: near, scale });
-            }
-            for uv in fibonacci_lattice(per_scale) {
+            let near = |uv: DVec2| lobes.direction(dvec2(shift(uv.x, 3 * turn + 1), shift(uv.y, turn)));
+            let anywhere = |uv: DVec2| {
                 let z = 1.0 - 2.0 * shift(uv.x, 3 * turn + 2);
-                let (sin, phi) = ((1.0 - z * z).sqrt(), TAU * shift(uv.y, turn));
-                lights.push(Light { direction: dvec3(sin * phi.cos(), sin * phi.sin(), z), scale });
-            }
+                let sin = (1.0 - z * z).sqrt();
+                (DVec2::from_angle(TAU * shift(uv.y, turn)) * sin).extend(z)
+            };
+            directions.extend(fibonacci_lattice(per_scale).map(near));
+            directions.extend(fibonacci_lattice(per_scale).map(anywhere));
         }
-        let points = SlicePoints::new(slice);
-        let response: Vec<_> = lights.iter().map(|light| points.response(slice, light)).collect();
-        let cosine: Vec<_> = lights.iter().map(cosine_response).collect();
-        // Where nothing is reflected any weight will do.
+        let part = |f: fn(&DVec3) -> f64| directions.iter().map(|d| f(d) as f32).collect::<Vec<_>>();
+        let direction = [part(|d| d.x), part(|d| d.y), part(|d| d.z)];
+        let response = responses(slice, &directions, &direction);
+
+        // Where nothing is reflected any unit will do.
         let albedo = luminance(slice.albedo());
-        let typical = if albedo > 0.0 { albedo } else { 1.0 } / (2.0 * PI);
-        let weight = lights
-            .iter()
-            .zip(&response)
-            .map(|(light, response)| {
-                let relative = luminance(*response) / typical;
-                light_width(light.scale).powf(WIDTH_EXPONENT) / (typical * (relative + DIM_RESPONSE))
-            })
-            .collect();
-        Self { lights, weight, cosine, response }
-    }
-}
-
-/// Points of equal mass of a slice.
-struct SlicePoints {
-    /// Direction, and f cos over the density of points.
-    points: Vec<(DVec3, DVec3, f64)>,
-}
-
-impl SlicePoints {
-    fn new(slice: &Slice) -> Self {
-        let points = slice.points(SLICE_POINTS).map(|w| {
-            let f_cos = slice.f_cos(w);
-            (w, f_cos, SLICE_POINTS as f64 * slice.pdf(w))
+        let unit = if albedo > 0.0 { albedo } else { 1.0 } / (2.0 * PI);
+        let scale_of = |j: usize| j / (2 * per_scale);
+        let weights = response.iter().enumerate().map(|(j, response)| {
+            light_width(scale_of(j)).powf(WIDTH_EXPONENT) / (luminance(*response) / unit + DIM_RESPONSE)
         });
-        Self { points: points.collect() }
+        let weights: Vec<f64> = weights.collect();
+        let weighted =
+            |value: &dyn Fn(usize) -> f64| (0..weights.len()).map(|j| (weights[j] * value(j)) as f32).collect();
+        Self {
+            unit,
+            direction,
+            weight: weighted(&|_| 1.0),
+            cosine: weighted(&|j| cosine_response(directions[j].z, scale_of(j))),
+            response: std::array::from_fn(|c| weighted(&|j| response[j][c] / unit)),
+        }
     }
 
-    /// The integral of f cos over a light: both sets of points with the balance heuristic.
-    fn response(&self, slice: &Slice, light: &Light) -> DVec3 {
-        let kappa = light_kappa(light.scale);
-        let peak = vmf_peak(kappa);
-        let mut sum = DVec3::ZERO;
-        for &(w, f_cos, density) in &self.points {
-            let exponent = kappa * (w.dot(light.direction) - 1.0);
-            if exponent > -30.0 {
-                let radiance = peak * exponent.exp();
-                sum += f_cos * radiance / (density + LIGHT_POINTS as f64 * radiance);
-            }
-        }
-        for uv in fibonacci_lattice(LIGHT_POINTS) {
-            let w = vmf_direction(light.direction, kappa, uv.x, TAU * uv.y);
-            if w.z > 0.0 {
-                let radiance = peak * (kappa * (w.dot(light.direction) - 1.0)).exp();
-                let f_cos = slice.f_cos(w);
-                let density = SLICE_POINTS as f64 * slice.pdf_of(f_cos, w);
-                sum += f_cos * radiance / (density + LIGHT_POINTS as f64 * radiance);
-            }
-        }
-        sum
+    /// How many there are.
+    pub fn count(&self) -> usize {
+        self.weight.len()
+    }
+
+    /// Those of one scale.
+    pub fn of_scale(&self, scale: usize) -> Range<usize> {
+        let each = self.count() / SCALES;
+        each * scale..each * (scale + 1)
     }
 }
 
-/// The integral of max(cos, 0) / pi over a light.
-fn cosine_response(light: &Light) -> f64 {
+/// The integral of f cos over each light at `directions`, whose parts are `parts`: points of equal mass of the slice and points of
+/// each light, with the balance heuristic.
+fn responses(slice: &Slice, directions: &[DVec3], parts: &[Vec<f32>; 3]) -> Vec<DVec3> {
+    let each = directions.len() / SCALES;
+    let mut sums = of_slice_points(slice, parts, each);
+    for scale in 0..SCALES {
+        let kappa = light_kappa(scale);
+        let peak = vmf_peak(kappa);
+        let offsets: Vec<DVec3> =
+            fibonacci_lattice(LIGHT_POINTS).map(|uv| vmf_direction(DVec3::Z, kappa, uv.x, TAU * uv.y)).collect();
+        for j in each * scale..each * (scale + 1) {
+            let (x, y) = directions[j].any_orthonormal_pair();
+            let points =
+                offsets.iter().map(|offset| (offset.x * x + offset.y * y + offset.z * directions[j], offset.z));
+            let (w, cos): (Vec<_>, Vec<_>) = points.filter(|(w, _)| w.z > 0.0).unzip();
+            for ((f_cos, w), cos) in slice.f_cos_all(&w).into_iter().zip(&w).zip(cos) {
+                let radiance = peak * (kappa * (cos - 1.0)).exp();
+                let density = SLICE_POINTS as f64 * slice.pdf_of(f_cos, *w);
+                sums[j] += f_cos * radiance / (density + LIGHT_POINTS as f64 * radiance);
+            }
+        }
+    }
+    sums
+}
+
+/// The part of the slice's points in that, for `each` lights a scale.
+fn of_slice_points(slice: &Slice, parts: &[Vec<f32>; 3], each: usize) -> Vec<DVec3> {
+    // Those below the horizon, by rounding, reflect nothing.
+    let directions: Vec<_> = slice.points(SLICE_POINTS).filter(|w| w.z > 0.0).collect();
+    let point = |(w, f_cos): (&DVec3, DVec3)| SlicePoint {
+        direction: w.as_vec3(),
+        f_cos: f_cos.as_vec3(),
+        density: (SLICE_POINTS as f64 * slice.pdf_of(f_cos, *w)) as f32,
+    };
+    let points: Vec<_> = directions.iter().zip(slice.f_cos_all(&directions)).map(point).collect();
+    let mut sums: [Vec<f32>; 3] = std::array::from_fn(|_| vec![0.0; SCALES * each]);
+    for scale in 0..SCALES {
+        let of_scale = each * scale..each * (scale + 1);
+        pulp::Arch::new().dispatch(Summing {
+            points: &points,
+            lights: parts.each_ref().map(|part| &part[of_scale.clone()]),
+            kappa: light_kappa(scale),
+            sums: sums.each_mut().map(|sums| &mut sums[of_scale.clone()]),
+        });
+    }
+    let [red, green, blue] = &sums;
+    (0..red.len()).map(|j| DVec3::new(red[j].into(), green[j].into(), blue[j].into())).collect()
+}
+
+/// A direction, f cos there, and the density of such points.
+struct SlicePoint {
+    direction: Vec3,
+    f_cos: Vec3,
+    density: f32,
+}
+
+/// A call of what adds up the slice's points over lights of one kappa, compiled for the vector instructions that are there.
+struct Summing<'a> {
+    points: &'a [SlicePoint],
+    lights: [&'a [f32]; 3],
+    kappa: f64,
+    sums: [&'a mut [f32]; 3],
+}
+
+impl pulp::NullaryFnOnce for Summing<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let (kappa, peak) = (self.kappa as f32, vmf_peak(self.kappa) as f32);
+        let [xs, ys, zs] = self.lights.map(|part| part.as_chunks::<LANES>().0);
+        let [reds, greens, blues] = self.sums.map(|sums| sums.as_chunks_mut::<LANES>().0);
+        let lights = xs.iter().zip(ys).zip(zs);
+        for (((xs, ys), zs), ((reds, greens), blues)) in lights.zip(reds.iter_mut().zip(greens).zip(blues)) {
+            let [mut red, mut green, mut blue] = [[0.0; LANES]; 3];
+            for &SlicePoint { direction, f_cos, density } in self.points {
+                for j in 0..LANES {
+                    let [x, y, z] = [direction.x - xs[j], direction.y - ys[j], direction.z - zs[j]];
+                    let radiance = peak * exp(-0.5 * kappa * (x * x + y * y + z * z));
+                    let share = radiance / (density + LIGHT_POINTS as f32 * radiance);
+                    red[j] += f_cos.x * share;
+                    green[j] += f_cos.y * share;
+                    blue[j] += f_cos.z * share;
+                }
+            }
+            (*reds, *greens, *blues) = (red, green, blue);
+        }
+    }
+}
+
+/// The integral of max(cos, 0) / pi over a light of `scale` at this z.
+fn cosine_response(z: f64, scale: usize) -> f64 {
     const STEPS: usize = 512;
     static TABLES: OnceLock<Vec<Vec<f64>>> = OnceLock::new();
     let tables = TABLES.get_or_init(|| {
         let table = |scale| (0..=STEPS).map(|i| cosine_integral(2.0 * i as f64 / STEPS as f64 - 1.0, scale)).collect();
         (0..SCALES).map(table).collect()
     });
-    let at = (0.5 * (light.direction.z + 1.0)).clamp(0.0, 1.0) * STEPS as f64;
+    let at = (0.5 * (z + 1.0)).clamp(0.0, 1.0) * STEPS as f64;
     let below = (at as usize).min(STEPS - 1);
-    let table = &tables[light.scale];
+    let table = &tables[scale];
     table[below] + (table[below + 1] - table[below]) * (at - below as f64)
 }
 

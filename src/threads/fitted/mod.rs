@@ -5,9 +5,11 @@
 //! | kernels, and how they overlap lights | [`kernel`] |
 //! | the lights that they are fitted to | [`lights`] |
 //! | where the fit of the first row starts | [`cells`] |
+//! | how kernels answer them | [`answers`] |
 //! | the fit of one row | [`solve`] |
 //! | of all rows | [`generate()`] |
 //! | as stored and looked up, 12 bytes a thread and row | [`FittedTable`] |
+pub mod answers;
 pub mod cells;
 mod generate;
 pub mod kernel;

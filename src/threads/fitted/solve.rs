@@ -1,9 +1,12 @@
 //! The fit of one row: kernels and weights that answer test lights as the slice does, by Levenberg and Marquardt's method.
+use faer::linalg::matmul::triangular::{BlockStructure, matmul};
+use faer::linalg::solvers::{Llt, Solve};
+use faer::{Accum, Mat, MatRef, Par, Side};
 use glam::{DVec3, dvec3};
-use nalgebra::{Cholesky, DMatrix, DVector};
 
-use super::kernel::{Pair, SHARPEST_LEVEL, WIDEST_LEVEL, kappa_of_level, overlap, scale_rad};
-use super::lights::{Light, SCALES, TestLights, light_kappa};
+use super::answers::Answers;
+use super::kernel::{SHARPEST_LEVEL, WIDEST_LEVEL, scale_rad};
+use super::lights::TestLights;
 use crate::error::{Error, Result};
 use crate::progress::Observer;
 
@@ -23,38 +26,6 @@ pub fn cosine_part(kernels: &[Kernel], albedo: DVec3) -> DVec3 {
     albedo - kernels.iter().map(|kernel| kernel.weight).sum::<DVec3>()
 }
 
-/// Kernels of whole levels against lights of all scales.
-fn pairs() -> &'static [[Pair; SCALES]] {
-    static PAIRS: std::sync::OnceLock<Vec<[Pair; SCALES]>> = std::sync::OnceLock::new();
-    PAIRS.get_or_init(|| {
-        let levels = SHARPEST_LEVEL as i32..=WIDEST_LEVEL as i32;
-        levels
-            .map(|level| std::array::from_fn(|scale| Pair::new(kappa_of_level(level.into()), light_kappa(scale))))
-            .collect()
-    })
-}
-
-/// How a kernel of weight 1 answers a light, and the derivatives by the cosine between them and by the level: below it and above it,
-/// which differ at whole levels.
-#[derive(Clone, Copy)]
-struct Answer {
-    value: f64,
-    by_cos: f64,
-    by_level: [f64; 2],
-}
-
-fn answer(kernel: &Kernel, light: &Light) -> Answer {
-    let from_sharpest = kernel.level - SHARPEST_LEVEL;
-    let pairs = pairs();
-    let finer = (from_sharpest as usize).min(pairs.len() - 2);
-    let t = from_sharpest - finer as f64;
-    let cos = kernel.direction.dot(light.direction);
-    let (a, a_cos) = overlap(cos, &pairs[finer][light.scale]);
-    let (b, b_cos) = overlap(cos, &pairs[finer + 1][light.scale]);
-    let below = if t > 0.0 || finer == 0 { b - a } else { a - overlap(cos, &pairs[finer - 1][light.scale]).0 };
-    Answer { value: a + t * (b - a), by_cos: a_cos + t * (b_cos - a_cos), by_level: [below, b - a] }
-}
-
 /// Iterations and when to stop.
 #[derive(Clone, Copy, Debug)]
 pub struct Effort {
@@ -63,6 +34,9 @@ pub struct Effort {
     /// Ends when a step lowers the error by less than this part of it.
     pub least_gain: f64,
 }
+
+/// Less would be lost in the rounding of the products.
+const LEAST_DAMPING: f32 = 1e-6;
 
 /// The state of a fit.
 pub struct Fit<'a> {
@@ -73,7 +47,7 @@ pub struct Fit<'a> {
 }
 
 impl<'a> Fit<'a> {
-    /// Of the slice with this albedo, which answers `lights` as they say.
+    /// Of the slice with this albedo, which answers `lights` as they say; the albedo and all weights in units of `lights`.
     pub fn new(lights: &'a TestLights, albedo: DVec3) -> Self {
         Self { lights, albedo, prior: None }
     }
@@ -85,31 +59,28 @@ impl<'a> Fit<'a> {
     }
 
     fn squared_responses(&self) -> f64 {
-        let TestLights { weight, response, .. } = self.lights;
-        weight.iter().zip(response).map(|(weight, response)| (*weight * *response).length_squared()).sum()
+        squares(&self.lights.response)
     }
 
     /// The square root of the sum over lights and channels of squared weighted residuals, over that of squared weighted responses.
     pub fn relative_error(&self, kernels: &[Kernel]) -> f64 {
-        let residuals = self.residuals(kernels, &self.answers(kernels));
-        let total = self.squared_responses();
-        (residuals.iter().map(|r| r.length_squared()).sum::<f64>() / total.max(f64::MIN_POSITIVE)).sqrt()
+        let residuals = self.residuals(kernels, &Answers::new(kernels, self.lights));
+        (squares(&residuals) / self.squared_responses().max(f64::MIN_POSITIVE)).sqrt()
     }
 
-    /// Of each kernel to each light; all lights of the first kernel first.
-    fn answers(&self, kernels: &[Kernel]) -> Vec<Answer> {
-        kernels.iter().flat_map(|kernel| self.lights.lights.iter().map(|light| answer(kernel, light))).collect()
-    }
-
-    fn residuals(&self, kernels: &[Kernel], answers: &[Answer]) -> Vec<DVec3> {
-        let cosine = cosine_part(kernels, self.albedo);
-        let TestLights { lights, weight, cosine: cosine_answer, response } = self.lights;
-        let mut sums: Vec<_> = response.iter().zip(cosine_answer).map(|(r, answer)| cosine * *answer - *r).collect();
-        for (kernel, answers) in kernels.iter().zip(answers.chunks(lights.len())) {
-            sums.iter_mut().zip(answers).for_each(|(sum, answer)| *sum += kernel.weight * answer.value);
-        }
-        sums.iter_mut().zip(weight).for_each(|(sum, weight)| *sum *= *weight);
-        sums
+    /// Weighted: red, green, blue.
+    fn residuals(&self, kernels: &[Kernel], answers: &Answers) -> [Vec<f32>; 3] {
+        let cosine_part = cosine_part(kernels, self.albedo);
+        let TestLights { cosine, response, .. } = self.lights;
+        std::array::from_fn(|c| {
+            let part = cosine_part[c] as f32;
+            let mut sums: Vec<f32> = response[c].iter().zip(cosine).map(|(r, cosine)| part * cosine - r).collect();
+            for (kernel, answers) in kernels.iter().zip(answers.value.chunks(cosine.len())) {
+                let weight = kernel.weight[c] as f32;
+                sums.iter_mut().zip(answers).for_each(|(sum, answer)| *sum += weight * answer);
+            }
+            sums
+        })
     }
 
     fn prior_cost(&self, kernels: &[Kernel]) -> f64 {
@@ -124,12 +95,14 @@ impl<'a> Fit<'a> {
     /// The levels that each kernel may go to in one step, from and to. The cost has a kink at each whole level: a step ends there, and
     /// stays there where the cost rises both ways. Otherwise derivatives would be those of the wrong side, and one kernel at
     /// a kink would keep all from moving.
-    fn level_bounds(&self, kernels: &[Kernel], answers: &[Answer], residuals: &[DVec3]) -> Vec<[f64; 2]> {
-        let weight = &self.lights.weight;
+    fn level_bounds(&self, kernels: &[Kernel], answers: &Answers, residuals: &[Vec<f32>; 3]) -> Vec<[f64; 2]> {
         let slope = |k: usize, side: usize| -> f64 {
-            let answers = answers[k * weight.len()..].iter();
-            let terms = residuals.iter().zip(weight).zip(answers);
-            terms.map(|((r, weight), answer)| r.dot(kernels[k].weight) * weight * answer.by_level[side]).sum::<f64>()
+            let answers = &answers.by_level[side][k * self.lights.count()..];
+            let channels = (0..3).map(|c| {
+                let terms = residuals[c].iter().zip(answers);
+                kernels[k].weight[c] * terms.map(|(r, answer)| f64::from(r * answer)).sum::<f64>()
+            });
+            channels.sum::<f64>()
                 + self.prior.map_or(0.0, |(before, strength)| strength * (kernels[k].level - before[k].level))
         };
         let bounds = |k: usize| {
@@ -146,21 +119,33 @@ impl<'a> Fit<'a> {
     }
 
     /// The weighted design, a row a light: answers of each kernel less the cosine's, then their derivatives by two tangents and the level,
-    /// towards `levels`.
-    fn design(&self, kernels: &[Kernel], answers: &[Answer], levels: &[[f64; 2]]) -> DMatrix<f64> {
-        let m = kernels.len();
-        let TestLights { lights, weight, cosine, .. } = self.lights;
-        let mut columns = DMatrix::zeros(lights.len(), 4 * m);
-        for (k, (kernel, answers)) in kernels.iter().zip(answers.chunks(lights.len())).enumerate() {
-            let (x, y) = kernel.direction.any_orthonormal_pair();
-            let side = usize::from(levels[k][1] > kernel.level);
-            for (j, (light, &Answer { value, by_cos, by_level })) in lights.iter().zip(answers).enumerate() {
-                columns[(j, k)] = weight[j] * (value - cosine[j]);
-                columns[(j, m + 3 * k)] = weight[j] * by_cos * x.dot(light.direction);
-                columns[(j, m + 3 * k + 1)] = weight[j] * by_cos * y.dot(light.direction);
-                columns[(j, m + 3 * k + 2)] = weight[j] * by_level[side];
-            }
+    /// towards `levels`; last the residuals of the three channels.
+    fn design(
+        &self,
+        kernels: &[Kernel],
+        answers: &Answers,
+        levels: &[[f64; 2]],
+        residuals: &[Vec<f32>; 3],
+    ) -> Vec<f32> {
+        let TestLights { direction: [lights_x, lights_y, lights_z], cosine, .. } = self.lights;
+        let count = self.lights.count();
+        let mut columns = Vec::with_capacity(count * (4 * kernels.len() + 3));
+        for answers in answers.value.chunks(count) {
+            columns.extend(answers.iter().zip(cosine).map(|(answer, cosine)| answer - cosine));
         }
+        for (k, kernel) in kernels.iter().enumerate() {
+            let of_kernel = k * count..(k + 1) * count;
+            let (x, y) = kernel.direction.any_orthonormal_pair();
+            for tangent in [x.as_vec3(), y.as_vec3()] {
+                let by_cos = &answers.by_cos[of_kernel.clone()];
+                columns.extend((0..count).map(|j| {
+                    by_cos[j] * (tangent.x * lights_x[j] + tangent.y * lights_y[j] + tangent.z * lights_z[j])
+                }));
+            }
+            let side = usize::from(levels[k][1] > kernel.level);
+            columns.extend_from_slice(&answers.by_level[side][of_kernel]);
+        }
+        residuals.iter().for_each(|residuals| columns.extend_from_slice(residuals));
         columns
     }
 
@@ -171,22 +156,13 @@ impl<'a> Fit<'a> {
     pub fn solve(&self, kernels: &mut Vec<Kernel>, effort: Effort, observer: &dyn Observer) -> Result<()> {
         let mut damping = 1e-3;
         let mut tried = 0;
-        let squares = |r: &[DVec3]| r.iter().map(|r| r.length_squared()).sum::<f64>();
-        let mut answers = self.answers(kernels);
+        let mut answers = Answers::new(kernels, self.lights);
         let mut residuals = self.residuals(kernels, &answers);
         let mut cost = squares(&residuals) + self.prior_cost(kernels);
         while tried < effort.steps {
             let levels = self.level_bounds(kernels, &answers, &residuals);
-            let design = self.design(kernels, &answers, &levels);
-            if observer.cancelled() {
-                return Err(Error::Cancelled);
-            }
-            let gram = design.transpose() * &design;
-            let right: [DVector<f64>; 3] = std::array::from_fn(|c| {
-                let r = DVector::from_iterator(residuals.len(), residuals.iter().map(|r| r[c]));
-                design.tr_mul(&r)
-            });
-            let (hessian, gradient) = self.normal_equations(kernels, &gram, &right);
+            let products = products(&self.design(kernels, &answers, &levels, &residuals), self.lights.count());
+            let (hessian, gradient) = self.normal_equations(kernels, &products);
             let before = cost;
             loop {
                 if observer.cancelled() {
@@ -194,12 +170,12 @@ impl<'a> Fit<'a> {
                 }
                 tried += 1;
                 let next = step(kernels, &levels, &hessian, &gradient, damping);
-                let next_answers = self.answers(&next);
+                let next_answers = Answers::new(&next, self.lights);
                 let next_residuals = self.residuals(&next, &next_answers);
                 let next_cost = squares(&next_residuals) + self.prior_cost(&next);
                 if next_cost < cost {
                     (*kernels, answers, residuals, cost) = (next, next_answers, next_residuals, next_cost);
-                    damping = (damping * 0.2).max(1e-9);
+                    damping = (damping * 0.2).max(LEAST_DAMPING);
                     break;
                 }
                 damping *= 5.0;
@@ -214,37 +190,36 @@ impl<'a> Fit<'a> {
         Ok(())
     }
 
-    /// Gauss and Newton's matrix and the gradient. Unknowns: red, green and blue weights of all kernels, then two tangents and the
-    /// level of each kernel.
-    fn normal_equations(
-        &self,
-        kernels: &[Kernel],
-        gram: &DMatrix<f64>,
-        right: &[DVector<f64>; 3],
-    ) -> (DMatrix<f64>, DVector<f64>) {
+    /// The lower half of Gauss and Newton's matrix, and the gradient. Unknowns: red, green and blue weights of all kernels, then two
+    /// tangents and the level of each kernel. `products` are those of the columns of [`Fit::design`]: its lower half.
+    fn normal_equations(&self, kernels: &[Kernel], products: &Mat<f32>) -> (Mat<f32>, Vec<f32>) {
         let m = kernels.len();
-        let mut hessian = DMatrix::zeros(6 * m, 6 * m);
-        let mut gradient = DVector::zeros(6 * m);
+        let weights: Vec<_> = kernels.iter().map(|kernel| kernel.weight.as_vec3()).collect();
+        let mut hessian = Mat::zeros(6 * m, 6 * m);
+        let mut gradient = vec![0.0; 6 * m];
         for c in 0..3 {
+            let of_residuals = 4 * m + c;
             for l in 0..m {
-                for k in 0..m {
-                    hessian[(c * m + k, c * m + l)] = gram[(k, l)];
+                let products = products.col_as_slice(l);
+                let column = hessian.col_as_slice_mut(c * m + l);
+                column[c * m + l..(c + 1) * m].copy_from_slice(&products[l..m]);
+                for (k, (column, products)) in
+                    column[3 * m..].chunks_exact_mut(3).zip(products[m..4 * m].chunks_exact(3)).enumerate()
+                {
+                    (0..3).for_each(|i| column[i] = weights[k][c] * products[i]);
                 }
-                for p in 0..3 * m {
-                    let value = kernels[p / 3].weight[c] * gram[(m + p, l)];
-                    hessian[(3 * m + p, c * m + l)] = value;
-                    hessian[(c * m + l, 3 * m + p)] = value;
-                }
-                gradient[c * m + l] = right[c][l];
+                gradient[c * m + l] = products[of_residuals];
             }
             for p in 0..3 * m {
-                gradient[3 * m + p] += kernels[p / 3].weight[c] * right[c][m + p];
+                gradient[3 * m + p] += weights[p / 3][c] * products[(of_residuals, m + p)];
             }
         }
         for q in 0..3 * m {
-            for p in 0..3 * m {
-                hessian[(3 * m + p, 3 * m + q)] =
-                    kernels[p / 3].weight.dot(kernels[q / 3].weight) * gram[(m + p, m + q)];
+            let products = &products.col_as_slice(m + q)[m..4 * m];
+            let column = &mut hessian.col_as_slice_mut(3 * m + q)[3 * m..];
+            for k in q / 3..m {
+                let scale = weights[k].dot(weights[q / 3]);
+                (3 * k..3 * k + 3).for_each(|p| column[p] = scale * products[p]);
             }
         }
         if let Some((before, strength)) = self.prior {
@@ -252,16 +227,14 @@ impl<'a> Fit<'a> {
                 let (x, y) = kernel.direction.any_orthonormal_pair();
                 let away = kernel.direction - before.direction;
                 let scale = strength / scale_rad(before.level).powi(2);
-                for (p, (gradient_part, scale)) in [
+                let terms = [
                     (x.dot(away) * scale, scale),
                     (y.dot(away) * scale, scale),
                     ((kernel.level - before.level) * strength, strength),
-                ]
-                .into_iter()
-                .enumerate()
-                {
-                    gradient[3 * m + 3 * k + p] += gradient_part;
-                    hessian[(3 * m + 3 * k + p, 3 * m + 3 * k + p)] += scale;
+                ];
+                for (p, (slope, curvature)) in (3 * m + 3 * k..).zip(terms) {
+                    gradient[p] += slope as f32;
+                    hessian[(p, p)] += curvature as f32;
                 }
             }
         }
@@ -269,18 +242,26 @@ impl<'a> Fit<'a> {
     }
 }
 
+fn squares(channels: &[Vec<f32>; 3]) -> f64 {
+    channels.iter().flatten().map(|&value| f64::from(value).powi(2)).sum()
+}
+
+/// The products of all pairs of columns of `length`: the lower half.
+fn products(columns: &[f32], length: usize) -> Mat<f32> {
+    let columns = MatRef::from_column_major_slice(columns, length, columns.len() / length);
+    let mut products = Mat::zeros(columns.ncols(), columns.ncols());
+    let whole = BlockStructure::Rectangular;
+    let lower = BlockStructure::TriangularLower;
+    matmul(&mut products, lower, Accum::Replace, columns.transpose(), whole, columns, whole, 1.0, Par::Seq);
+    products
+}
+
 /// The step of damped normal equations, within bounds: a weight at zero that would fall stays there, and levels are bounded by `levels`.
-fn step(
-    kernels: &[Kernel],
-    levels: &[[f64; 2]],
-    hessian: &DMatrix<f64>,
-    gradient: &DVector<f64>,
-    damping: f64,
-) -> Vec<Kernel> {
+fn step(kernels: &[Kernel], levels: &[[f64; 2]], hessian: &Mat<f32>, gradient: &[f32], damping: f32) -> Vec<Kernel> {
     let m = kernels.len();
     let mut matrix = hessian.clone();
-    let mut right = -gradient;
-    let largest = (0..6 * m).map(|i| hessian[(i, i)]).fold(0.0, f64::max);
+    let mut right = Mat::from_fn(6 * m, 1, |i, _| -gradient[i]);
+    let largest = (0..6 * m).map(|i| hessian[(i, i)]).fold(0.0, f32::max);
     let frozen = |i: usize| {
         if i < 3 * m {
             kernels[i % m].weight[i / m] <= 0.0 && gradient[i] > 0.0
@@ -291,21 +272,20 @@ fn step(
     };
     let floor = |k: usize| {
         // Kernels without weight have no gradient in direction and level: they stay where they are.
-        1e-10 * largest / scale_rad(kernels[k].level).powi(2)
+        1e-10 * largest / (scale_rad(kernels[k].level) as f32).powi(2)
     };
     for i in 0..6 * m {
         matrix[(i, i)] += damping * hessian[(i, i)] + if i < 3 * m { 1e-12 * largest } else { floor((i - 3 * m) / 3) };
         if frozen(i) {
-            for j in 0..6 * m {
-                matrix[(i, j)] = 0.0;
-                matrix[(j, i)] = 0.0;
-            }
+            (0..i).for_each(|j| matrix[(i, j)] = 0.0);
+            matrix.col_as_slice_mut(i)[i..].fill(0.0);
             matrix[(i, i)] = 1.0;
-            right[i] = 0.0;
+            right[(i, 0)] = 0.0;
         }
     }
-    let Some(factor) = Cholesky::new(matrix) else { return kernels.to_vec() };
+    let Ok(factor) = Llt::new(matrix.as_ref(), Side::Lower) else { return kernels.to_vec() };
     let change = factor.solve(&right);
+    let change = |i: usize| f64::from(change[(i, 0)]);
     kernels
         .iter()
         .enumerate()
@@ -315,11 +295,11 @@ fn step(
             let width = scale_rad(kernel.level);
             // The model of a kernel's answer is linear over about its own width.
             let limit = |value: f64| value.clamp(-2.0 * width, 2.0 * width);
-            let tangent = limit(change[at]) * x + limit(change[at + 1]) * y;
-            let weight = dvec3(change[k], change[m + k], change[2 * m + k]);
+            let tangent = limit(change(at)) * x + limit(change(at + 1)) * y;
+            let weight = dvec3(change(k), change(m + k), change(2 * m + k));
             Kernel {
                 direction: (kernel.direction + tangent).normalize(),
-                level: (kernel.level + change[at + 2]).clamp(levels[k][0], levels[k][1]),
+                level: (kernel.level + change(at + 2)).clamp(levels[k][0], levels[k][1]),
                 weight: (kernel.weight + weight).max(DVec3::ZERO),
             }
         })

@@ -6,7 +6,7 @@ use glam::DVec3;
 use super::kernel::{SHARPEST_LEVEL, WIDEST_LEVEL, scale_rad};
 use super::solve::Kernel;
 use super::{FittedTable, MAX_COUNT, PackedKernel, generate};
-use crate::brdf::Brdf;
+use crate::brdf::{Brdf, CustomBrdf};
 use crate::error::Error;
 use crate::progress::Observer;
 use crate::threads::slice::{Slice, fibonacci_lattice};
@@ -137,6 +137,29 @@ fn materials_that_reflect_nothing_or_as_mirrors_have_finite_tables() {
     assert!(table.kernels.iter().all(|kernel| kernel.unpack().weight == glam::Vec3::ZERO));
     // 90 rows: the last is at 89 degrees, where the lobe is cut by the horizon.
     check("narrow", &generate(test_materials::narrow(), &small(2, 90), &()).unwrap());
+}
+
+#[test]
+fn a_fit_does_not_depend_on_how_dark_a_material_is() {
+    struct Gold(f64, Brdf);
+    impl CustomBrdf for Gold {
+        fn name(&self) -> &str {
+            "gold, darkened"
+        }
+        fn key(&self) -> Vec<u8> {
+            self.0.to_le_bytes().to_vec()
+        }
+        fn evaluate(&self, w_i: DVec3, w_o: DVec3) -> DVec3 {
+            self.0 * self.1.evaluate(w_i, w_o)
+        }
+    }
+    let times = |factor: f64| {
+        let brdf = Brdf::custom(Gold(factor, Brdf::builtin("gold").unwrap()));
+        generate(&brdf, &small(4, 3), &()).unwrap()
+    };
+    // Powers of two, so that nothing is rounded otherwise.
+    let [bright, dark] = [1.0, 2f64.powi(-100)].map(times);
+    assert_eq!(bright.relative_error, dark.relative_error);
 }
 
 #[test]
