@@ -118,3 +118,27 @@ fn a_report_is_one_page_that_needs_no_other_file() {
         assert!(!page.contains("href=") && !page.contains("<script") && !page.contains("NaN"), "the page needs others");
     }
 }
+
+#[test]
+fn fit_prints_time_beside_error_and_writes_json() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_threadlight"));
+    command.current_dir(&folder).args("bench fit --materials clay,gold --counts 1,4 --json fit.json".split(' '));
+    let output = command.output().unwrap();
+    let said = String::from_utf8(output.stdout).unwrap();
+    assert!(output.status.success(), "{said}");
+    for text in ["1 threads", "4 threads", "clay", "gold", "median", "worst", "others"] {
+        assert!(said.contains(text), "{said}");
+    }
+    let fits = json(&folder, "fit.json");
+    let fits = fits.as_array().unwrap();
+    assert_eq!(fits.len(), 4);
+    for fit in fits {
+        assert_eq!(keys(fit), ["fit_ms", "fitted_error", "material", "threads", "validation_error"]);
+        assert!(fit["fit_ms"].as_f64().unwrap() > 0.0);
+    }
+    // Four threads of gold answer other lights nearly as well as their own, and better than one.
+    let of_gold = |field: &str| [2, 3].map(|row: usize| fits[row][field].as_f64().unwrap());
+    let ([_, own], [one, four]) = (of_gold("fitted_error"), of_gold("validation_error"));
+    assert!(four < one && four < 2.0 * own, "{own} {one} {four}");
+}

@@ -9,6 +9,7 @@
 //! | what is measured: materials, environments, scenes, methods, counts | [`cases`] |
 //! | error and time of all of these: tables 2 to 4, figures 10 to 12 | [`sweep`] |
 //! | time of a frame beside its floor, and as things double: table 1 | [`speed`] |
+//! | what threads cost to make, beside what they are worth | [`fit`] |
 //! | pictures side by side: figures 10, 11 and 13 | [`gallery`] |
 //! | how it looks | [`tables`], [`plots`], [`sheet`] |
 //! | all of it on one page | [`report`](mod@report) |
@@ -16,6 +17,7 @@
 pub mod cases;
 pub mod difference;
 pub mod expected;
+pub mod fit;
 pub mod gallery;
 pub mod metrics;
 pub mod plots;

@@ -126,18 +126,11 @@ impl Threads {
     /// Where each thread looks for the view angle `theta_o` (radians), unit, in the shading frame, and which share of the light that is
     /// looked up it has: between rows as shading has them.
     pub fn seen_from(&self, theta_o: f64) -> Vec<(DVec3, f64)> {
-        let [rows, count] = self.size();
-        let position = (theta_o / FRAC_PI_2 * rows as f64).clamp(0.0, (rows - 1) as f64);
-        let (low, t) = (position as usize, position.fract());
-        let high = (low + 1).min(rows - 1);
+        let count = self.size()[1];
         match self {
             Self::Fitted(table) => {
-                let kernels = table.row(low).iter().zip(table.row(high)).map(|(a, b)| {
-                    let [a, b] = [a, b].map(|kernel| kernel.unpack());
-                    let direction = a.direction.as_dvec3().lerp(b.direction.as_dvec3(), t).normalize();
-                    (direction, luminance(a.weight.lerp(b.weight, t as f32).as_dvec3()))
-                });
-                let kernels: Vec<_> = kernels.collect();
+                let kernels = table.seen_from(theta_o).into_iter();
+                let kernels: Vec<_> = kernels.map(|kernel| (kernel.direction, luminance(kernel.weight))).collect();
                 let total: f64 = kernels.iter().map(|(_, weight)| weight).sum();
                 let share = |weight: f64| if total > 0.0 { weight / total } else { 1.0 / count as f64 };
                 kernels.into_iter().map(|(direction, weight)| (direction, share(weight))).collect()

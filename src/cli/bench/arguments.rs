@@ -130,7 +130,7 @@ pub fn named<'a>(flag: &str, texts: &'a [String]) -> Result<Vec<(String, &'a str
 }
 
 /// `values`, if none is there twice: rows could not be told apart.
-fn once<T: PartialEq + std::fmt::Debug>(flag: &str, values: Vec<T>) -> Result<Vec<T>> {
+pub fn once<T: PartialEq + std::fmt::Debug>(flag: &str, values: Vec<T>) -> Result<Vec<T>> {
     match values.iter().enumerate().find(|(i, value)| values[..*i].contains(value)) {
         Some((_, twice)) => {
             Err(Error::input(flag, format!("names {twice:?} twice"), "name each once, and files by names that differ"))
@@ -192,12 +192,17 @@ impl OutputArguments {
     }
 
     pub fn write_json(&self, measurements: &impl serde::Serialize) -> anyhow::Result<()> {
-        if let Some(path) = &self.json {
-            let text = serde_json::to_string_pretty(measurements).context("--json")? + "\n";
-            output::write_whole(path, text.as_bytes())?;
-        }
-        Ok(())
+        write_json(self.json.as_deref(), measurements)
     }
+}
+
+/// Writes `measurements` where --json says, if it is given.
+pub fn write_json(path: Option<&Path>, measurements: &impl serde::Serialize) -> anyhow::Result<()> {
+    if let Some(path) = path {
+        let text = serde_json::to_string_pretty(measurements).context("--json")? + "\n";
+        output::write_whole(path, text.as_bytes())?;
+    }
+    Ok(())
 }
 
 /// An error if `folder` is none, or cannot be made or written to.

@@ -1,6 +1,7 @@
 //! `threadlight bench`: measurements, one file each.
 mod arguments;
 mod error;
+mod fit;
 mod gallery;
 mod report;
 mod speed;
@@ -18,6 +19,7 @@ pub struct Bench {
 enum What {
     Error(Box<error::BenchError>),
     Speed(Box<speed::BenchSpeed>),
+    Fit(fit::BenchFit),
     Gallery(Box<gallery::BenchGallery>),
     Report(Box<report::BenchReport>),
 }
@@ -27,6 +29,7 @@ impl Bench {
         match self.what {
             What::Error(bench) => bench.run(),
             What::Speed(bench) => bench.run(),
+            What::Fit(bench) => bench.run(),
             What::Gallery(bench) => bench.run(),
             What::Report(bench) => bench.run(),
         }

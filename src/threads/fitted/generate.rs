@@ -5,7 +5,7 @@ use glam::{DVec3, dvec3};
 
 use super::cells::cells;
 use super::kernel::scale_rad;
-use super::lights::TestLights;
+use super::lights::{Quadrature, TestLights};
 use super::solve::{Effort, Fit, Kernel};
 use super::table::FittedTable;
 use crate::brdf::Brdf;
@@ -50,7 +50,8 @@ pub fn generate(brdf: &Brdf, settings: &ThreadSettings, observer: &dyn Observer)
         }
         let slices = Slice::with_lobes(brdf, theta_o(row, rows));
         let [slice, lobes] = &slices;
-        let lights = TestLights::new(&slices, FEWEST_LIGHTS + LIGHTS_A_THREAD * settings.count, LIGHTS_SEED);
+        let lights =
+            TestLights::new(&slices, FEWEST_LIGHTS + LIGHTS_A_THREAD * settings.count, LIGHTS_SEED, Quadrature::FIT);
         if observer.cancelled() {
             return Err(Error::Cancelled);
         }

@@ -52,13 +52,25 @@ pub struct TestLights {
     pub response: [Vec<f32>; 3],
 }
 
-/// Points by which a slice is integrated over wide lights, and over each light.
-const SLICE_POINTS: usize = 1500;
-const LIGHT_POINTS: usize = 16;
+/// By how many points a slice is integrated over the lights.
+#[derive(Clone, Copy, Debug)]
+pub struct Quadrature {
+    /// Points of equal mass of the slice: for wide lights.
+    pub slice_points: usize,
+    /// Points of each light.
+    pub light_points: usize,
+}
+
+impl Quadrature {
+    /// What a fit needs: with three times as many points of a light its error is the same.
+    pub const FIT: Self = Self { slice_points: 1500, light_points: 16 };
+    /// Far more, to see what the fit's leaves.
+    pub const FINE: Self = Self { slice_points: 6000, light_points: 200 };
+}
 
 impl TestLights {
     /// About `count` lights, half in the `lobes` of `slice` and half anywhere. `seed` turns them.
-    pub fn new([slice, lobes]: &[Slice; 2], count: usize, seed: usize) -> Self {
+    pub fn new([slice, lobes]: &[Slice; 2], count: usize, seed: usize, quadrature: Quadrature) -> Self {
         let per_scale = (count / SCALES / 2).next_multiple_of(LANES / 2);
         let mut directions = Vec::with_capacity(count);
         for scale in 0..SCALES {
@@ -76,7 +88,7 @@ impl TestLights {
         }
         let part = |f: fn(&DVec3) -> f64| directions.iter().map(|d| f(d) as f32).collect::<Vec<_>>();
         let direction = [part(|d| d.x), part(|d| d.y), part(|d| d.z)];
-        let response = responses(slice, &directions, &direction);
+        let response = quadrature.responses(slice, &directions, &direction);
 
         // Where nothing is reflected any unit will do.
         let albedo = luminance(slice.albedo());
@@ -109,53 +121,57 @@ impl TestLights {
     }
 }
 
-/// The integral of f cos over each light at `directions`, whose parts are `parts`: points of equal mass of the slice and points of
-/// each light, with the balance heuristic.
-fn responses(slice: &Slice, directions: &[DVec3], parts: &[Vec<f32>; 3]) -> Vec<DVec3> {
-    let each = directions.len() / SCALES;
-    let mut sums = of_slice_points(slice, parts, each);
-    for scale in 0..SCALES {
-        let kappa = light_kappa(scale);
-        let peak = vmf_peak(kappa);
-        let offsets: Vec<DVec3> =
-            fibonacci_lattice(LIGHT_POINTS).map(|uv| vmf_direction(DVec3::Z, kappa, uv.x, TAU * uv.y)).collect();
-        for j in each * scale..each * (scale + 1) {
-            let (x, y) = directions[j].any_orthonormal_pair();
-            let points =
-                offsets.iter().map(|offset| (offset.x * x + offset.y * y + offset.z * directions[j], offset.z));
-            let (w, cos): (Vec<_>, Vec<_>) = points.filter(|(w, _)| w.z > 0.0).unzip();
-            for ((f_cos, w), cos) in slice.f_cos_all(&w).into_iter().zip(&w).zip(cos) {
-                let radiance = peak * (kappa * (cos - 1.0)).exp();
-                let density = SLICE_POINTS as f64 * slice.pdf_of(f_cos, *w);
-                sums[j] += f_cos * radiance / (density + LIGHT_POINTS as f64 * radiance);
+impl Quadrature {
+    /// The integral of f cos over each light at `directions`, whose parts are `parts`: points of equal mass of the slice and points of
+    /// each light, with the balance heuristic.
+    fn responses(self, slice: &Slice, directions: &[DVec3], parts: &[Vec<f32>; 3]) -> Vec<DVec3> {
+        let each = directions.len() / SCALES;
+        let mut sums = self.of_slice_points(slice, parts, each);
+        for scale in 0..SCALES {
+            let kappa = light_kappa(scale);
+            let peak = vmf_peak(kappa);
+            let offsets: Vec<DVec3> = fibonacci_lattice(self.light_points)
+                .map(|uv| vmf_direction(DVec3::Z, kappa, uv.x, TAU * uv.y))
+                .collect();
+            for j in each * scale..each * (scale + 1) {
+                let (x, y) = directions[j].any_orthonormal_pair();
+                let points =
+                    offsets.iter().map(|offset| (offset.x * x + offset.y * y + offset.z * directions[j], offset.z));
+                let (w, cos): (Vec<_>, Vec<_>) = points.filter(|(w, _)| w.z > 0.0).unzip();
+                for ((f_cos, w), cos) in slice.f_cos_all(&w).into_iter().zip(&w).zip(cos) {
+                    let radiance = peak * (kappa * (cos - 1.0)).exp();
+                    let density = self.slice_points as f64 * slice.pdf_of(f_cos, *w);
+                    sums[j] += f_cos * radiance / (density + self.light_points as f64 * radiance);
+                }
             }
         }
+        sums
     }
-    sums
-}
 
-/// The part of the slice's points in that, for `each` lights a scale.
-fn of_slice_points(slice: &Slice, parts: &[Vec<f32>; 3], each: usize) -> Vec<DVec3> {
-    // Those below the horizon, by rounding, reflect nothing.
-    let directions: Vec<_> = slice.points(SLICE_POINTS).filter(|w| w.z > 0.0).collect();
-    let point = |(w, f_cos): (&DVec3, DVec3)| SlicePoint {
-        direction: w.as_vec3(),
-        f_cos: f_cos.as_vec3(),
-        density: (SLICE_POINTS as f64 * slice.pdf_of(f_cos, *w)) as f32,
-    };
-    let points: Vec<_> = directions.iter().zip(slice.f_cos_all(&directions)).map(point).collect();
-    let mut sums: [Vec<f32>; 3] = std::array::from_fn(|_| vec![0.0; SCALES * each]);
-    for scale in 0..SCALES {
-        let of_scale = each * scale..each * (scale + 1);
-        pulp::Arch::new().dispatch(Summing {
-            points: &points,
-            lights: parts.each_ref().map(|part| &part[of_scale.clone()]),
-            kappa: light_kappa(scale),
-            sums: sums.each_mut().map(|sums| &mut sums[of_scale.clone()]),
-        });
+    /// The part of the slice's points in that, for `each` lights a scale.
+    fn of_slice_points(self, slice: &Slice, parts: &[Vec<f32>; 3], each: usize) -> Vec<DVec3> {
+        // Those below the horizon, by rounding, reflect nothing.
+        let directions: Vec<_> = slice.points(self.slice_points).filter(|w| w.z > 0.0).collect();
+        let point = |(w, f_cos): (&DVec3, DVec3)| SlicePoint {
+            direction: w.as_vec3(),
+            f_cos: f_cos.as_vec3(),
+            density: (self.slice_points as f64 * slice.pdf_of(f_cos, *w)) as f32,
+        };
+        let points: Vec<_> = directions.iter().zip(slice.f_cos_all(&directions)).map(point).collect();
+        let mut sums: [Vec<f32>; 3] = std::array::from_fn(|_| vec![0.0; SCALES * each]);
+        for scale in 0..SCALES {
+            let of_scale = each * scale..each * (scale + 1);
+            pulp::Arch::new().dispatch(Summing {
+                points: &points,
+                light_points: self.light_points as f32,
+                lights: parts.each_ref().map(|part| &part[of_scale.clone()]),
+                kappa: light_kappa(scale),
+                sums: sums.each_mut().map(|sums| &mut sums[of_scale.clone()]),
+            });
+        }
+        let [red, green, blue] = &sums;
+        (0..red.len()).map(|j| DVec3::new(red[j].into(), green[j].into(), blue[j].into())).collect()
     }
-    let [red, green, blue] = &sums;
-    (0..red.len()).map(|j| DVec3::new(red[j].into(), green[j].into(), blue[j].into())).collect()
 }
 
 /// A direction, f cos there, and the density of such points.
@@ -168,6 +184,7 @@ struct SlicePoint {
 /// A call of what adds up the slice's points over lights of one kappa, compiled for the vector instructions that are there.
 struct Summing<'a> {
     points: &'a [SlicePoint],
+    light_points: f32,
     lights: [&'a [f32]; 3],
     kappa: f64,
     sums: [&'a mut [f32]; 3],
@@ -188,7 +205,7 @@ impl pulp::NullaryFnOnce for Summing<'_> {
                 for j in 0..LANES {
                     let [x, y, z] = [direction.x - xs[j], direction.y - ys[j], direction.z - zs[j]];
                     let radiance = peak * exp(-0.5 * kappa * (x * x + y * y + z * z));
-                    let share = radiance / (density + LIGHT_POINTS as f32 * radiance);
+                    let share = radiance / (density + self.light_points * radiance);
                     red[j] += f_cos.x * share;
                     green[j] += f_cos.y * share;
                     blue[j] += f_cos.z * share;

@@ -8,6 +8,7 @@
 //! | how kernels answer them | [`answers`] |
 //! | the fit of one row | [`solve`] |
 //! | of all rows | [`generate()`] |
+//! | what a fit leaves, under other lights | [`validation_error`] |
 //! | as stored and looked up, 12 bytes a thread and row | [`FittedTable`] |
 pub mod answers;
 pub mod cells;
@@ -18,9 +19,11 @@ pub mod solve;
 mod table;
 #[cfg(test)]
 mod tests;
+mod validate;
 
 pub use generate::generate;
 pub use table::{FittedTable, PackedKernel, UnpackedKernel};
+pub use validate::validation_error;
 
 /// Most fitted threads that a table can have.
 pub const MAX_COUNT: usize = 128;

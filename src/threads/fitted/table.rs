@@ -1,4 +1,6 @@
 //! Fitted threads as they are stored, uploaded and looked up: twelve bytes a thread and row. In shaders: glsl/threads/fitted.glsl.
+use std::f64::consts::FRAC_PI_2;
+
 use glam::{DVec3, Vec3};
 use half::f16;
 
@@ -42,6 +44,12 @@ impl PackedKernel {
         }
     }
 
+    /// The same in double precision.
+    fn kernel(self) -> Kernel {
+        let UnpackedKernel { direction, level, weight } = self.unpack();
+        Kernel { direction: direction.as_dvec3(), level: level.into(), weight: weight.as_dvec3() }
+    }
+
     /// Whether its level and its weight are in their ranges.
     fn is_usable(self) -> bool {
         let UnpackedKernel { level, weight, .. } = self.unpack();
@@ -72,6 +80,22 @@ impl FittedTable {
     /// The kernels of `row`, one per thread.
     pub fn row(&self, row: usize) -> &[PackedKernel] {
         &self.kernels[row * self.count..][..self.count]
+    }
+
+    /// The kernels for the view angle `theta_o` (radians): between rows as shading has them.
+    pub fn seen_from(&self, theta_o: f64) -> Vec<Kernel> {
+        let position = (theta_o / FRAC_PI_2 * self.rows as f64).clamp(0.0, (self.rows - 1) as f64);
+        let (low, t) = (position as usize, position.fract());
+        let high = (low + 1).min(self.rows - 1);
+        let between = |(a, b): (&PackedKernel, &PackedKernel)| {
+            let [a, b] = [a, b].map(|packed| packed.kernel());
+            Kernel {
+                direction: a.direction.lerp(b.direction, t).normalize(),
+                level: a.level + t * (b.level - a.level),
+                weight: a.weight.lerp(b.weight, t),
+            }
+        };
+        self.row(low).iter().zip(self.row(high)).map(between).collect()
     }
 
     /// Expected error relative to the radiance, RMS over rows as a sphere shows them: sin(theta_o) cos(theta_o) of its picture each.
@@ -143,11 +167,7 @@ impl FittedTable {
         let count = rows.first().map_or(0, |(kernels, ..)| kernels.len());
         // From the weights as they were rounded, so that a white furnace does not see it.
         let cosine = rows.iter().zip(kernels.chunks(count.max(1))).map(|((.., albedo, _), packed)| {
-            let rounded = |packed: &PackedKernel| {
-                let UnpackedKernel { direction, level, weight } = packed.unpack();
-                Kernel { direction: direction.as_dvec3(), level: level.into(), weight: weight.as_dvec3() }
-            };
-            cosine_part(&packed.iter().map(rounded).collect::<Vec<_>>(), *albedo).as_vec3().to_array()
+            cosine_part(&packed.iter().map(|kernel| kernel.kernel()).collect::<Vec<_>>(), *albedo).as_vec3().to_array()
         });
         Self {
             rows: rows.len(),

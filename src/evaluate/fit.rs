@@ -1,0 +1,107 @@
+//! What threads cost to make, beside what they are worth: `threadlight bench fit`.
+use std::time::Instant;
+
+use super::tables::{Section, Table};
+use crate::error::{Error, Result};
+use crate::memo::Memo;
+use crate::pipeline::median;
+use crate::progress::{Observer, OnlyCancels};
+use crate::scene::MaterialSource;
+use crate::steps::LoadMaterial;
+use crate::threads::fitted::{generate, validation_error};
+use crate::threads::{ThreadKind, ThreadSettings};
+
+/// What to fit, and how often.
+#[derive(Clone, Debug)]
+pub struct Fits {
+    /// Materials, by names that differ.
+    pub materials: Vec<(String, MaterialSource)>,
+    /// Numbers of threads, each 1 to [`crate::threads::fitted::MAX_COUNT`].
+    pub counts: Vec<u32>,
+    /// Times are medians of so many.
+    pub repeat: u32,
+}
+
+/// A fit that was measured.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct TimedFit {
+    /// Of which material.
+    pub material: String,
+    /// How many threads.
+    pub threads: u32,
+    /// From the BRDF in memory to threads in memory.
+    pub fit_ms: f64,
+    /// Relative to the radiance, under the lights of the fit: what tables say of themselves.
+    pub fitted_error: f64,
+    /// Under others: [`validation_error`].
+    pub validation_error: f64,
+}
+
+/// Fits and measures; `found` has what was measured until an error or an interruption.
+///
+/// # Errors
+/// Materials that cannot be read, counts that cannot be fitted, [`Error::Cancelled`].
+pub fn run(fits: &Fits, memo: &Memo, observer: &dyn Observer, found: &mut Vec<TimedFit>) -> Result<()> {
+    let total = fits.materials.len() * fits.counts.len() * fits.repeat.max(1) as usize;
+    let mut done = 0;
+    observer.progress(done, total);
+    for (material, source) in &fits.materials {
+        let brdf = memo.round(observer).ask(&LoadMaterial(source))?;
+        for &threads in &fits.counts {
+            let settings =
+                ThreadSettings { kind: ThreadKind::Fitted, count: threads as usize, ..ThreadSettings::default() };
+            let mut times_ms = Vec::new();
+            let table = loop {
+                let start = Instant::now();
+                let table = generate(&brdf, &settings, &OnlyCancels(observer))?;
+                times_ms.push(start.elapsed().as_secs_f64() * 1e3);
+                done += 1;
+                observer.progress(done, total);
+                if times_ms.len() >= fits.repeat as usize {
+                    break table;
+                }
+            };
+            if observer.cancelled() {
+                return Err(Error::Cancelled);
+            }
+            found.push(TimedFit {
+                material: material.clone(),
+                threads,
+                fit_ms: median(times_ms),
+                fitted_error: table.mean_relative_error().into(),
+                validation_error: validation_error(&table, &brdf),
+            });
+        }
+    }
+    Ok(())
+}
+
+/// For each number of threads a row a material, and what all of them have.
+pub fn tables(found: &[TimedFit]) -> Section {
+    let mut counts: Vec<u32> = found.iter().map(|fit| fit.threads).collect();
+    counts.sort_unstable();
+    counts.dedup();
+    let of_count = |count: u32| {
+        let fits: Vec<_> = found.iter().filter(|fit| fit.threads == count).collect();
+        let cells = |ms: f64, fitted: f64, others: f64| {
+            vec![format!("{ms:.0}"), format!("{fitted:.5}"), format!("{others:.5}")]
+        };
+        let row = |fit: &&TimedFit| (fit.material.clone(), cells(fit.fit_ms, fit.fitted_error, fit.validation_error));
+        let over_all = |name: &str, of: fn(Vec<f64>) -> f64| {
+            let value = |part: fn(&TimedFit) -> f64| of(fits.iter().map(|fit| part(fit)).collect());
+            let cells =
+                cells(value(|fit| fit.fit_ms), value(|fit| fit.fitted_error), value(|fit| fit.validation_error));
+            (name.to_owned(), cells)
+        };
+        let mean = |values: Vec<f64>| values.iter().sum::<f64>() / values.len() as f64;
+        let worst = |values: Vec<f64>| values.into_iter().fold(0.0, f64::max);
+        let mut rows: Vec<_> = fits.iter().map(row).collect();
+        if fits.len() > 1 {
+            rows.extend([over_all("median", median), over_all("mean", mean), over_all("worst", worst)]);
+        }
+        let head = ["ms", "its lights", "others"].map(str::to_owned).to_vec();
+        Table { title: format!("{count} threads"), head, rows }
+    };
+    let tables = counts.into_iter().map(of_count).collect();
+    Section { title: "Time to fit, and error relative to the radiance:".into(), tables }
+}
