@@ -1,8 +1,7 @@
 //! Where a fit starts: the mass of the slice's lobes divided into cells, and each cell's moments.
 use glam::DVec3;
 
-use super::kernel::{FINEST_WIDTH_RAD, SHARPEST_LEVEL, WIDEST_LEVEL};
-use super::solve::Kernel;
+use super::kernel::{FINEST_WIDTH_RAD, Kernel, SHARPEST_LEVEL, WIDEST_LEVEL};
 use crate::threads::slice::Slice;
 
 /// Kernels at the centroids of `count` cells of `lobes`, as wide as their second moments say, with the mass of the cell.

@@ -4,9 +4,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use glam::{DVec3, dvec3};
 
 use super::cells::cells;
-use super::kernel::scale_rad;
+use super::kernel::{Kernel, scale_rad};
 use super::lights::{Quadrature, TestLights};
-use super::solve::{Effort, Fit, Kernel};
+use super::solve::{Effort, Fit};
 use super::table::FittedTable;
 use crate::brdf::Brdf;
 use crate::error::{Error, Result};

@@ -5,8 +5,7 @@ use std::sync::OnceLock;
 
 use glam::{DVec2, DVec3, Vec3, dvec2, dvec3};
 
-use super::answers::exp;
-use super::kernel::{vmf_direction, vmf_peak};
+use super::kernel::{exp, vmf_direction, vmf_peak};
 use crate::brdf::luminance;
 use crate::threads::slice::{Slice, fibonacci_lattice};
 

@@ -5,21 +5,10 @@ use faer::{Accum, Mat, MatRef, Par, Side};
 use glam::{DVec3, dvec3};
 
 use super::answers::Answers;
-use super::kernel::{SHARPEST_LEVEL, WIDEST_LEVEL, scale_rad};
+use super::kernel::{Kernel, SHARPEST_LEVEL, WIDEST_LEVEL, scale_rad};
 use super::lights::TestLights;
 use crate::error::{Error, Result};
 use crate::progress::Observer;
-
-/// A thread in one row: a kernel of the environment's pyramid, and the radiance it gives under light of radiance 1.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Kernel {
-    /// Where it looks, unit, in the shading frame.
-    pub direction: DVec3,
-    /// Level of the pyramid, [`SHARPEST_LEVEL`] to [`WIDEST_LEVEL`]: its width.
-    pub level: f64,
-    /// Linear Rec. 709, not negative.
-    pub weight: DVec3,
-}
 
 /// What is left of the albedo for the cosine kernel.
 pub fn cosine_part(kernels: &[Kernel], albedo: DVec3) -> DVec3 {

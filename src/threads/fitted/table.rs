@@ -4,8 +4,8 @@ use std::f64::consts::FRAC_PI_2;
 use glam::{DVec3, Vec3};
 use half::f16;
 
-use super::kernel::{SHARPEST_LEVEL, WIDEST_LEVEL};
-use super::solve::{Kernel, cosine_part};
+use super::kernel::{Kernel, SHARPEST_LEVEL, WIDEST_LEVEL};
+use super::solve::cosine_part;
 use crate::packing::{octahedral_decode, octahedral_encode, pack_snorm_2x16, unpack_snorm_2x16};
 
 /// A kernel in three words: direction (octahedral, 2 x 16 bits), level and red weight, green and blue weight (half floats).

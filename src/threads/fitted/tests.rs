@@ -3,8 +3,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use glam::DVec3;
 
-use super::kernel::{SHARPEST_LEVEL, WIDEST_LEVEL, scale_rad};
-use super::solve::Kernel;
+use super::kernel::{Kernel, SHARPEST_LEVEL, WIDEST_LEVEL, scale_rad};
 use super::{FittedTable, MAX_COUNT, PackedKernel, generate};
 use crate::brdf::{Brdf, CustomBrdf};
 use crate::error::Error;

@@ -1,8 +1,9 @@
 //! How well a table answers lights that it was not fitted to.
 use rayon::prelude::*;
 
+use super::kernel::Kernel;
 use super::lights::{Quadrature, TestLights};
-use super::solve::{Fit, Kernel};
+use super::solve::Fit;
 use super::table::FittedTable;
 use crate::brdf::Brdf;
 use crate::threads::slice::Slice;
