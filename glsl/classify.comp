@@ -21,10 +21,9 @@ layout(set = 0, binding = 2, std430) writeonly buffer TileList {
     uint tiles[];
 } tile_list;
 // For each tile of the image the places of its pixels in it: interior ones from the front, edge ones from the back.
-layout(set = 0, binding = 4, std430) writeonly buffer PixelList {
+layout(set = 0, binding = 3, std430) writeonly buffer PixelList {
     uint pixels[];
 } pixel_list;
-layout(set = 0, binding = 3, rgba32f) uniform writeonly image2D radiance;
 
 layout(push_constant) uniform Push {
     uvec2 size_px;
@@ -70,9 +69,6 @@ void main() {
         }
         // With R the length of the mean normal, 1 - R is the variance.
         smooth_surface = smooth_surface && 1.0 - length(normals) / float(covered) < push.smooth_variance;
-        if (covered == 0) {
-            imageStore(radiance, ivec2(pixel), vec4(0.0));
-        }
     }
     uint kind = smooth_surface && covered == SUBPIXELS * SUBPIXELS ? INTERIOR : EDGE;
     uint tile = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;

@@ -39,7 +39,8 @@ float vmf_deficit(float kappa) {
 
 float kappa_of_deficit(float deficit) {
     float kappa = 1.0 / deficit;
-    for (int i = 0; i < 20; ++i) {
+    // There it is the deficit's inverse itself, and elsewhere close to that.
+    for (int i = 0; kappa <= 10.0 && i < 20; ++i) {
         kappa *= vmf_deficit(kappa) / deficit;
     }
     return kappa;
@@ -58,6 +59,11 @@ float texel_deficit(uint kernel, float size, vec3 direction) {
     return kernel == MEAN ? deficit + texel / 4.0 * (1.0 - deficit) : deficit;
 }
 
+// Where on a face, from -1 to 1, the direction of this shadow is; at the nearer edge if it is not there.
+float face_place(vec2 shadow) {
+    return shadow.y > abs(shadow.x) ? shadow.x / shadow.y : shadow.x < 0.0 ? -1.0 : 1.0;
+}
+
 // The texels along one axis of a face that a cone reaches: of directions whose shadow in the plane of that axis and the face's
 // own is (x, z), within the angle of this sine. Empty where first >= end.
 uvec2 cone_range(float x, float z, float sin_cone, uint size) {
@@ -65,16 +71,18 @@ uvec2 cone_range(float x, float z, float sin_cone, uint size) {
     if (shadow <= sin_cone) {
         return uvec2(0, size);
     }
-    float middle = atan(x, z);
-    float half_angle = asin(sin_cone / shadow);
-    const float EDGE = radians(45.0);
-    float low = max(middle - half_angle, -EDGE);
-    float high = min(middle + half_angle, EDGE);
+    // The shadow of the cone is between these two directions.
+    vec2 along = vec2(x, z) / shadow;
+    float s = sin_cone / shadow;
+    float c = sqrt(1.0 - s * s);
+    // Behind the face a cone may reach beyond the opposite of its axis.
+    float low = z < 0.0 && x < 0.0 ? -1.0 : face_place(vec2(along.x * c - along.y * s, along.y * c + along.x * s));
+    float high = z < 0.0 && x >= 0.0 ? 1.0 : face_place(vec2(along.x * c + along.y * s, along.y * c - along.x * s));
     if (low > high) {
         return uvec2(0);
     }
-    vec2 texels = 0.5 * (tan(vec2(low, high)) + 1.0) * float(size);
-    return uvec2(max(floor(texels.x), 0.0), min(ceil(texels.y), float(size)));
+    vec2 texels = 0.5 * (vec2(low, high) + 1.0) * float(size);
+    return uvec2(floor(texels.x), min(ceil(texels.y), float(size)));
 }
 
 vec3 source_texel(uvec3 id) {

@@ -39,6 +39,8 @@ pub mod shading;
 pub mod steps;
 #[path = "threads/mod.rs"]
 pub mod threads;
+#[path = "vector_math.rs"]
+pub mod vector_math;
 #[cfg(feature = "viewer")]
 #[path = "viewer/mod.rs"]
 pub mod viewer;

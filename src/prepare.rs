@@ -5,10 +5,11 @@ use crate::memo::{Key, Keyed, Memo, Round, Step};
 use crate::method::Method;
 use crate::passes::{PlacedMesh, Sampling, View};
 use crate::scene::{Camera, MaterialSource, Mesh, Scene};
-use crate::steps::{FitThreads, LoadEnvironment, LoadMaterial, LoadMesh};
+use crate::steps::{DraftThreads, FitThreads, LoadEnvironment, LoadMaterial, LoadMesh};
 use crate::threads::{ThreadSettings, Threads};
 use crate::{Error, Result};
 use glam::{DAffine3, DVec3};
+use std::cell::Cell;
 
 /// A scene with all its files read and its threads made. Cheap to clone.
 #[derive(Clone)]
@@ -57,10 +58,14 @@ pub fn ask_threads(
     brdf: &Keyed<Brdf>,
     sampling: Sampling,
 ) -> Result<Option<Keyed<Threads>>> {
-    let Some(kind) = method.threads() else { return Ok(None) };
-    let Sampling { count, seed } = sampling;
-    let settings = ThreadSettings { kind, count: count as usize, seed, ..Default::default() };
+    let Some(settings) = thread_settings(method, sampling) else { return Ok(None) };
     round.ask(&FitThreads { brdf, settings }).map(Some)
+}
+
+/// Which threads `method` shades by, if it does.
+fn thread_settings(method: Method, Sampling { count, seed }: Sampling) -> Option<ThreadSettings> {
+    let kind = method.threads()?;
+    Some(ThreadSettings { kind, count: count as usize, seed, ..Default::default() })
 }
 
 /// Asks `round` for all that `scene` names, and for the threads of its materials.
@@ -68,6 +73,59 @@ pub fn ask_threads(
 /// # Errors
 /// The first file or setting that cannot be used; cancelled.
 pub fn prepare(scene: &Scene, round: &Round) -> Result<Prepared> {
+    let ask = |method, _: &str, brdf: &Keyed<Brdf>, sampling| ask_threads(round, method, brdf, sampling);
+    prepare_by(scene, round, &ask)
+}
+
+/// Whether threads of `scene` can be drafted from those of `before`: fitted ones, as many, of models whose parameters were changed.
+pub fn can_draft(scene: &Scene, before: &Prepared) -> bool {
+    let Ok(method) = Method::from_name(&scene.shading.method) else { return false };
+    let source = |scene: &'_ Scene, name: &str| {
+        scene.materials.iter().find(|material| material.name == name).map(|material| material.source.clone())
+    };
+    let was_edited = |name: &str| match source(scene, name) {
+        Some(MaterialSource::Model { .. }) => before.materials.iter().any(|material| material.name == name),
+        other => other == source(&before.scene, name),
+    };
+    method == Method::Fitted
+        && before.method == method
+        && before.sampling.count == scene.shading.threads.unwrap_or(method.default_count())
+        && scene.used_materials().into_iter().all(was_edited)
+}
+
+/// As [`prepare`], but threads that are not known yet are drafted from those of `before`; none where that cannot be ([`can_draft`]) or
+/// nothing has to be.
+///
+/// # Errors
+/// Those of [`prepare`].
+pub fn prepare_draft(scene: &Scene, before: &Prepared, round: &Round) -> Result<Option<Prepared>> {
+    if !can_draft(scene, before) {
+        return Ok(None);
+    }
+    let is_draft = Cell::new(false);
+    let ask = |method, name: &str, brdf: &Keyed<Brdf>, sampling| {
+        let Some(settings) = thread_settings(method, sampling) else { return Ok(None) };
+        if let Some(finished) = round.known(&FitThreads { brdf, settings })? {
+            return Ok(Some(finished));
+        }
+        let mut shown =
+            before.materials.iter().filter(|shown| shown.name == name && shown.brdf.model() == brdf.model());
+        let Some((shown, threads)) = shown.find_map(|shown| Some((shown, shown.threads.as_ref()?))) else {
+            return ask_threads(round, method, brdf, sampling);
+        };
+        is_draft.set(true);
+        // While another material is edited, this one's draft serves on.
+        let serves_on = shown.brdf.key == brdf.key;
+        if serves_on { Ok(Some(threads.clone())) } else { round.ask(&DraftThreads { brdf, before: threads }).map(Some) }
+    };
+    let prepared = prepare_by(scene, round, &ask)?;
+    Ok(is_draft.get().then_some(prepared))
+}
+
+/// Gives the threads of a material by its name in the scene and its BRDF.
+type AskThreads<'a> = dyn Fn(Method, &str, &Keyed<Brdf>, Sampling) -> Result<Option<Keyed<Threads>>> + 'a;
+
+fn prepare_by(scene: &Scene, round: &Round, ask_threads: &AskThreads) -> Result<Prepared> {
     let method = Method::from_name(&scene.shading.method)?;
     let count = scene.shading.threads.unwrap_or(method.default_count());
     check_count(method, count, scene.image.subpixels)?;
@@ -86,7 +144,7 @@ pub fn prepare(scene: &Scene, round: &Round) -> Result<Prepared> {
             MaterialSource::Model { .. } => error.within(format!("material \"{name}\"")),
             _ => error,
         })?;
-        let threads = ask_threads(round, method, &brdf, sampling)?;
+        let threads = ask_threads(method, name, &brdf, sampling)?;
         materials.push(PreparedMaterial { name: name.to_owned(), brdf, threads });
     }
     Ok(Prepared {

@@ -189,8 +189,8 @@ fn the_screenshot_shows_picture_and_panel_and_only_what_has_changed_runs() {
         .map(|frame| frame.into_iter().filter(|pass| of_picture.contains(pass)).collect::<Vec<_>>())
         .filter(|passes| !passes.is_empty())
         .collect();
-    // The first picture, the brighter one, the other material: geometry once, shading twice.
-    assert_eq!(made, [&of_picture[..], &of_picture[4..], &of_picture[1..]]);
+    // The first picture, the brighter one, the other material: geometry and its classes once, shading twice.
+    assert_eq!(made, [&of_picture[..], &of_picture[4..], &of_picture[2..]]);
     let window = viewer.picture("window.png");
     assert_eq!((window.width, window.height), (460, 240));
     let distinct = |columns: std::ops::Range<u32>| {
@@ -199,6 +199,39 @@ fn the_screenshot_shows_picture_and_panel_and_only_what_has_changed_runs() {
         colors.collect::<std::collections::BTreeSet<_>>().len()
     };
     assert!(distinct(0..160) > 100 && distinct(160..460) > 20, "{} {}", distinct(0..160), distinct(160..460));
+}
+
+#[test]
+fn a_dragged_parameter_is_seen_by_drafts_and_ends_as_if_it_had_never_been_dragged() {
+    let Some(viewer) = Viewer::new() else { return };
+    let mut replay = "\"wait\"\n".to_owned();
+    let alpha = |value: f64| {
+        format!("{{\"set\": {{\"parameter\": {{\"material\": \"gold\", \"key\": \"alpha\", \"value\": {value}}}}}}}\n")
+    };
+    let values: Vec<f64> = (0..12).map(|step| 0.25 + f64::from(step) / 64.0).collect();
+    values.iter().for_each(|value| replay += &alpha(*value));
+    replay += "\"wait\"\n{\"save_picture\": \"saved.png\"}\n{\"save_scene\": \"scene.toml\"}\n\"quit\"\n";
+    let arguments = ["--threads", "4", "--no-cache", "--stats", "stats.json", "--stats-error"];
+    let ended = viewer.play(&[&SMALL[..], &arguments].concat(), &replay);
+    ended.expect_success();
+    let stats: serde_json::Value = serde_json::from_slice(&std::fs::read(viewer.path("stats.json")).unwrap()).unwrap();
+    assert_eq!(stats["size"], serde_json::json!([160, 240]));
+    // Others are of the window, which gets its size.
+    let events = stats["events"].as_array().expect("events").iter();
+    let events: Vec<_> = events.filter(|event| event["input"]["set"]["parameter"].is_object()).collect();
+    assert_eq!(events.len(), values.len());
+    let ms = |event: &serde_json::Value, key: &str| event[key].as_f64();
+    for (event, value) in events.iter().copied().zip(&values) {
+        assert_eq!(event["input"]["set"]["parameter"]["value"].as_f64(), Some(*value));
+        assert!(ms(event, "shown_ms") > Some(0.0), "{event}");
+        // Unlike the finished picture, but like it.
+        assert!(ms(event, "rms_to_finished").is_none_or(|rms| rms > 0.0 && rms < 0.02), "{event}");
+    }
+    assert!(events.iter().filter(|event| event["rms_to_finished"].is_number()).count() > values.len() / 2);
+    let last = events.last().unwrap();
+    assert!(ms(last, "finished_ms") > ms(last, "shown_ms"), "{last}");
+    viewer.render("scene.toml", "again.png");
+    assert!(std::fs::read(viewer.path("again.png")).unwrap() == std::fs::read(viewer.path("saved.png")).unwrap());
 }
 
 #[test]

@@ -6,7 +6,7 @@ use common::{Validated, sphere};
 use glam::DVec3;
 use std::time::{Duration, Instant};
 use threadlight::low_level::memo::Memo;
-use threadlight::low_level::scene::{MaterialSource, Source};
+use threadlight::low_level::scene::{MaterialSettings, MaterialSource, ObjectSettings, Source};
 use threadlight::low_level::viewer::change::Change;
 use threadlight::low_level::viewer::input::Input;
 use threadlight::low_level::viewer::interaction::Viewer;
@@ -55,6 +55,65 @@ fn an_edited_file_that_is_dropped_again_is_seen_as_it_is_now() {
     wait(&mut viewer);
     assert!(viewer.notice.as_ref().is_some_and(|notice| notice.is_error && notice.text.contains("paint.toml")));
     assert!((red(&viewer) - 0.75).abs() < 1e-9);
+    drop(viewer);
+    gpu.finish();
+}
+
+#[test]
+fn of_two_materials_that_are_edited_in_turn_each_keeps_its_threads() {
+    let gpu = Validated::new();
+    let scene = |color: f64, alpha: f64| {
+        let paint = common::model(&format!(
+            "model = 'plastic'\ndistribution = 'ggx'\nalpha = 0.2\nior = 1.5\ndiffuse = [{color}, 0.1, 0.1]"
+        ));
+        let mut scene = sphere(paint, "white", 2, (32, 24));
+        let metal = common::model(&format!(
+            "model = 'conductor'\ndistribution = 'ggx'\nalpha = {alpha}\neta = [0.2, 0.9, 1.1]\nk = [3.9, 2.4, 2.1]"
+        ));
+        scene.materials.push(MaterialSettings { name: "metal".into(), source: metal });
+        scene.objects.push(ObjectSettings::new(Source::Builtin("sphere".into()), "metal"));
+        scene
+    };
+    let mut viewer = Viewer::new(scene(0.2, 0.3), &gpu.device, Memo::default(), || ());
+    wait(&mut viewer);
+    let set = |material: &str, key: &str, value: toml::Value| {
+        Input::Set(Change::Parameter { material: material.into(), key: key.into(), value })
+    };
+    // The first thing that is loaded after an input.
+    let next = |viewer: &mut Viewer, input: &Input| {
+        viewer.handle(input);
+        let start = Instant::now();
+        while !viewer.take_loaded().unwrap() || viewer.draft_awaited_until().is_some() {
+            assert!(start.elapsed() < Duration::from_secs(100), "nothing was loaded");
+        }
+        let loaded = viewer.loaded().unwrap();
+        let threads = loaded.prepared.materials.iter().map(|material| (*material.threads.clone().unwrap()).clone());
+        (loaded.is_draft, threads.collect::<Vec<_>>())
+    };
+    let finished: Vec<_> = {
+        let loaded = viewer.loaded().unwrap();
+        loaded.prepared.materials.iter().map(|material| (*material.threads.clone().unwrap()).clone()).collect()
+    };
+    let (is_draft, of_metal) = next(&mut viewer, &set("metal", "alpha", 0.31.into()));
+    assert!(is_draft && of_metal[0] == finished[0] && of_metal[1] != finished[1]);
+    // Another input before anything is finished: without a window, no frame asks for it, so it waits for the draft to be taken.
+    viewer.frame_was_drawn();
+    let (is_draft, of_both) = next(&mut viewer, &set("m", "diffuse", vec![0.25, 0.1, 0.1].into()));
+    assert!(is_draft && of_both[0] != finished[0] && of_both[1] == of_metal[1]);
+    // What is saved has finished threads.
+    let folder = tempfile::tempdir().unwrap();
+    let [early, late] = ["early.png", "late.png"].map(|name| folder.path().join(name));
+    viewer.handle(&Input::SavePicture(early.clone()));
+    viewer.frame_was_drawn();
+    wait(&mut viewer);
+    let expected = common::ready(&scene(0.25, 0.31));
+    let loaded = viewer.loaded().unwrap();
+    assert!(!loaded.is_draft);
+    for (found, expected) in loaded.prepared.materials.iter().zip(&expected.materials) {
+        assert_eq!(**found.threads.as_ref().unwrap(), **expected.threads.as_ref().unwrap(), "{}", found.name);
+    }
+    viewer.handle(&Input::SavePicture(late.clone()));
+    assert!(std::fs::read(early).unwrap() == std::fs::read(late).unwrap());
     drop(viewer);
     gpu.finish();
 }

@@ -31,7 +31,7 @@ fn the_device_makes_the_same_maps_as_the_cpu() {
     let environment = environment();
     let cache = PipelineCache::new(&gpu.device, None).unwrap();
     let found = vmf_pyramid(&gpu.device, &cache, &Pyramid::box_filtered(&environment), &()).unwrap();
-    let expected = VmfPyramid::new(&Pyramid::box_filtered(&environment));
+    let expected = VmfPyramid::new(&Pyramid::box_filtered(&environment), &()).unwrap();
     assert_eq!(found.levels.levels.len(), expected.levels.levels.len());
     for (map, (found, expected)) in found.levels.levels.iter().zip(&expected.levels.levels).enumerate() {
         assert_eq!(found.len(), expected.len());
@@ -50,7 +50,7 @@ fn the_device_makes_the_same_maps_as_the_cpu() {
 #[test]
 fn the_mean_over_the_sphere_stays_that_of_the_environment() {
     let environment = environment();
-    let pyramid = VmfPyramid::new(&Pyramid::box_filtered(&environment));
+    let pyramid = VmfPyramid::new(&Pyramid::box_filtered(&environment), &()).unwrap();
     let mean = |lookup: &dyn Fn(Vec3) -> Vec3| {
         let count = 100_000;
         let direction = |i: i32| {

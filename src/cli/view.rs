@@ -5,7 +5,8 @@ use clap::value_parser;
 use std::path::PathBuf;
 use std::time::Duration;
 use threadlight::low_level::output::{self, Format};
-use threadlight::low_level::viewer::{self, ViewerSettings, input};
+use threadlight::low_level::viewer::latency::Record;
+use threadlight::low_level::viewer::{self, Ended, ViewerSettings, input};
 use threadlight::low_level::vulkan::PresentMode;
 use threadlight::{Error, Result};
 
@@ -47,6 +48,12 @@ pub struct ViewArguments {
     /// End with an error where one "wait" of the replay takes longer.
     #[arg(long, value_name = "SECONDS", default_value_t = 600, value_parser = value_parser!(u64).range(1..))]
     replay_limit: u64,
+    /// Write how long inputs waited for the frame that shows them, as JSON.
+    #[arg(long, value_name = "FILE")]
+    stats: Option<PathBuf>,
+    /// Render at the end how far the drafts that were shown are from what they stood for, for --stats.
+    #[arg(long, requires = "stats")]
+    stats_error: bool,
 }
 
 /// Size of the picture where neither scene nor flag names one: with the panel, 1280 x 720.
@@ -60,12 +67,18 @@ impl ViewArguments {
             }
             output::check_writable(path)?;
         }
+        self.stats.as_deref().map_or(Ok(()), output::check_writable)?;
         let mut scene = self.scene.scene()?;
         if self.scene.scene.is_none() && self.scene.size.is_none() {
             (scene.image.width, scene.image.height) = SIZE;
         }
         let replay = self.replay.as_deref().map(input::read_replay).transpose()?.unwrap_or_default();
-        let messages = viewer::run(ViewerSettings {
+        let record = match (&self.stats, self.stats_error) {
+            (None, _) => Record::Latest,
+            (Some(_), false) => Record::All,
+            (Some(_), true) => Record::AllAndErrors,
+        };
+        let Ended { messages, stats } = viewer::run(ViewerSettings {
             scene,
             cache: self.machine.cache(),
             device: self.machine.device,
@@ -75,7 +88,11 @@ impl ViewArguments {
             screenshot: self.screenshot,
             replay: replay.into_iter().map(|(_, input)| input).collect(),
             replay_limit: Duration::from_secs(self.replay_limit),
+            record,
         })?;
+        if let Some((path, stats)) = self.stats.as_deref().zip(stats) {
+            output::write_whole(path, serde_json::to_string_pretty(&stats)?.as_bytes())?;
+        }
         if let Some(first) = messages.first() {
             anyhow::bail!("validation: {} messages, the first: {}", messages.len(), first.replace('\n', " "));
         }

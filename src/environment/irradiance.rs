@@ -2,6 +2,8 @@
 //!
 //! It is for environments without small bright sources: between the texels of a map their terminator would be a step, so
 //! shading adds theirs exactly.
+use std::ops::Range;
+
 use glam::Vec3;
 use rayon::prelude::*;
 
@@ -29,38 +31,108 @@ struct Cell {
     centroid: Vec3,
 }
 
+/// Cells whose light is summed at once.
+const LANES: usize = 8;
+
+/// Cells side by side.
+#[derive(Clone, Copy, Default)]
+struct Block {
+    centroid: [[f32; LANES]; 3],
+    power: [[f32; LANES]; 3],
+    /// Middles times solid angles.
+    middle: [[f32; LANES]; 3],
+}
+
 /// Irradiance over pi for every normal: a cube map of one level. The only error is that `observer` cancels it.
 pub fn irradiance_map(environment: &Environment, observer: &dyn Observer) -> Result<Pyramid> {
     let cells = gather(environment, observer)?;
-    let irradiance = |texel: usize| {
-        if observer.cancelled() {
-            return Err(Error::Cancelled);
+    let block = |cells: &[Cell]| {
+        let mut block = Block::default();
+        for (lane, cell) in cells.iter().enumerate() {
+            for axis in 0..3 {
+                block.centroid[axis][lane] = cell.centroid[axis];
+                block.power[axis][lane] = cell.power[axis];
+                block.middle[axis][lane] = cell.solid_angle * cell.middle[axis];
+            }
         }
-        let middle = |index: usize| (index as f64 + 0.5) / FACE_SIZE as f64;
-        let (face, row, column) = (texel / FACE_SIZE / FACE_SIZE, texel / FACE_SIZE % FACE_SIZE, texel % FACE_SIZE);
-        let n = direction_of(face, middle(column), middle(row)).as_vec3();
-        let (mut sum, mut cosines) = (Vec3::ZERO, 0.0);
-        for cell in &cells {
-            sum += n.dot(cell.centroid).max(0.0) * cell.power;
-            cosines += n.dot(cell.middle).max(0.0) * cell.solid_angle;
-        }
-        // Over what a constant gives, which is pi but for the size of the cells: constants stay as they are.
-        Ok((sum / cosines).to_array())
+        block
     };
-    let texels = (0..6 * FACE_SIZE * FACE_SIZE).into_par_iter().map(irradiance).collect::<Result<_>>()?;
+    let blocks: Vec<_> = cells.chunks(LANES).map(block).collect();
+    let mut texels = vec![[0.0; 3]; 6 * FACE_SIZE * FACE_SIZE];
+    texels.par_chunks_mut(FACE_SIZE).enumerate().try_for_each(|(row, texels)| {
+        observer.check()?;
+        for (column, texel) in texels.iter_mut().enumerate() {
+            let middle = |index: usize| (index as f64 + 0.5) / FACE_SIZE as f64;
+            let normal = direction_of(row / FACE_SIZE, middle(column), middle(row % FACE_SIZE)).as_vec3();
+            *texel = pulp::Arch::new().dispatch(Gathering { blocks: &blocks, normal });
+        }
+        Ok::<_, Error>(())
+    })?;
     Ok(Pyramid { face_size: FACE_SIZE, levels: vec![texels] })
+}
+
+/// A call of what sums the light that reaches a normal, compiled for the vector instructions that are there.
+struct Gathering<'a> {
+    blocks: &'a [Block],
+    normal: Vec3,
+}
+
+impl pulp::NullaryFnOnce for Gathering<'_> {
+    type Output = [f32; 3];
+
+    #[inline(always)]
+    fn call(self) -> [f32; 3] {
+        let n = self.normal;
+        let dot = |[x, y, z]: &[[f32; LANES]; 3], lane: usize| n.x * x[lane] + n.y * y[lane] + n.z * z[lane];
+        let mut sums = [[0.0; LANES]; 4];
+        for Block { centroid, power, middle } in self.blocks {
+            for lane in 0..LANES {
+                let cos = dot(centroid, lane).max(0.0);
+                (0..3).for_each(|channel| sums[channel][lane] += cos * power[channel][lane]);
+                sums[3][lane] += dot(middle, lane).max(0.0);
+            }
+        }
+        let [red, green, blue, cosines] = sums.map(|lanes| lanes.iter().sum::<f32>());
+        // Over what a constant gives, which is pi but for the size of the cells: constants stay as they are.
+        [red, green, blue].map(|sum| sum / cosines)
+    }
 }
 
 /// The light of `environment` in cells.
 fn gather(environment: &Environment, observer: &dyn Observer) -> Result<Vec<Cell>> {
-    let mut cells = vec![Cell::default(); 6 * CELLS_SIZE * CELLS_SIZE];
+    // In so many parts, summed in their order: the same on any number of cores.
+    const PARTS: usize = 16;
     // At least 2: radiance is bilinear between the centres of pixels, so these alone would not tell how wide it is.
     let times = FEWEST_COLUMNS.div_ceil(environment.width.min(2 * environment.height)).max(2);
-    let edge = |row: usize| (std::f64::consts::PI * row as f64 / (times * environment.height) as f64).cos();
-    for row in 0..times * environment.height {
-        if observer.cancelled() {
-            return Err(Error::Cancelled);
+    let rows = times * environment.height;
+    let part = |part: usize| gather_rows(environment, times, part * rows / PARTS..(part + 1) * rows / PARTS, observer);
+    let parts: Vec<_> = (0..PARTS).into_par_iter().map(part).collect::<Result<_>>()?;
+    let cell = |index: usize| {
+        let mut sum = Cell::default();
+        for cell in parts.iter().map(|cells: &Vec<Cell>| cells[index]) {
+            sum.solid_angle += cell.solid_angle;
+            sum.power += cell.power;
+            sum.middle += cell.middle;
+            sum.centroid += cell.centroid;
         }
+        let middle = sum.middle.normalize_or_zero();
+        // Where there is no light, any place will do.
+        Cell { middle, centroid: sum.centroid.try_normalize().unwrap_or(middle), ..sum }
+    };
+    Ok((0..6 * CELLS_SIZE * CELLS_SIZE).map(cell).collect())
+}
+
+/// That of these rows of pixels, each divided into `times` along both axes; means are yet to be divided by their weights.
+fn gather_rows(
+    environment: &Environment,
+    times: usize,
+    rows: Range<usize>,
+    observer: &dyn Observer,
+) -> Result<Vec<Cell>> {
+    let mut cells = vec![Cell::default(); 6 * CELLS_SIZE * CELLS_SIZE];
+    let edge = |row: usize| (std::f64::consts::PI * row as f64 / (times * environment.height) as f64).cos();
+    for row in rows {
+        observer.check()?;
         let solid_angle = std::f64::consts::TAU / (times * environment.width) as f64 * (edge(row) - edge(row + 1));
         for column in 0..times * environment.width {
             let place = |index: usize| (index as f64 + 0.5) / times as f64 - 0.5;
@@ -76,11 +148,6 @@ fn gather(environment: &Environment, observer: &dyn Observer) -> Result<Vec<Cell
             cell.centroid += light.element_sum() * direction;
         }
     }
-    cells.iter_mut().for_each(|cell| {
-        cell.middle = cell.middle.normalize_or_zero();
-        // Where there is no light, any place will do.
-        cell.centroid = cell.centroid.try_normalize().unwrap_or(cell.middle);
-    });
     Ok(cells)
 }
 

@@ -15,7 +15,7 @@ use crate::error::{Error, Result};
 use crate::output::write_whole;
 
 /// Version of the file format and of the maps in it: to be raised when the same environment gets others.
-pub const FORMAT_VERSION: u32 = 3;
+pub const FORMAT_VERSION: u32 = 4;
 
 const MAGIC: &[u8; 8] = b"VMFMAPS\0";
 
@@ -76,7 +76,8 @@ mod tests {
     use super::*;
 
     fn pyramid() -> VmfPyramid {
-        VmfPyramid::new(&Pyramid::box_filtered(&environment(16, 8, |x, y| [x as f32, y as f32 / 3.0, 1.0])))
+        VmfPyramid::new(&Pyramid::box_filtered(&environment(16, 8, |x, y| [x as f32, y as f32 / 3.0, 1.0])), &())
+            .unwrap()
     }
 
     #[test]

@@ -1,14 +1,18 @@
 //! The pyramid of known kernels: the environment convolved with von Mises-Fisher kernels, level by level twice as wide.
-//! Fitted threads look these up. Twin: glsl/vmf_pyramid.comp, which makes it at load.
-use std::f64::consts::FRAC_PI_4;
+//! Fitted threads look these up. Twin: glsl/vmf_pyramid.comp, by which GPUs make it; processors make it here, thirty times as fast as
+//! drivers for them run that.
 use std::ops::Range;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
-use glam::DVec3;
+use glam::{DVec2, DVec3, dvec2};
 use rayon::prelude::*;
 
 use super::cube::{coordinates, direction_of, texel_solid_angle};
 use super::pyramid::Pyramid;
 use super::to_dvec3;
+use crate::error::Result;
+use crate::progress::Observer;
+use crate::vector_math::exp;
 
 /// Width of a level's kernel in texels of that level, in the middle of a face.
 const TEXELS_A_WIDTH: f64 = 2.0;
@@ -88,20 +92,24 @@ impl VmfPyramid {
         steps
     }
 
-    /// From the box-filtered pyramid of the same environment, on the CPU: slow.
-    pub fn new(source: &Pyramid) -> Self {
+    /// From the box-filtered pyramid of the same environment. `observer` hears of rows of texels.
+    ///
+    /// # Errors
+    /// Cancelled by `observer`.
+    pub fn new(source: &Pyramid, observer: &dyn Observer) -> Result<Self> {
         let mut maps: Vec<Vec<[f32; 3]>> = Vec::new();
         let steps = Self::steps(source.face_size);
+        let blurs = || steps.iter().filter(|step| step.kernel == BlurKernel::Vmf);
+        let rows = Rows { done: AtomicUsize::new(0), total: blurs().map(|step| 6 * step.size).sum(), observer };
         for step in &steps {
             let from = step.from.map_or(&source.levels[0], |from| &maps[from]);
-            maps.push(if step.kernel == BlurKernel::Mean {
-                means_of_four(from, step.size)
-            } else {
-                blurred(from, step)
+            maps.push(match step.kernel {
+                BlurKernel::Mean => means_of_four(from, step.size),
+                _ => blurred(from, step, &rows)?,
             });
         }
         let levels = steps.iter().zip(maps).filter(|(step, _)| step.kernel == BlurKernel::Vmf).map(|(_, map)| map);
-        Self { levels: Pyramid { face_size: source.face_size, levels: levels.collect() } }
+        Ok(Self { levels: Pyramid { face_size: source.face_size, levels: levels.collect() } })
     }
 
     /// Width of the kernel of level 0, in radians.
@@ -118,8 +126,9 @@ fn vmf_deficit(kappa: f64) -> f64 {
 
 /// kappa of the vMF kernel whose mean cosine is 1 - `deficit`.
 fn kappa_of_deficit(deficit: f64) -> f64 {
-    // The deficit is nearly 1 / kappa, so that this is close to a fixed point from the start.
-    (0..20).fold(1.0 / deficit, |kappa, _| kappa * vmf_deficit(kappa) / deficit)
+    let kappa = 1.0 / deficit;
+    // There it is the deficit's inverse itself, and elsewhere close to that.
+    if kappa > 10.0 { kappa } else { (0..20).fold(kappa, |kappa, _| kappa * vmf_deficit(kappa) / deficit) }
 }
 
 /// 1 - the mean cosine of what a texel of faces of `size`, around `direction`, was convolved with. Together with the tent of the
@@ -147,61 +156,146 @@ fn means_of_four(source: &[[f32; 3]], size: usize) -> Vec<[f32; 3]> {
     (0..6 * size * size).into_par_iter().map(mean).collect()
 }
 
-/// A map, convolved from the one that `step` names.
-fn blurred(source: &[[f32; 3]], step: &BlurStep) -> Vec<[f32; 3]> {
-    let &BlurStep { from_kernel, from_size, size, kernel, .. } = step;
-    let direction = |size: usize, texel: usize| {
-        let middle = |index: usize| (index as f64 + 0.5) / size as f64;
-        direction_of(texel / size / size, middle(texel % size), middle(texel / size % size))
+/// How many rows of how many have been made, and who hears of it.
+struct Rows<'a> {
+    done: AtomicUsize,
+    total: usize,
+    observer: &'a dyn Observer,
+}
+
+/// Texels side by side that are summed over at once.
+const LANES: usize = 8;
+
+/// Texels side by side in a row of a map; those beyond its end have no solid angle.
+#[derive(Clone, Copy, Default)]
+struct Block {
+    direction: [[f32; LANES]; 3],
+    solid_angle: [f32; LANES],
+    radiance: [[f32; LANES]; 3],
+}
+
+/// The blocks of a map: face by face, row by row.
+fn blocks(source: &[[f32; 3]], size: usize) -> Vec<Block> {
+    let a_row = size.div_ceil(LANES);
+    let block = |index: usize| {
+        let (row, first) = (index / a_row, index % a_row * LANES);
+        let mut block = Block::default();
+        for lane in 0..LANES.min(size - first) {
+            let direction = texel_direction(size, row * size + first + lane);
+            block.solid_angle[lane] = texel_solid_angle(size, direction) as f32;
+            let radiance = source[row * size + first + lane];
+            for axis in 0..3 {
+                block.direction[axis][lane] = direction[axis] as f32;
+                block.radiance[axis][lane] = radiance[axis];
+            }
+        }
+        block
     };
-    let texels = (0..6 * from_size * from_size).into_par_iter().map(|texel| {
-        let direction = direction(from_size, texel);
-        (direction, texel_solid_angle(from_size, direction))
-    });
-    let texels: Vec<(DVec3, f64)> = texels.collect();
-    let texel_of = |texel: usize| {
-        let centre = direction(size, texel);
-        let from = texel_deficit(from_kernel, from_size, centre);
-        let kappa = kappa_of_deficit((texel_deficit(kernel, size, centre) - from) / (1.0 - from));
-        let extent = f64::min(KERNEL_EXTENT / kappa, 2.0);
-        let sin_cone = if extent < 1.0 { (extent * (2.0 - extent)).sqrt() } else { 1.0 };
-        let (mut sum, mut weight_sum) = (DVec3::ZERO, 0.0);
-        for face in 0..6 {
-            let axes = coordinates(face, centre);
-            let columns = cone_range(axes.x, axes.z, sin_cone, from_size);
-            for row in cone_range(axes.y, axes.z, sin_cone, from_size) {
-                let start = (face * from_size + row) * from_size;
-                for at in start + columns.start..start + columns.end {
-                    let (direction, solid_angle) = texels[at];
+    (0..6 * size * a_row).into_par_iter().map(block).collect()
+}
+
+/// The direction of the middle of a texel, by its place in a map of faces of `size`.
+fn texel_direction(size: usize, texel: usize) -> DVec3 {
+    let middle = |index: usize| (index as f64 + 0.5) / size as f64;
+    direction_of(texel / size / size, middle(texel % size), middle(texel / size % size))
+}
+
+/// A map, convolved from the one that `step` names.
+fn blurred(source: &[[f32; 3]], step: &BlurStep, rows: &Rows) -> Result<Vec<[f32; 3]>> {
+    let blocks = blocks(source, step.from_size);
+    let mut map = vec![[0.0; 3]; 6 * step.size * step.size];
+    map.par_chunks_mut(step.size).enumerate().try_for_each(|(row, texels)| -> Result<()> {
+        rows.observer.check()?;
+        pulp::Arch::new().dispatch(BlurRow { blocks: &blocks, step, row, texels });
+        rows.observer.progress(rows.done.fetch_add(1, Ordering::Relaxed) + 1, rows.total);
+        Ok(())
+    })?;
+    Ok(map)
+}
+
+/// A call of what makes a row of a map, compiled for the vector instructions that are there.
+struct BlurRow<'a> {
+    blocks: &'a [Block],
+    step: &'a BlurStep,
+    /// Counted from the first of the first face.
+    row: usize,
+    texels: &'a mut [[f32; 3]],
+}
+
+impl pulp::NullaryFnOnce for BlurRow<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let &BlurStep { from_kernel, from_size, size, kernel, .. } = self.step;
+        for (column, texel) in self.texels.iter_mut().enumerate() {
+            let centre = texel_direction(size, self.row * size + column);
+            let from = texel_deficit(from_kernel, from_size, centre);
+            let kappa = kappa_of_deficit((texel_deficit(kernel, size, centre) - from) / (1.0 - from));
+            *texel = convolved(self.blocks, from_size, centre, kappa);
+        }
+    }
+}
+
+/// The map of these blocks around `centre`, weighed by the kernel of this kappa.
+#[inline(always)]
+fn convolved(blocks: &[Block], size: usize, centre: DVec3, kappa: f64) -> [f32; 3] {
+    // 1 - cos of the cone that the kernel fills.
+    let extent = f64::min(KERNEL_EXTENT / kappa, 2.0);
+    let sin_cone = if extent < 1.0 { (extent * (2.0 - extent)).sqrt() } else { 1.0 };
+    let a_row = size.div_ceil(LANES);
+    let (c, kappa, extent) = (centre.as_vec3(), kappa as f32, extent as f32);
+    let mut sums = [[0.0; LANES]; 4];
+    for face in 0..6 {
+        let axes = coordinates(face, centre);
+        let rows = cone_range(axes.y, axes.z, sin_cone, size);
+        if rows.is_empty() {
+            continue;
+        }
+        let columns = cone_range(axes.x, axes.z, sin_cone, size);
+        for row in rows {
+            let start = (face * size + row) * a_row;
+            // Whole blocks: what they have beyond the range is outside the cone.
+            for block in &blocks[start + columns.start / LANES..start + columns.end.div_ceil(LANES)] {
+                let [xs, ys, zs] = &block.direction;
+                for j in 0..LANES {
+                    let [x, y, z] = [xs[j] - c.x, ys[j] - c.y, zs[j] - c.z];
                     // 1 - cos as half the squared distance: exact for neighbours too.
-                    let away = 0.5 * (direction - centre).length_squared();
-                    if away < extent {
-                        let weight = (-kappa * away).exp();
-                        sum += weight * solid_angle * to_dvec3(&source[at]);
-                        weight_sum += weight * solid_angle;
-                    }
+                    let away = 0.5 * (x * x + y * y + z * z);
+                    let within = if away < extent { block.solid_angle[j] } else { 0.0 };
+                    let weight = exp(-kappa * away) * within;
+                    (0..3).for_each(|channel| sums[channel][j] += weight * block.radiance[channel][j]);
+                    sums[3][j] += weight;
                 }
             }
         }
-        (sum / weight_sum).as_vec3().to_array()
-    };
-    (0..6 * size * size).into_par_iter().map(texel_of).collect()
+    }
+    let [red, green, blue, weight] = sums.map(|lanes| lanes.iter().sum::<f32>());
+    [red, green, blue].map(|sum| sum / weight)
 }
 
 /// The texels along one axis of a face that a cone reaches: of directions whose shadow in the plane of that axis and the face's own
 /// is (x, z), within the angle of this sine.
 fn cone_range(x: f64, z: f64, sin_cone: f64, size: usize) -> Range<usize> {
-    let shadow = x.hypot(z);
-    if shadow <= sin_cone {
+    let shadow = dvec2(x, z);
+    let length = shadow.length();
+    if length <= sin_cone {
         return 0..size;
     }
-    let (middle, half_angle) = (x.atan2(z), (sin_cone / shadow).asin());
-    let (low, high) = ((middle - half_angle).max(-FRAC_PI_4), (middle + half_angle).min(FRAC_PI_4));
+    // The shadow of the cone is between these two directions.
+    let (sin, along) = (sin_cone / length, shadow / length);
+    let cos = (1.0 - sin * sin).sqrt();
+    let [low, high] = [-sin, sin].map(|sin| dvec2(along.x * cos + along.y * sin, along.y * cos - along.x * sin));
+    // Where on the face, from -1 to 1, if it is there.
+    let place = |edge: DVec2| if edge.y > edge.x.abs() { edge.x / edge.y } else { 1f64.copysign(edge.x) };
+    // Behind the face a cone may reach beyond the opposite of its axis.
+    let low = if z < 0.0 && x < 0.0 { -1.0 } else { place(low) };
+    let high = if z < 0.0 && x >= 0.0 { 1.0 } else { place(high) };
     if low > high {
         return 0..0;
     }
-    let texel = |angle: f64| 0.5 * (angle.tan() + 1.0) * size as f64;
-    texel(low).floor().max(0.0) as usize..(texel(high).ceil() as usize).min(size)
+    let texel = |place: f64| 0.5 * (place + 1.0) * size as f64;
+    texel(low).floor() as usize..(texel(high).ceil() as usize).min(size)
 }
 
 #[cfg(test)]
@@ -224,7 +318,7 @@ mod tests {
                 (w, w.x.hypot(w.z), map.radiance(w))
             })
             .collect();
-        let pyramid = VmfPyramid::new(&Pyramid::box_filtered(&map));
+        let pyramid = VmfPyramid::new(&Pyramid::box_filtered(&map), &()).unwrap();
         let spot = map.direction(70.0, 40.0);
         for level in 0..pyramid.levels.levels.len() {
             let width = pyramid.finest_width_rad() * (level as f64).exp2();

@@ -17,6 +17,7 @@ impl FrameGraph<'_> {
     pub fn clear_image(&mut self, name: &str, image: &mut ImageHandle, color: [f32; 4]) {
         let mut pass = self.pass(name);
         let cleared = pass.write(*image, Access::TransferWrite);
+        pass.depends_on(&color.map(f32::to_bits));
         pass.record(Box::new(move |commands, resources| Ok(commands.clear_image(resources.image(cleared)?, color)?)));
         *image = cleared;
     }

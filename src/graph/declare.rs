@@ -92,6 +92,13 @@ impl<W> Graph<W> {
         handle.into()
     }
 
+    /// A buffer that is worth keeping: see [`Graph::kept_image`].
+    pub fn kept_buffer(&mut self, name: &str, desc: BufferDesc) -> BufferHandle {
+        let handle = self.resource(name, ResourceKind::Buffer(desc), None);
+        self.resources[handle.resource].keep = true;
+        handle.into()
+    }
+
     /// An image that someone else owns: a swapchain image.
     ///
     /// `before` is the access it was last used with; what was written must already be visible to that access. `None`: its

@@ -192,16 +192,59 @@ impl<'r> Round<'r> {
     /// # Errors
     /// Those of the step; cancelled.
     pub fn ask<S: Step>(&self, step: &S) -> Result<Keyed<S::Output>> {
-        self.observer.check()?;
-        let key = Key::builder(std::any::type_name::<S::Output>()).key(step.key(self.memo)?).build();
         let start = Instant::now();
-        let (output, origin) = match self.memo.find(key).and_then(|output| output.downcast().ok()) {
-            Some(output) => (output, Origin::Memory),
-            None => {
-                let (output, origin) = self.load_or_make(step, key)?;
-                (Arc::new(output), origin)
-            }
-        };
+        let key = self.key_of(step)?;
+        match self.find(step, key, start) {
+            Some(output) => Ok(output),
+            None => Ok(self.hold(step, key, Arc::new(self.make(step, key)?), Origin::Made, start)),
+        }
+    }
+
+    /// The output of `step` if it is in memory or on disk; it is not made.
+    ///
+    /// # Errors
+    /// A step that has no key; cancelled.
+    pub fn known<S: Step>(&self, step: &S) -> Result<Option<Keyed<S::Output>>> {
+        let start = Instant::now();
+        Ok(self.find(step, self.key_of(step)?, start))
+    }
+
+    /// Two steps of different outputs have no key in common.
+    fn key_of<S: Step>(&self, step: &S) -> Result<Key> {
+        self.observer.check()?;
+        Ok(Key::builder(std::any::type_name::<S::Output>()).key(step.key(self.memo)?).build())
+    }
+
+    fn find<S: Step>(&self, step: &S, key: Key, start: Instant) -> Option<Keyed<S::Output>> {
+        if let Some(output) = self.memo.find(key).and_then(|output| output.downcast().ok()) {
+            return Some(self.hold(step, key, output, Origin::Memory, start));
+        }
+        let output = step.stored()?.read(self.memo.folder()?, key)?;
+        Some(self.hold(step, key, Arc::new(output), Origin::Disk, start))
+    }
+
+    fn make<S: Step>(&self, step: &S, key: Key) -> Result<S::Output> {
+        self.observer.begin(S::NAME);
+        // What is only needed on the way is let go at its end.
+        let output = step.make(&Round { within: Some(S::NAME), ..self.memo.round(self.observer) })?;
+        if let Some(name) = self.within {
+            self.observer.begin(name);
+        }
+        if let Some((stored, folder)) = step.stored().zip(self.memo.folder()) {
+            stored.write(folder, key, &output);
+        }
+        Ok(output)
+    }
+
+    /// Holds what came of `step`, and notes where it came from.
+    fn hold<S: Step>(
+        &self,
+        step: &S,
+        key: Key,
+        output: Arc<S::Output>,
+        origin: Origin,
+        start: Instant,
+    ) -> Keyed<S::Output> {
         let held: Output = output.clone();
         if origin != Origin::Memory {
             self.memo.remember(key, &held);
@@ -209,24 +252,7 @@ impl<'r> Round<'r> {
         }
         self.held.borrow_mut().insert(key, held);
         self.asked.borrow_mut().push(Asked { step: S::NAME, origin, time: start.elapsed() });
-        Ok(Keyed { key: step.content_key(&output).unwrap_or(key), output })
-    }
-
-    fn load_or_make<S: Step>(&self, step: &S, key: Key) -> Result<(S::Output, Origin)> {
-        let stored = step.stored().zip(self.memo.folder());
-        if let Some(output) = stored.as_ref().and_then(|(stored, folder)| stored.read(folder, key)) {
-            return Ok((output, Origin::Disk));
-        }
-        self.observer.begin(S::NAME);
-        // What is only needed on the way is let go at its end.
-        let output = step.make(&Round { within: Some(S::NAME), ..self.memo.round(self.observer) })?;
-        if let Some(name) = self.within {
-            self.observer.begin(name);
-        }
-        if let Some((stored, folder)) = stored {
-            stored.write(folder, key, &output);
-        }
-        Ok((output, Origin::Made))
+        Keyed { key: step.content_key(&output).unwrap_or(key), output }
     }
 
     /// The memo.
@@ -311,6 +337,21 @@ mod tests {
         drop(held);
         assert_eq!(memo.outputs_in_memory(), 0);
         assert_eq!(origin(&memo.round(&()), &Number(1, false)), Origin::Made);
+    }
+
+    #[test]
+    fn what_is_known_is_in_memory_or_on_disk() {
+        let folder = tempfile::tempdir().unwrap();
+        let memo = Memo::new(Some(folder.path()));
+        let round = memo.round(&());
+        assert!(round.known(&Number(1, true)).unwrap().is_none() && round.asked("number").is_empty());
+        round.ask(&Number(1, true)).unwrap();
+        assert_eq!(*round.known(&Number(1, true)).unwrap().unwrap(), 1);
+        drop(round);
+        let round = Memo::new(Some(folder.path()));
+        let round = round.round(&());
+        assert_eq!(*round.known(&Number(1, true)).unwrap().unwrap(), 1);
+        assert_eq!(round.asked("number")[0].origin, Origin::Disk);
     }
 
     #[test]

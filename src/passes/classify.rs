@@ -1,10 +1,9 @@
 //! Sorts pixels into interior, edge and background, and lists those to shade: nothing else is looked at again.
 use super::View;
-use crate::graph::{BufferDesc, BufferHandle, FrameGraph, ImageDesc, ImageHandle};
+use crate::graph::{BufferDesc, BufferHandle, FrameGraph, ImageHandle};
 use crate::memo::Keyed;
 use crate::method::Method;
 use crate::vulkan::ComputePipeline;
-use ash::vk;
 use bytemuck::{Pod, Zeroable};
 
 /// Sub-pixels whose normals differ by less share one partitioned sum over the threads. Narrower than this, and curved
@@ -75,7 +74,7 @@ pub fn smooth_variance(method: Method) -> f32 {
     if method.shares_surface() { SHARED_VARIANCE } else { 1.0 }
 }
 
-/// What is to be shaded, and the image to shade into, already black where nothing is.
+/// What is to be shaded.
 #[derive(Clone, Copy)]
 pub struct Tiles {
     /// [`Counters`].
@@ -84,8 +83,6 @@ pub struct Tiles {
     pub tiles: BufferHandle,
     /// For each tile of the image the places of its pixels in it: interior ones from the front, edge ones from the back.
     pub pixels: BufferHandle,
-    /// Linear radiance times coverage, and coverage.
-    pub radiance: ImageHandle,
 }
 
 /// Lists the pixels of `geometry` that hold surface.
@@ -95,24 +92,22 @@ pub fn classify<'a>(graph: &mut FrameGraph<'a>, classify: &'a Classify, geometry
     let [columns, rows, _] = classify.pipeline.group_size();
     let tile_count = u64::from(width.div_ceil(columns)) * u64::from(height.div_ceil(rows));
     let tile_pixels = u64::from(columns * rows);
-    let mut counters = graph.buffer("counters", BufferDesc { size_bytes: size_of::<Counters>() as u64 });
+    // Kept: as long as nothing moves, other light and other materials are shaded by the same lists.
+    let mut counters = graph.kept_buffer("counters", BufferDesc { size_bytes: size_of::<Counters>() as u64 });
     graph.clear_buffer("clear_counters", &mut counters);
-    let mut tiles = graph.buffer("tile_list", BufferDesc { size_bytes: 2 * 4 * tile_count });
-    let mut pixels = graph.buffer("pixel_list", BufferDesc { size_bytes: 4 * tile_pixels * tile_count });
-    let linear = vk::Format::R32G32B32A32_SFLOAT;
-    let mut radiance = graph.kept_image("radiance", ImageDesc { format: linear, width, height });
+    let mut tiles = graph.kept_buffer("tile_list", BufferDesc { size_bytes: 2 * 4 * tile_count });
+    let mut pixels = graph.kept_buffer("pixel_list", BufferDesc { size_bytes: 4 * tile_pixels * tile_count });
     graph
         .compute("classify", &classify.pipeline)
         .read("geometry", geometry)
         .modify("counters", &mut counters)
         .write("tile_list", &mut tiles)
         .write("pixel_list", &mut pixels)
-        .write("radiance", &mut radiance)
         .push(&Push {
             size_px: [width, height],
             cos_smooth: SMOOTH_DEG.to_radians().cos(),
             smooth_variance: classify.smooth_variance,
         })
         .cover([width, height, 1]);
-    Tiles { counters, tiles, pixels, radiance }
+    Tiles { counters, tiles, pixels }
 }

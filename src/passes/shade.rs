@@ -1,7 +1,7 @@
 //! Pass 2 of the paper (section 4.2): the radiance of every listed pixel, by its partition of the sample threads.
 use super::{CameraRays, Counters, DeviceLight, Tiles, View};
 use crate::brdf::{Brdf, MaterialRecord, MerlTable};
-use crate::graph::{BufferDesc, BufferHandle, FrameGraph, ImageHandle};
+use crate::graph::{BufferDesc, BufferHandle, FrameGraph, ImageDesc, ImageHandle};
 use crate::memo::Keyed;
 use crate::method::Method;
 use crate::threads::{SliceTable, Threads};
@@ -215,8 +215,11 @@ pub fn shade<'a>(
     tiles: &Tiles,
     view: &View,
 ) -> Shaded {
-    let Tiles { counters, tiles, pixels, mut radiance } = *tiles;
+    let Tiles { counters, tiles, pixels } = *tiles;
     let Shade { pipeline, materials, light, sampling } = shade;
+    let format = vk::Format::R32G32B32A32_SFLOAT;
+    let mut radiance = graph.kept_image("radiance", ImageDesc { format, width: view.width, height: view.height });
+    graph.clear_image("clear_radiance", &mut radiance, [0.0; 4]);
     let mut lookups = graph.buffer("lookups", BufferDesc { size_bytes: size_of::<u64>() as u64 });
     graph.clear_buffer("clear_lookups", &mut lookups);
     let dispatch = |kind| (Counters::arguments_of(kind), Push::new(view, sampling, light, kind));

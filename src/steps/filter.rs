@@ -8,7 +8,7 @@ use crate::method::Method;
 use crate::passes::vmf_pyramid;
 use crate::steps::pipelines;
 use crate::threads::Threads;
-use crate::vulkan::Device;
+use crate::vulkan::{Device, DeviceKind};
 use std::sync::Arc;
 
 /// Texels along the edge of a face of the box-filtered pyramid that the blur begins with: that of its own would show on maps of few
@@ -89,7 +89,7 @@ impl Step for Part<'_> {
 pub struct Blur<'a> {
     /// Of what.
     pub environment: &'a Keyed<Environment>,
-    /// What makes it; none for the processor. Which does is not part of the key: they agree to 1e-5.
+    /// What makes it, if that is a GPU; else the processor does. Which does is not part of the key: they agree to 1e-5.
     pub device: Option<&'a Arc<Device>>,
 }
 
@@ -104,9 +104,9 @@ impl Step for Blur<'_> {
     fn make(&self, round: &Round) -> Result<VmfPyramid> {
         let face_size = Some(face_size_before_blur(self.environment));
         let source = round.ask(&BoxFilter { environment: self.environment, face_size })?;
-        match self.device {
+        match self.device.filter(|device| device.description().kind != DeviceKind::Cpu) {
             Some(device) => vmf_pyramid(device, &*pipelines(round, device)?, &source, round.observer()),
-            None => Ok(VmfPyramid::new(&source)),
+            None => VmfPyramid::new(&source, round.observer()),
         }
     }
 

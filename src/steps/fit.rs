@@ -1,8 +1,9 @@
-//! Makes the threads of a BRDF.
+//! Makes the threads of a BRDF, and drafts of them.
 use crate::Result;
 use crate::brdf::Brdf;
 use crate::error::Error;
 use crate::memo::{Key, Keyed, Memo, Round, Step, Stored};
+use crate::threads::fitted::draft;
 use crate::threads::{FORMAT_VERSION, ThreadSettings, Threads, generate, read, write};
 
 /// Makes the threads of `brdf`. They are kept on disk as the `.threads` files that users write.
@@ -37,6 +38,30 @@ impl Step for FitThreads<'_> {
             }),
             write: Box::new(|path, threads| write(threads, path)),
         })
+    }
+}
+
+/// Makes threads of `brdf` that continue others at once, in the place of those that take longer.
+pub struct DraftThreads<'a> {
+    /// Of what.
+    pub brdf: &'a Keyed<Brdf>,
+    /// Of a BRDF that is like it, fitted or a draft themselves.
+    pub before: &'a Keyed<Threads>,
+}
+
+impl Step for DraftThreads<'_> {
+    type Output = Threads;
+    const NAME: &'static str = "draft";
+
+    fn key(&self, _: &Memo) -> Result<Key> {
+        Ok(Key::builder("draft").key(self.brdf.key).key(self.before.key).build())
+    }
+
+    fn make(&self, round: &Round) -> Result<Threads> {
+        match &**self.before {
+            Threads::Fitted(before) => Ok(Threads::Fitted(draft(self.brdf, before, round.observer())?)),
+            Threads::Paper(_) => Err(Error::input("threads", "of this kind are not drafted", "make them")),
+        }
     }
 }
 

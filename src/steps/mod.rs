@@ -7,6 +7,6 @@ mod upload;
 
 pub use compile::{CompileCompute, CompileGeometryCache, pipelines};
 pub use filter::{Blur, BoxFilter, blurred_light, light};
-pub use fit::FitThreads;
+pub use fit::{DraftThreads, FitThreads};
 pub use load::{LoadEnvironment, LoadMaterial, LoadMesh};
 pub use upload::{UploadBackground, UploadLight, UploadMaterials, UploadMesh};

@@ -5,9 +5,21 @@ use glam::{DVec2, DVec3, dvec3};
 
 use crate::brdf::{Brdf, luminance};
 
-/// Steps over theta_h and phi_h. Albedos come out within 1e-3 (tested), the CDF is finer than 1024 threads can tell.
-const THETA_STEPS: usize = 192;
-const PHI_STEPS: usize = 128;
+/// Numbers of steps over theta_h and phi_h.
+#[derive(Clone, Copy, Debug)]
+pub struct Resolution {
+    /// Rings.
+    pub theta: usize,
+    /// Azimuths of each.
+    pub phi: usize,
+}
+
+impl Resolution {
+    /// Albedos come out within 1e-3 (tested), the CDF is finer than 1024 threads can tell.
+    pub const FULL: Self = Self { theta: 192, phi: 128 };
+    /// For drafts, a twelfth of the work.
+    pub const DRAFT: Self = Self { theta: 64, phi: 32 };
+}
 
 /// p(w) = f(w, w_o) (n.w) / integral of the same, in luminance, for one view angle.
 ///
@@ -22,9 +34,10 @@ pub struct Slice<'a> {
     albedo: DVec3,
     /// What `density` integrates to.
     total: f64,
-    /// CDF over x: THETA_STEPS + 1 values from 0 to 1.
+    resolution: Resolution,
+    /// CDF over x: a value more than steps, from 0 to 1.
     ring_cdf: Vec<f64>,
-    /// CDF over phi_h within each step of x: THETA_STEPS times PHI_STEPS + 1 values from 0 to 1.
+    /// CDF over phi_h within each step of x: a value more than steps of phi_h, from 0 to 1.
     azimuth_cdf: Vec<f64>,
     peak: DVec3,
 }
@@ -65,12 +78,12 @@ fn direction_of_turn(turn: f64) -> DVec2 {
 }
 
 /// Those of all steps of x and phi_h, ring by ring.
-fn cells(brdf: &Brdf, w_o: DVec3) -> Vec<Cell> {
-    let azimuths: Vec<_> = (0..PHI_STEPS).map(|j| direction_of_turn((j as f64 + 0.5) / PHI_STEPS as f64)).collect();
-    let mut cells = Vec::with_capacity(THETA_STEPS * PHI_STEPS);
+fn cells(brdf: &Brdf, w_o: DVec3, Resolution { theta, phi }: Resolution) -> Vec<Cell> {
+    let azimuths: Vec<_> = (0..phi).map(|j| direction_of_turn((j as f64 + 0.5) / phi as f64)).collect();
+    let mut cells = Vec::with_capacity(theta * phi);
     let (mut seen, mut directions) = (Vec::new(), Vec::new());
-    for i in 0..THETA_STEPS {
-        let x = (i as f64 + 0.5) / THETA_STEPS as f64;
+    for i in 0..theta {
+        let x = (i as f64 + 0.5) / theta as f64;
         for phi in &azimuths {
             let h = half_vector(x, *phi);
             let cos_theta_d = w_o.dot(h);
@@ -89,19 +102,16 @@ fn cells(brdf: &Brdf, w_o: DVec3) -> Vec<Cell> {
 }
 
 impl<'a> Slice<'a> {
-    /// Steps of the CDF over x and over phi_h.
-    pub const STEPS: [usize; 2] = [THETA_STEPS, PHI_STEPS];
-
     /// Tabulates `brdf` seen from `theta_o` (radians, less than pi / 2). Where it reflects nothing the pdf is that of a
     /// diffuse surface, cos / pi: a thread then still has a direction, and its samples add up to the zero they should.
     pub fn new(brdf: &'a Brdf, theta_o: f64) -> Self {
         let w_o = dvec3(theta_o.sin(), 0.0, theta_o.cos());
-        Self::above(brdf, w_o, &cells(brdf, w_o), 0.0)
+        Self::above(brdf, w_o, &cells(brdf, w_o, Resolution::FULL), Resolution::FULL, 0.0)
     }
 
     /// The same, and the slice of what is above the median of f, by luminance: lobes without the base that they stand on. A tenth of
     /// the mass of a glossy plastic is in its lobe; the second slice has all of its mass there.
-    pub fn with_lobes(brdf: &'a Brdf, theta_o: f64) -> [Self; 2] {
+    pub fn with_lobes(brdf: &'a Brdf, theta_o: f64, resolution: Resolution) -> [Self; 2] {
         const POINTS: usize = 512;
         let w_o = dvec3(theta_o.sin(), 0.0, theta_o.cos());
         let directions: Vec<_> = fibonacci_lattice(POINTS)
@@ -109,34 +119,42 @@ impl<'a> Slice<'a> {
             .collect();
         let mut values: Vec<f64> = brdf.evaluate_all(&directions, w_o).into_iter().map(luminance).collect();
         values.sort_by(f64::total_cmp);
-        let cells = cells(brdf, w_o);
-        [0.0, values[POINTS / 2]].map(|base| Self::above(brdf, w_o, &cells, base))
+        let cells = cells(brdf, w_o, resolution);
+        [0.0, values[POINTS / 2]].map(|base| Self::above(brdf, w_o, &cells, resolution, base))
     }
 
-    fn above(brdf: &'a Brdf, w_o: DVec3, cells: &[Cell], base: f64) -> Self {
-        let slice = Self::tabulate(brdf, w_o, cells, base, |f| above_base(f, base));
+    fn above(brdf: &'a Brdf, w_o: DVec3, cells: &[Cell], resolution: Resolution, base: f64) -> Self {
+        let slice = Self::tabulate(brdf, w_o, cells, resolution, base, |f| above_base(f, base));
         if slice.total > 0.0 {
             return slice;
         }
-        Self { albedo: DVec3::ZERO, ..Self::tabulate(brdf, w_o, cells, base, |_| DVec3::splat(FRAC_1_PI)) }
+        Self { albedo: DVec3::ZERO, ..Self::tabulate(brdf, w_o, cells, resolution, base, |_| DVec3::splat(FRAC_1_PI)) }
     }
 
-    fn tabulate(brdf: &'a Brdf, w_o: DVec3, cells: &[Cell], base: f64, counted: impl Fn(DVec3) -> DVec3) -> Self {
+    fn tabulate(
+        brdf: &'a Brdf,
+        w_o: DVec3,
+        cells: &[Cell],
+        resolution: Resolution,
+        base: f64,
+        counted: impl Fn(DVec3) -> DVec3,
+    ) -> Self {
+        let Resolution { theta, phi } = resolution;
         let density = |w_i: DVec3| counted(brdf.evaluate(w_i, w_o)) * w_i.z;
         let mut albedo = DVec3::ZERO;
         let mut ring_cdf = vec![0.0];
-        let mut azimuth_cdf = Vec::with_capacity(THETA_STEPS * (PHI_STEPS + 1));
+        let mut azimuth_cdf = Vec::with_capacity(theta * (phi + 1));
         // The mirror direction is where sharp lobes have their maximum, and no cell has it as its centre.
         let mirror = dvec3(-w_o.x, 0.0, w_o.z);
         let mut peak = (luminance(density(mirror)), 0.0, DVec3::Z);
-        for i in 0..THETA_STEPS {
-            let x = (i as f64 + 0.5) / THETA_STEPS as f64;
+        for i in 0..theta {
+            let x = (i as f64 + 0.5) / theta as f64;
             // sin(theta_h) dtheta_h dphi_h, dtheta_h = pi x dx, by 4 of the reflection.
-            let ring = 4.0 * (FRAC_PI_2 * x * x).sin() * PI * x / THETA_STEPS as f64 * 2.0 * PI / PHI_STEPS as f64;
+            let ring = 4.0 * (FRAC_PI_2 * x * x).sin() * PI * x / theta as f64 * 2.0 * PI / phi as f64;
             let start = azimuth_cdf.len();
             let mut sum = 0.0;
             azimuth_cdf.push(0.0);
-            for &Cell { h, cos_theta_d, cos_theta_i, f } in &cells[i * PHI_STEPS..(i + 1) * PHI_STEPS] {
+            for &Cell { h, cos_theta_d, cos_theta_i, f } in &cells[i * phi..(i + 1) * phi] {
                 if cos_theta_d > 0.0 && cos_theta_i > 0.0 {
                     let rgb = counted(f) * cos_theta_i;
                     let value = luminance(rgb);
@@ -151,13 +169,13 @@ impl<'a> Slice<'a> {
             ring_cdf.push(ring_cdf[i] + sum);
             normalise(&mut azimuth_cdf[start..]);
         }
-        let total = ring_cdf[THETA_STEPS];
+        let total = ring_cdf[theta];
         normalise(&mut ring_cdf);
-        let peak = climb(peak.2, FRAC_PI_2 * (2.0 * peak.1 + 1.0 / THETA_STEPS as f64) / THETA_STEPS as f64, |h| {
+        let peak = climb(peak.2, FRAC_PI_2 * (2.0 * peak.1 + 1.0 / theta as f64) / theta as f64, |h| {
             let w_i = reflect(w_o, h);
             if w_i.z > 0.0 && w_o.dot(h) > 0.0 { luminance(density(w_i)) } else { 0.0 }
         });
-        Self { brdf, w_o, base, albedo, total, ring_cdf, azimuth_cdf, peak: reflect(w_o, peak) }
+        Self { brdf, w_o, base, albedo, total, resolution, ring_cdf, azimuth_cdf, peak: reflect(w_o, peak) }
     }
 
     /// The integral of f cos per channel: the directional albedo.
@@ -195,8 +213,9 @@ impl<'a> Slice<'a> {
     pub fn direction(&self, uv: DVec2) -> DVec3 {
         let (i, x) = invert(&self.ring_cdf, uv.x);
         let (j, turn) = invert(self.azimuths(i), uv.y);
-        let phi = direction_of_turn((j as f64 + turn) / PHI_STEPS as f64);
-        let h = half_vector((i as f64 + x) / THETA_STEPS as f64, phi);
+        let Resolution { theta, phi } = self.resolution;
+        let phi = direction_of_turn((j as f64 + turn) / phi as f64);
+        let h = half_vector((i as f64 + x) / theta as f64, phi);
         reflect(self.w_o, h)
     }
 
@@ -211,11 +230,12 @@ impl<'a> Slice<'a> {
     }
 
     /// The CDF in steps `merged` times as wide: over rings (x), and ring by ring over the azimuths (phi_h from -180 degrees).
-    /// Each goes from 0 to 1. `merged` divides both numbers of steps, [`Slice::STEPS`].
+    /// Each goes from 0 to 1. `merged` divides both numbers of steps.
     pub fn coarse_cdfs(&self, merged: usize) -> (Vec<f64>, Vec<Vec<f64>>) {
         let rings = self.ring_cdf.iter().copied().step_by(merged).collect();
-        let azimuths = (0..THETA_STEPS).step_by(merged).map(|start| {
-            let mut sum = vec![0.0; PHI_STEPS / merged + 1];
+        let Resolution { theta, phi } = self.resolution;
+        let azimuths = (0..theta).step_by(merged).map(|start| {
+            let mut sum = vec![0.0; phi / merged + 1];
             for ring in start..start + merged {
                 let mass = self.ring_cdf[ring + 1] - self.ring_cdf[ring];
                 let steps = self.azimuths(ring).iter().step_by(merged);
@@ -233,7 +253,8 @@ impl<'a> Slice<'a> {
     }
 
     fn azimuths(&self, ring: usize) -> &[f64] {
-        &self.azimuth_cdf[ring * (PHI_STEPS + 1)..][..PHI_STEPS + 1]
+        let values = self.resolution.phi + 1;
+        &self.azimuth_cdf[ring * values..][..values]
     }
 }
 
@@ -335,7 +356,7 @@ mod tests {
     #[test]
     fn lobes_are_the_slice_without_its_base() {
         let plastic = test_materials::glossy_plastic();
-        let [slice, lobes] = Slice::with_lobes(&plastic, 45f64.to_radians());
+        let [slice, lobes] = Slice::with_lobes(&plastic, 45f64.to_radians(), Resolution::FULL);
         let mirror = dvec3(-1.0, 0.0, 1.0).normalize();
         let near = |slice: &Slice| {
             let count = 1000;
@@ -345,7 +366,7 @@ mod tests {
         assert!(of_all < 0.3 && of_lobes > 2.0 * of_all, "{of_all} {of_lobes}");
         // Nothing stands out of Lambert: anywhere will do.
         let lambert = Brdf::from_parameters("lambert", toml::toml! { reflectance = 0.5 }).unwrap();
-        let [_, lobes] = Slice::with_lobes(&lambert, 0.5);
+        let [_, lobes] = Slice::with_lobes(&lambert, 0.5, Resolution::FULL);
         assert!(lobes.albedo() == DVec3::ZERO && lobes.direction(DVec2::splat(0.5)).z > 0.0);
     }
 

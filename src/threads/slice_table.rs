@@ -1,16 +1,16 @@
 //! The CDFs of a BRDF's slices at all view angles: what importance sampling draws directions by (Matusik et al. 2003).
 use rayon::prelude::*;
 
-use super::slice::Slice;
+use super::slice::{Resolution, Slice};
 use super::theta_o;
 use crate::brdf::Brdf;
 
 /// View angles: theta_o = row 90 deg / ROWS. `SLICE_ROWS` in glsl/importance_sampling.glsl.
 pub const ROWS: usize = 90;
 /// Rings of the half vector: theta_h = 90 deg x^2, x in steps of 1 / RINGS. `SLICE_RINGS`.
-pub const RINGS: usize = Slice::STEPS[0] / MERGED;
+pub const RINGS: usize = Resolution::FULL.theta / MERGED;
 /// Azimuths of the half vector from -180 degrees. `SLICE_AZIMUTHS`.
-pub const AZIMUTHS: usize = Slice::STEPS[1] / MERGED;
+pub const AZIMUTHS: usize = Resolution::FULL.phi / MERGED;
 /// Numbers of a row. `SLICE_SIZE`.
 pub const ROW_SIZE: usize = RINGS + 1 + RINGS * (AZIMUTHS + 1);
 

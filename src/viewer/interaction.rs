@@ -1,20 +1,21 @@
 //! The viewer: what inputs do to the session, and the frames that follow from it. Knows nothing of the window system.
 use super::change::Change;
 use super::comparer::Comparer;
-use super::comparison::Wipe;
+use super::comparison::{Other, Wipe, compare_with};
 use super::dynamic_resolution::DynamicResolution;
 use super::input::{DragAction, Dropped, Input, change_of_dropped};
+use super::latency::{Answer, Latency, Record, Stats};
 use super::latest_job::{LatestJob, Progress};
 use super::loaded::Loaded;
 use super::measured::Measured;
 use super::orbit::{Bounds, Orbit, environment_turn_deg};
 use super::presenter::{Drawn, Extras, Presenter, ShownPicture};
 use super::session::Session;
-use crate::memo::{Key, Memo};
+use crate::memo::{Key, Memo, Round};
 use crate::output::{self, Format};
 use crate::passes::{Area, View};
 use crate::pipeline::{DeviceScene, Wanted};
-use crate::prepare::{key_of, prepare, view_of};
+use crate::prepare::{Prepared, can_draft, key_of, prepare, prepare_draft, view_of};
 #[cfg(feature = "hot-reload")]
 use crate::progress::Observer;
 use crate::scene::{Background, Scene};
@@ -28,6 +29,10 @@ use std::time::{Duration, Instant};
 
 /// A picture is still moving for so long after the last motion: a scroll wheel has no release.
 const SETTLING: Duration = Duration::from_millis(150);
+/// Frames wait for a draft so long at most.
+const DRAFT_PATIENCE: Duration = Duration::from_millis(100);
+/// Threads are finished when nobody has asked for others for so long: what is dragged moves more often.
+const BEFORE_FINISHING: Duration = Duration::from_millis(100);
 
 /// Something to tell the user.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -58,6 +63,17 @@ pub struct Viewer {
     loading: LatestJob<Loaded>,
     /// What was asked for last.
     requested: Option<Key>,
+    /// Since when a draft is being made of what was asked for last; none if it is there, or there is none.
+    drafting_since: Option<Instant>,
+    /// Whether more may be wanted than the draft that the next frame shows. It is asked for then: making it now would hold that frame up.
+    request_after_frame: bool,
+    /// How long inputs wait to be seen.
+    pub latency: Latency,
+    /// Number of the latest change.
+    changes: u64,
+    record: Record,
+    /// The drafts that were shown, where they are to be measured: each with the number of the answer that it was.
+    drafts: Vec<(usize, Arc<Prepared>)>,
     dynamic_resolution: DynamicResolution,
     last_motion: Option<Instant>,
     last_turn: Option<Instant>,
@@ -86,6 +102,12 @@ impl Viewer {
             cursor: None,
             loading: LatestJob::new("loading", move || wake()),
             requested: None,
+            drafting_since: None,
+            request_after_frame: false,
+            latency: Latency::keeping(100),
+            changes: 0,
+            record: Record::default(),
+            drafts: Vec::new(),
             dynamic_resolution: DynamicResolution::default(),
             last_motion: None,
             last_turn: None,
@@ -96,6 +118,39 @@ impl Viewer {
         };
         viewer.request();
         viewer
+    }
+
+    /// Records more, from now on, of how long inputs wait.
+    pub fn record(&mut self, record: Record) {
+        if record != Record::Latest {
+            self.latency = Latency::keeping(usize::MAX);
+        }
+        self.record = record;
+    }
+
+    /// How long inputs waited; none unless all were to be recorded.
+    ///
+    /// # Errors
+    /// Whatever goes wrong where drafts are measured.
+    pub fn stats(&self) -> Result<Option<Stats>> {
+        if self.record == Record::Latest {
+            return Ok(None);
+        }
+        let mut events: Vec<Answer> = self.latency.answers().iter().cloned().collect();
+        for (index, draft) in &self.drafts {
+            let finished = Other::Shading(draft.scene.shading.clone());
+            let rms = &mut events[*index].rms_to_finished;
+            compare_with(draft, &finished, &self.device, &self.memo, &(), &mut |compared| {
+                *rms = compared.metrics.map(|metrics| metrics.rms);
+            })?;
+        }
+        Ok(Some(Stats {
+            device: self.device.description().name.clone(),
+            size: [self.area.width, self.area.height],
+            median_shown_ms: self.latency.shown_ms(0.5),
+            p95_shown_ms: self.latency.shown_ms(0.95),
+            events,
+        }))
     }
 
     /// What is shown, if it has been loaded.
@@ -118,6 +173,23 @@ impl Viewer {
         self.loading.is_busy()
     }
 
+    /// Until when frames wait for the draft that is being made, if one is: where a slider is and what it asks for are shown together.
+    pub fn draft_awaited_until(&self) -> Option<Instant> {
+        self.drafting_since.map(|since| since + DRAFT_PATIENCE)
+    }
+
+    /// A frame was drawn of what was loaded: what was wanted meanwhile is asked for.
+    pub fn frame_was_drawn(&mut self) {
+        if std::mem::take(&mut self.request_after_frame) {
+            self.request();
+        }
+    }
+
+    /// Whether the next frame shows a draft that no frame has shown yet.
+    pub fn has_new_draft(&self) -> bool {
+        self.request_after_frame
+    }
+
     /// Whether anything is made in the background.
     pub fn is_busy(&self) -> bool {
         self.is_loading() || self.comparer.is_busy()
@@ -131,9 +203,18 @@ impl Viewer {
 
     /// Does what the user asks for. Whatever goes wrong is told by a notice, and changes nothing.
     pub fn handle(&mut self, input: &Input) {
+        let (start, changes) = (Instant::now(), self.changes);
         if let Err(error) = self.try_handle(input) {
             self.tell_error(&error);
+        } else if self.changes > changes {
+            let is_loaded = self.loaded.as_ref().is_some_and(|loaded| loaded.key.is_some() && loaded.key == self.key());
+            self.latency.asked(input, start, (!is_loaded).then_some(self.changes));
         }
+    }
+
+    /// What is wanted is made of this; none where a file cannot be read.
+    fn key(&self) -> Option<Key> {
+        key_of(self.session.wanted(), &self.memo).ok()
     }
 
     fn try_handle(&mut self, input: &Input) -> Result<()> {
@@ -161,6 +242,7 @@ impl Viewer {
                     (scene.image.width, scene.image.height) = (self.area.width, self.area.height);
                     scene.files().for_each(|path| self.memo.look_again(path));
                     self.session.replace(scene);
+                    self.changes += 1;
                     self.request();
                     Ok(())
                 }
@@ -234,6 +316,7 @@ impl Viewer {
             self.memo.look_again(path);
         }
         self.session.change(change)?;
+        self.changes += 1;
         self.request();
         Ok(())
     }
@@ -248,21 +331,36 @@ impl Viewer {
         self.change(&Change::Camera(Some(orbit.camera())))
     }
 
-    /// Asks for what is wanted, if that is another than what was asked for last.
+    /// Asks for what is wanted, if that is another than what was asked for last: for a draft of it first, where that can be.
     fn request(&mut self) {
         let scene = self.session.wanted().clone();
         // Where a file cannot be read there is no key, and asking for it tells why.
-        let key = key_of(&scene, &self.memo).ok();
+        let key = self.key();
         if key.is_some() && self.requested == key {
             return;
         }
-        self.requested = key;
-        let (device, memo) = (self.device.clone(), self.memo.clone());
+        let before = self.loaded.as_ref().map(|loaded| loaded.prepared.clone());
+        let before = before.filter(|before| can_draft(&scene, before));
+        if before.is_some() && (self.drafting_since.is_some() || self.request_after_frame) {
+            // The draft that is being made is shown first: else one that moves would never be seen.
+            return;
+        }
+        (self.requested, self.drafting_since) = (key, before.is_some().then(Instant::now));
+        let (device, memo, change) = (self.device.clone(), self.memo.clone(), self.changes);
         self.loading.request(move |task| {
+            let loaded = |prepared: Prepared, round: &Round, is_draft: bool| -> Result<Loaded> {
+                let renderer = Arc::new(DeviceScene::new(&device, &prepared, round)?);
+                Ok(Loaded { prepared: Arc::new(prepared), renderer, key, is_draft, change })
+            };
+            if let Some(before) = before {
+                let round = memo.round(task);
+                if let Some(draft) = prepare_draft(&scene, &before, &round)? {
+                    task.publish(loaded(draft, &round, true)?);
+                    task.rest(BEFORE_FINISHING)?;
+                }
+            }
             let round = memo.round(task);
-            let prepared = prepare(&scene, &round)?;
-            let renderer = DeviceScene::new(&device, &prepared, &round)?;
-            Ok(Loaded { prepared: Arc::new(prepared), renderer: Arc::new(renderer), key })
+            loaded(prepare(&scene, &round)?, &round, false)
         });
     }
 
@@ -270,15 +368,16 @@ impl Viewer {
     #[cfg(feature = "hot-reload")]
     fn reload_shaders(&mut self) {
         let scene = self.session.wanted().clone();
-        let key = key_of(&scene, &self.memo).ok();
-        self.requested = key;
+        let (key, change) = (self.key(), self.changes);
+        (self.requested, self.drafting_since) = (key, None);
         let (device, memo) = (self.device.clone(), self.memo.clone());
         self.loading.request(move |task| {
             Observer::begin(task, "shaders");
             let round = memo.round(task);
             let prepared = prepare(&scene, &round)?;
             let renderer = crate::vulkan::hot_reload::reload(|| DeviceScene::new(&device, &prepared, &round))?;
-            Ok(Loaded { prepared: Arc::new(prepared), renderer: Arc::new(renderer), key })
+            let (prepared, renderer) = (Arc::new(prepared), Arc::new(renderer));
+            Ok(Loaded { prepared, renderer, key, is_draft: false, change })
         });
     }
 
@@ -297,15 +396,18 @@ impl Viewer {
         });
         while let Some(result) = self.loading.take() {
             is_new = true;
+            let was_drafting = self.drafting_since.take().is_some();
             match result {
                 Ok(loaded) => {
                     self.session.loaded(loaded.prepared.scene.clone());
                     self.loaded = Some(loaded);
+                    self.request_after_frame = was_drafting;
                 }
                 Err(Error::Cancelled) => {}
                 Err(error) if self.loaded.is_none() => return Err(error),
                 Err(error) => {
                     self.session.failed();
+                    self.latency.failed();
                     self.requested = self.loaded.as_ref().and_then(|loaded| loaded.key);
                     self.tell_error(&error);
                 }
@@ -377,8 +479,9 @@ impl Viewer {
     ) -> Result<Option<Drawn>> {
         let start = Instant::now();
         self.turn();
-        let is_moving = self.is_moving(is_held) && !screenshot;
         let loaded = self.loaded.clone();
+        let is_draft = loaded.as_ref().is_some_and(|loaded| loaded.is_draft);
+        let is_moving = (self.is_moving(is_held) || is_draft) && !screenshot;
         let view = match &loaded {
             Some(loaded) => {
                 let mut view = self.view(loaded)?;
@@ -397,8 +500,17 @@ impl Viewer {
             view,
             area: self.area,
         });
-        let extras = Extras { counts: !is_moving, screenshot };
+        let change = loaded.as_ref().map_or(0, |loaded| loaded.change);
+        let is_awaited = loaded.is_some() && self.latency.is_awaited(change, is_draft);
+        let extras = Extras { counts: !is_moving, screenshot, completion: is_awaited };
         let drawn = stage.draw(size, picture, panel, textures, extras)?;
+        self.frame_was_drawn();
+        if drawn.is_some() && is_awaited {
+            self.latency.shown(change, is_draft, Instant::now());
+            if let Some(draft) = loaded.as_ref().filter(|_| is_draft && self.record == Record::AllAndErrors) {
+                self.drafts.push((self.latency.answers().len() - 1, self.seen(draft)?));
+            }
+        }
         if let (Some(drawn), Some(view)) = (&drawn, &view) {
             let frame = start.elapsed();
             let size = [view.width, view.height];
@@ -416,12 +528,26 @@ impl Viewer {
         Ok(drawn)
     }
 
+    /// What was loaded, as it is looked at now.
+    fn seen(&self, loaded: &Loaded) -> Result<Arc<Prepared>> {
+        let view = self.view(loaded)?;
+        Ok(Arc::new(Prepared { scene: self.session.shown().clone(), view, ..(*loaded.prepared).clone() }))
+    }
+
     /// How the scene that is shown is looked at.
     fn view(&self, loaded: &Loaded) -> Result<View> {
         let mut view = view_of(self.session.shown(), loaded.prepared.bounding_sphere())?;
         // Others have yet to be compiled.
         view.subpixels = loaded.renderer.view.subpixels;
         Ok(view)
+    }
+
+    /// What is shown as a `draft`, with finished threads, which are waited for.
+    fn finished(&self, draft: &Loaded) -> Result<Loaded> {
+        let round = self.memo.round(&());
+        let prepared = prepare(&draft.prepared.scene, &round)?;
+        let renderer = Arc::new(DeviceScene::new(&self.device, &prepared, &round)?);
+        Ok(Loaded { prepared: Arc::new(prepared), renderer, is_draft: false, ..draft.clone() })
     }
 
     /// Saves what is shown, as `threadlight render` would make it.
@@ -431,6 +557,7 @@ impl Viewer {
         let Some(loaded) = self.loaded.clone() else {
             return Err(Error::input("the picture", "has not been loaded yet", "wait until it is shown"));
         };
+        let loaded = if loaded.is_draft { self.finished(&loaded)? } else { loaded };
         let mut renderer = (*loaded.renderer).clone();
         renderer.view = self.view(&loaded)?;
         let wanted = Wanted { radiance: format == Format::Exr, display: format == Format::Png, geometry: false };

@@ -95,6 +95,7 @@ impl<T: Send + 'static> LatestJob<T> {
     /// Ends what was asked for, without a result.
     pub fn cancel(&self) {
         drop(self.shared.forget());
+        self.shared.called.notify_one();
     }
 
     /// The oldest result of the newest request that was not taken yet: what it [published](Task::publish), then what it returned.
@@ -194,6 +195,17 @@ impl<T: Send> Task<T> {
     pub fn publish(&self, result: T) {
         self.shared.keep(self.number, Ok(result));
         (self.shared.wake)();
+    }
+
+    /// Does nothing for so long: whoever asks again meanwhile does not have to wait for the rest.
+    ///
+    /// # Errors
+    /// Cancelled.
+    pub fn rest(&self, time: Duration) -> Result<()> {
+        let state = self.shared.lock();
+        let rested = self.shared.called.wait_timeout_while(state, time, |_| !self.cancelled());
+        drop(rested.unwrap_or_else(PoisonError::into_inner));
+        self.check()
     }
 
     fn report(&self, change: impl FnOnce(&mut Progress)) {
@@ -302,6 +314,23 @@ mod tests {
         assert!(!jobs.is_busy());
         jobs.request(|_| Ok(5));
         assert_eq!(wait(&jobs).unwrap(), 5);
+    }
+
+    #[test]
+    fn a_rest_ends_when_something_else_is_asked_for() {
+        let jobs = LatestJob::new("test", || ());
+        let (began, begins) = mpsc::channel();
+        jobs.request(move |task| {
+            began.send(()).unwrap();
+            task.rest(Duration::from_secs(100))?;
+            Ok(1)
+        });
+        begins.recv().unwrap();
+        jobs.request(|task| {
+            task.rest(Duration::from_millis(5))?;
+            Ok(2)
+        });
+        assert_eq!(wait(&jobs).unwrap(), 2);
     }
 
     #[test]

@@ -13,4 +13,8 @@ pub struct Loaded {
     pub renderer: Arc<DeviceScene>,
     /// What it was made of.
     pub key: Option<Key>,
+    /// Whether some of its threads only stand in for those that are being made.
+    pub is_draft: bool,
+    /// The change that it was asked for by: [`super::latency::Latency::asked`].
+    pub change: u64,
 }

@@ -12,6 +12,7 @@
 //! | when that is made anew | [`comparer`] | |
 //! | the threads of what is under the cursor | [`threads_seen`] | egui |
 //! | what frames have shown of themselves | [`measured`] | pure |
+//! | how long inputs wait to be seen | [`latency`] | pure |
 //! | what inputs do, and the frames that follow | [`interaction`] | |
 //! | what is shown and set beside the picture | `panel` | egui |
 //! | frames into the window | [`presenter`] | Vulkan, by the frame graph |
@@ -23,6 +24,7 @@ pub mod comparison;
 pub mod dynamic_resolution;
 pub mod input;
 pub mod interaction;
+pub mod latency;
 pub mod latest_job;
 pub mod loaded;
 pub mod measured;
@@ -39,6 +41,7 @@ use crate::scene::Scene;
 use crate::vulkan::PresentMode;
 use crate::{Error, Result};
 use input::Input;
+use latency::{Record, Stats};
 use std::path::PathBuf;
 use std::time::Duration;
 use winit::event_loop::EventLoop;
@@ -64,19 +67,29 @@ pub struct ViewerSettings {
     pub replay: Vec<Input>,
     /// The longest that a `"wait"` of it may take.
     pub replay_limit: Duration,
+    /// What to record of how long inputs wait to be seen.
+    pub record: Record,
 }
 
-/// Opens a window and runs until it is closed. Gives the validation layer's messages.
+/// What a session leaves.
+pub struct Ended {
+    /// The validation layer's messages.
+    pub messages: Vec<String>,
+    /// How long inputs waited, if all were to be recorded.
+    pub stats: Option<Stats>,
+}
+
+/// Opens a window and runs until it is closed.
 ///
 /// # Errors
 /// No window system, no device that presents to it, a scene that cannot be loaded.
-pub fn run(settings: ViewerSettings) -> Result<Vec<String>> {
+pub fn run(settings: ViewerSettings) -> Result<Ended> {
     let event_loop = EventLoop::<window::Wake>::with_user_event().build()?;
     let mut app = window::App::new(settings, event_loop.create_proxy());
     event_loop.run_app(&mut app)?;
-    let window::App { result, messages, .. } = app;
+    let window::App { result, messages, stats, .. } = app;
     result?;
-    Ok(messages.map(|messages| messages.all()).unwrap_or_default())
+    Ok(Ended { messages: messages.map(|messages| messages.all()).unwrap_or_default(), stats })
 }
 
 /// What the window system refuses.

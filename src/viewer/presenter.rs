@@ -43,13 +43,15 @@ impl Drawn {
     }
 }
 
-/// What a frame is to leave besides the picture in the window. Both wait for the GPU.
+/// What a frame is to leave besides the picture in the window. All wait for the GPU.
 #[derive(Clone, Copy, Default)]
 pub struct Extras {
     /// What was counted.
     pub counts: bool,
     /// What the window shows.
     pub screenshot: bool,
+    /// That it has been drawn when [`Presenter::draw`] returns.
+    pub completion: bool,
 }
 
 /// A frame in the window.
@@ -160,7 +162,7 @@ impl Presenter {
             }
             false => executable.execute_pass_by_pass(&mut self.frames, turn.semaphores)?,
         };
-        if counts.is_some() || screenshot.is_some() {
+        if counts.is_some() || screenshot.is_some() || extras.completion {
             self.frames.wait()?;
         }
         let ran = executable.plan.passes.iter().map(|pass| pass.name.clone()).collect();

@@ -1,6 +1,7 @@
 //! The window: what winit tells becomes inputs, and frames are drawn when there is something new.
 use super::input::{Button, Drag, Input, Scroll};
 use super::interaction::Viewer;
+use super::latency::Stats;
 use super::panel::{self, Panel};
 use super::presenter::Presenter;
 use super::{ViewerSettings, failed};
@@ -40,6 +41,8 @@ pub struct App {
     pub result: Result<()>,
     /// What the validation layer said, once there is an instance.
     pub messages: Option<Messages>,
+    /// How long inputs waited, if that was to be recorded.
+    pub stats: Option<Stats>,
 }
 
 /// An open window.
@@ -79,7 +82,7 @@ struct Script {
 impl App {
     /// An app that will open its window when winit says so.
     pub fn new(settings: ViewerSettings, proxy: EventLoopProxy<Wake>) -> Self {
-        Self { settings, proxy, open: None, result: Ok(()), messages: None }
+        Self { settings, proxy, open: None, result: Ok(()), messages: None, stats: None }
     }
 
     fn open(&mut self, event_loop: &ActiveEventLoop) -> Result<Open> {
@@ -113,10 +116,11 @@ impl App {
             Some(device.limits().max_image_dimension2_d as usize),
         );
         let proxy = self.proxy.clone();
-        let viewer = Viewer::new(scene.clone(), &device, Memo::new(cache.as_deref()), move || {
+        let mut viewer = Viewer::new(scene.clone(), &device, Memo::new(cache.as_deref()), move || {
             // A loop that has ended needs no waking.
             let _ = proxy.send_event(Wake);
         });
+        viewer.record(self.settings.record);
         let frames_left = frames.or(screenshot.is_some().then_some(1));
         let script =
             Script { replay: replay.clone().into(), frames_left, resizing: None, is_undrawn: true, waiting: None };
@@ -239,7 +243,11 @@ impl Open {
             }
             self.script.resizing = None;
         }
-        if self.script.is_undrawn && self.due.is_some_and(|due| due <= Instant::now()) {
+        if self.script.is_undrawn && self.due.is_some() || self.viewer.has_new_draft() {
+            return Ok(false);
+        }
+        if self.viewer.draft_awaited_until().is_some_and(|until| Instant::now() < until) {
+            // Nor does a user see where the slider is.
             return Ok(false);
         }
         let Some(input) = self.script.replay.front().cloned() else { return Ok(false) };
@@ -418,6 +426,9 @@ impl ApplicationHandler<Wake> for App {
             Ok(true) => return self.end(event_loop, Ok(())),
             Err(error) => return self.end(event_loop, Err(error)),
         }
+        if let Some(until) = open.viewer.draft_awaited_until() {
+            open.due = open.due.map(|due| due.max(until));
+        }
         let flow = match open.due.into_iter().chain(open.script.waiting).min() {
             None => ControlFlow::Wait,
             Some(until) if until <= Instant::now() => {
@@ -431,7 +442,13 @@ impl ApplicationHandler<Wake> for App {
 
     fn exiting(&mut self, _: &ActiveEventLoop) {
         // All that Vulkan made goes while the window is still there.
-        self.open = None;
+        let Some(open) = self.open.take() else { return };
+        if self.result.is_ok() {
+            match open.viewer.stats() {
+                Ok(stats) => self.stats = stats,
+                Err(error) => self.result = Err(error),
+            }
+        }
     }
 }
 

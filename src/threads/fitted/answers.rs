@@ -3,8 +3,9 @@
 use std::ops::Range;
 use std::sync::OnceLock;
 
-use super::kernel::{Kernel, SHARPEST_LEVEL, WIDEST_LEVEL, exp, kappa_of_level};
+use super::kernel::{Kernel, SHARPEST_LEVEL, WIDEST_LEVEL, kappa_of_level};
 use super::lights::{LANES, SCALES, TestLights, light_kappa};
+use crate::vector_math::exp;
 
 /// What the overlap of two kernels needs of their kappas a and b.
 #[derive(Clone, Copy, Debug)]

@@ -11,7 +11,7 @@ use super::table::FittedTable;
 use crate::brdf::Brdf;
 use crate::error::{Error, Result};
 use crate::progress::Observer;
-use crate::threads::slice::Slice;
+use crate::threads::slice::{Resolution, Slice};
 use crate::threads::{ThreadSettings, theta_o};
 
 /// Steps of the first row, which starts from cells, and of the others.
@@ -48,7 +48,7 @@ pub fn generate(brdf: &Brdf, settings: &ThreadSettings, observer: &dyn Observer)
         if observer.cancelled() {
             return Err(Error::Cancelled);
         }
-        let slices = Slice::with_lobes(brdf, theta_o(row, rows));
+        let slices = Slice::with_lobes(brdf, theta_o(row, rows), Resolution::FULL);
         let [slice, lobes] = &slices;
         let lights =
             TestLights::new(&slices, FEWEST_LIGHTS + LIGHTS_A_THREAD * settings.count, LIGHTS_SEED, Quadrature::FIT);
@@ -91,12 +91,12 @@ pub fn generate(brdf: &Brdf, settings: &ThreadSettings, observer: &dyn Observer)
 }
 
 /// The same with `scale` times the weights.
-fn scaled(kernels: &[Kernel], scale: f64) -> Vec<Kernel> {
+pub(super) fn scaled(kernels: &[Kernel], scale: f64) -> Vec<Kernel> {
     kernels.iter().map(|kernel| Kernel { weight: scale * kernel.weight, ..*kernel }).collect()
 }
 
 /// Kernels of the row for view angle `from` as a start for that of `to`.
-fn carried(kernels: &[Kernel], from: f64, to: f64) -> Vec<Kernel> {
+pub(super) fn carried(kernels: &[Kernel], from: f64, to: f64) -> Vec<Kernel> {
     let [w_from, w_to] = [from, to].map(|theta_o| dvec3(theta_o.sin(), 0.0, theta_o.cos()));
     let carry = |kernel: &Kernel| {
         let h = (kernel.direction + w_from).normalize();

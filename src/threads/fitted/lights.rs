@@ -3,11 +3,12 @@ use std::f64::consts::{FRAC_1_PI, PI, TAU};
 use std::ops::Range;
 use std::sync::OnceLock;
 
-use glam::{DVec2, DVec3, Vec3, dvec2, dvec3};
+use glam::{DVec2, DVec3, Vec3, dvec2};
 
-use super::kernel::{exp, vmf_direction, vmf_peak};
+use super::kernel::{vmf_direction, vmf_peak};
 use crate::brdf::luminance;
 use crate::threads::slice::{Slice, fibonacci_lattice};
+use crate::vector_math::exp;
 
 /// Widths of the lights: so many, evenly spaced in their logarithm from a third of a degree, a pixel of a map of 1024 columns, to
 /// where a light is as wide as the hemisphere.
@@ -63,6 +64,8 @@ pub struct Quadrature {
 impl Quadrature {
     /// What a fit needs: with three times as many points of a light its error is the same.
     pub const FIT: Self = Self { slice_points: 1500, light_points: 16 };
+    /// For drafts.
+    pub const DRAFT: Self = Self { slice_points: 400, light_points: 8 };
     /// Far more, to see what the fit's leaves.
     pub const FINE: Self = Self { slice_points: 6000, light_points: 200 };
 }
@@ -129,9 +132,7 @@ impl Quadrature {
         for scale in 0..SCALES {
             let kappa = light_kappa(scale);
             let peak = vmf_peak(kappa);
-            let offsets: Vec<DVec3> = fibonacci_lattice(self.light_points)
-                .map(|uv| vmf_direction(DVec3::Z, kappa, uv.x, TAU * uv.y))
-                .collect();
+            let offsets = kernel_points(kappa, self.light_points);
             for j in each * scale..each * (scale + 1) {
                 let (x, y) = directions[j].any_orthonormal_pair();
                 let points =
@@ -220,7 +221,10 @@ fn cosine_response(z: f64, scale: usize) -> f64 {
     const STEPS: usize = 512;
     static TABLES: OnceLock<Vec<Vec<f64>>> = OnceLock::new();
     let tables = TABLES.get_or_init(|| {
-        let table = |scale| (0..=STEPS).map(|i| cosine_integral(2.0 * i as f64 / STEPS as f64 - 1.0, scale)).collect();
+        let table = |scale| {
+            let points = kernel_points(light_kappa(scale), 512);
+            (0..=STEPS).map(|i| cosine_integral(2.0 * i as f64 / STEPS as f64 - 1.0, &points)).collect()
+        };
         (0..SCALES).map(table).collect()
     });
     let at = (0.5 * (z + 1.0)).clamp(0.0, 1.0) * STEPS as f64;
@@ -229,10 +233,13 @@ fn cosine_response(z: f64, scale: usize) -> f64 {
     table[below] + (table[below + 1] - table[below]) * (at - below as f64)
 }
 
-/// That integral for a light of `scale` whose direction has this z.
-fn cosine_integral(z: f64, scale: usize) -> f64 {
-    let d = dvec3((1.0 - z * z).max(0.0).sqrt(), 0.0, z);
-    let count = 512;
-    let points = fibonacci_lattice(count).map(|uv| vmf_direction(d, light_kappa(scale), uv.x, TAU * uv.y).z.max(0.0));
-    FRAC_1_PI * points.sum::<f64>() / count as f64
+/// That integral for a light of these points whose direction has this z.
+fn cosine_integral(z: f64, points: &[DVec3]) -> f64 {
+    let sin = (1.0 - z * z).max(0.0).sqrt();
+    FRAC_1_PI * points.iter().map(|point| (z * point.z + sin * point.x).max(0.0)).sum::<f64>() / points.len() as f64
+}
+
+/// So many points of equal mass of the kernel of this kappa around z.
+fn kernel_points(kappa: f64, count: usize) -> Vec<DVec3> {
+    fibonacci_lattice(count).map(|uv| vmf_direction(DVec3::Z, kappa, uv.x, TAU * uv.y)).collect()
 }

@@ -8,10 +8,12 @@
 //! | how kernels answer them | [`answers`] |
 //! | the fit of one row | [`solve`] |
 //! | of all rows | [`generate()`] |
+//! | of an edited BRDF, at once and coarsely | [`draft()`] |
 //! | what a fit leaves, under other lights | [`validation_error`] |
 //! | as stored and looked up, 12 bytes a thread and row | [`FittedTable`] |
 pub mod answers;
 pub mod cells;
+mod draft;
 mod generate;
 pub mod kernel;
 pub mod lights;
@@ -21,6 +23,7 @@ mod table;
 mod tests;
 mod validate;
 
+pub use draft::draft;
 pub use generate::generate;
 pub use table::{FittedTable, PackedKernel, UnpackedKernel};
 pub use validate::validation_error;

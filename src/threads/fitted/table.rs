@@ -45,7 +45,7 @@ impl PackedKernel {
     }
 
     /// The same in double precision.
-    fn kernel(self) -> Kernel {
+    pub(super) fn kernel(self) -> Kernel {
         let UnpackedKernel { direction, level, weight } = self.unpack();
         Kernel { direction: direction.as_dvec3(), level: level.into(), weight: weight.as_dvec3() }
     }
@@ -87,15 +87,7 @@ impl FittedTable {
         let position = (theta_o / FRAC_PI_2 * self.rows as f64).clamp(0.0, (self.rows - 1) as f64);
         let (low, t) = (position as usize, position.fract());
         let high = (low + 1).min(self.rows - 1);
-        let between = |(a, b): (&PackedKernel, &PackedKernel)| {
-            let [a, b] = [a, b].map(|packed| packed.kernel());
-            Kernel {
-                direction: a.direction.lerp(b.direction, t).normalize(),
-                level: a.level + t * (b.level - a.level),
-                weight: a.weight.lerp(b.weight, t),
-            }
-        };
-        self.row(low).iter().zip(self.row(high)).map(between).collect()
+        self.row(low).iter().zip(self.row(high)).map(|(a, b)| a.kernel().between(&b.kernel(), t)).collect()
     }
 
     /// Expected error relative to the radiance, RMS over rows as a sphere shows them: sin(theta_o) cos(theta_o) of its picture each.

@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use glam::DVec3;
 
 use super::kernel::{Kernel, SHARPEST_LEVEL, WIDEST_LEVEL, scale_rad};
-use super::{FittedTable, MAX_COUNT, PackedKernel, generate};
+use super::{FittedTable, MAX_COUNT, PackedKernel, draft, generate, validation_error};
 use crate::brdf::{Brdf, CustomBrdf};
 use crate::error::Error;
 use crate::progress::Observer;
@@ -187,4 +187,56 @@ fn a_table_is_given_up_soon_after_cancelling() {
         // The row that is under way on the other core.
         assert!((at..at + 3).contains(&observer.2.load(Ordering::Relaxed)));
     }
+}
+
+/// Gold of this roughness.
+fn gold(alpha: f64) -> Brdf {
+    let (model, mut parameters) = Brdf::builtin_model("gold").unwrap();
+    parameters.insert("alpha".into(), alpha.into());
+    Brdf::from_parameters(&model, parameters).unwrap()
+}
+
+#[test]
+fn drafts_follow_an_edited_parameter_with_up_to_three_times_the_error() {
+    let settings = small(16, 90);
+    let mut drafted = generate(&gold(0.3), &settings, &()).unwrap();
+    let there = (1..=20).map(|step| 0.3 - 0.01 * f64::from(step));
+    for alpha in there.clone().chain(there.rev()) {
+        drafted = draft(&gold(alpha), &drafted, &()).unwrap();
+        check("gold", &drafted);
+    }
+    let [found, finished] =
+        [&drafted, &generate(&gold(0.29), &settings, &()).unwrap()].map(|table| validation_error(table, &gold(0.29)));
+    println!("after 40 drafts {found:.5}, finished {finished:.5}");
+    assert!(found < 3.0 * finished, "{found} {finished}");
+    let furnace = |row: usize| {
+        let weights: DVec3 = drafted.row(row).iter().map(|packed| packed.unpack().weight.as_dvec3()).sum();
+        weights + glam::Vec3::from(drafted.cosine_part[row]).as_dvec3()
+    };
+    for row in [0, 32, 60, 85] {
+        let albedo = gold(0.29).albedo(theta_o(row, drafted.rows));
+        assert!(((furnace(row) - albedo) / albedo).abs().max_element() < 4e-3, "{row}: {} {albedo}", furnace(row));
+    }
+}
+
+#[test]
+fn drafts_are_equal_to_the_bit_on_any_number_of_cores_and_can_be_cancelled() {
+    let before = generate(&gold(0.3), &small(4, 12), &()).unwrap();
+    let on = |cores: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(cores).build().unwrap();
+        pool.install(|| draft(&gold(0.32), &before, &()).unwrap())
+    };
+    assert_eq!(on(1), on(5));
+    struct Cancels;
+    impl Observer for Cancels {
+        fn progress(&self, _: usize, _: usize) {}
+        fn cancelled(&self) -> bool {
+            true
+        }
+    }
+    assert!(matches!(draft(&gold(0.32), &before, &Cancels), Err(Error::Cancelled)));
+    // From and to what reflects nothing.
+    let dark = draft(&black(), &before, &()).unwrap();
+    check("black", &dark);
+    check("gold", &draft(&gold(0.32), &dark, &()).unwrap());
 }

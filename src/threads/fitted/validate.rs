@@ -6,7 +6,7 @@ use super::lights::{Quadrature, TestLights};
 use super::solve::Fit;
 use super::table::FittedTable;
 use crate::brdf::Brdf;
-use crate::threads::slice::Slice;
+use crate::threads::slice::{Resolution, Slice};
 
 /// View angles, in degrees: of rows and between them, denser where pictures of spheres have more pixels or lobes are cut.
 const ANGLES_DEG: [f64; 12] = [3.25, 10.5, 20.75, 30.0, 37.5, 45.25, 52.5, 60.75, 68.5, 76.25, 83.5, 87.5];
@@ -20,7 +20,7 @@ const SEED: usize = 5;
 pub fn validation_error(table: &FittedTable, brdf: &Brdf) -> f64 {
     let error = |angle_deg: &f64| {
         let theta_o = angle_deg.to_radians();
-        let slices = Slice::with_lobes(brdf, theta_o);
+        let slices = Slice::with_lobes(brdf, theta_o, Resolution::FULL);
         let lights = TestLights::new(&slices, LIGHTS, SEED, Quadrature::FINE);
         let in_units = |kernel: Kernel| Kernel { weight: kernel.weight / lights.unit, ..kernel };
         let kernels: Vec<_> = table.seen_from(theta_o).into_iter().map(in_units).collect();
