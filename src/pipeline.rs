@@ -131,6 +131,11 @@ impl DeviceScene {
         })
     }
 
+    /// Whether it shades by the same compiled shader as `other`.
+    pub fn shades_as(&self, other: &Self) -> bool {
+        self.shade.pipeline.key == other.shade.pipeline.key
+    }
+
     /// Starts the random numbers of later frames from `seed`: other noise, for methods that have any.
     pub fn reseed(&mut self, seed: u64) {
         self.shade.sampling.seed = seed;

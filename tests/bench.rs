@@ -142,3 +142,24 @@ fn fit_prints_time_beside_error_and_writes_json() {
     let ([_, own], [one, four]) = (of_gold("fitted_error"), of_gold("validation_error"));
     assert!(four < one && four < 2.0 * own, "{own} {one} {four}");
 }
+
+#[test]
+fn live_measures_the_drafts_of_a_dragged_parameter() {
+    let folder = tempfile::tempdir().unwrap();
+    let drag = "live --environment white --size 24x18 --threads 4 --drag gold.alpha --from 0.3 --to 0.4 --steps 4";
+    let said = bench(&folder, &format!("{drag} --json live.json"));
+    for text in ["alpha of gold, 4 steps", "draft", "finished", "ratio", "change"] {
+        assert!(said.contains(text), "{said}");
+    }
+    let steps = json(&folder, "live.json");
+    let steps = steps.as_array().unwrap();
+    let values: Vec<_> = steps.iter().map(|step| step["value"].as_f64().unwrap()).collect();
+    assert_eq!(values.len(), 6);
+    assert!((values[2] - 0.4).abs() < 1e-12 && values[3] < 0.4 && (values[5] - 0.3).abs() < 1e-12, "{values:?}");
+    for step in steps {
+        let number = |key: &str| step[key].as_f64().unwrap();
+        // In white light nothing but the albedo counts, which drafts have to a part in a hundred.
+        assert!(number("draft_rms") < 0.01 && number("finished_rms") < 0.003, "{step}");
+        assert!(number("draft_ms") > 0.0 && number("draft_ms") < number("fit_ms"), "{step}");
+    }
+}

@@ -10,6 +10,7 @@
 //! | error and time of all of these: tables 2 to 4, figures 10 to 12 | [`sweep`] |
 //! | time of a frame beside its floor, and as things double: table 1 | [`speed`] |
 //! | what threads cost to make, beside what they are worth | [`fit`] |
+//! | what drafts of threads are worth while a parameter is dragged | [`live`] |
 //! | pictures side by side: figures 10, 11 and 13 | [`gallery`] |
 //! | how it looks | [`tables`], [`plots`], [`sheet`] |
 //! | all of it on one page | [`report`](mod@report) |
@@ -19,6 +20,7 @@ pub mod difference;
 pub mod expected;
 pub mod fit;
 pub mod gallery;
+pub mod live;
 pub mod metrics;
 pub mod plots;
 pub mod reference;

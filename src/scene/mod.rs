@@ -11,6 +11,7 @@ use crate::file_format::file_formats;
 pub mod camera;
 mod file;
 pub mod mesh;
+mod parameter;
 
 pub use camera::Camera;
 pub use mesh::Mesh;

@@ -1,13 +1,12 @@
 //! Changes of the scene, as the panel, a key or a dropped file makes them.
 use serde::{Deserialize, Serialize};
 
-use crate::brdf::Brdf;
 use crate::error::{Error, Result};
 use crate::method::Method;
 use crate::prepare::check_count;
 use crate::scene::{
-    Background, Camera, EXPOSURE, GAMMA, INTENSITY, MAX_SAMPLES, MAX_SIZE_PX, MAX_SUBPIXELS, MaterialSettings,
-    MaterialSource, Scene, Source,
+    Background, Camera, EXPOSURE, GAMMA, INTENSITY, MAX_SAMPLES, MAX_SIZE_PX, MAX_SUBPIXELS, MaterialSource, Scene,
+    Source,
 };
 use std::fmt::Display;
 use std::ops::RangeInclusive;
@@ -85,7 +84,7 @@ impl Change {
                 };
                 changed.use_material(&name, source.clone());
             }
-            Self::Parameter { material, key, value } => set_parameter(&mut changed, material, key, value)?,
+            Self::Parameter { material, key, value } => changed.set_parameter(material, key, value)?,
             Self::Environment(source) => environment.source = source.clone(),
             Self::Rotation(degrees) => {
                 environment.rotation_deg = within("rotation", *degrees, &(f64::MIN..=f64::MAX))?;
@@ -139,35 +138,6 @@ fn sampling(scene: &Scene) -> (Option<Method>, u32) {
     let method = Method::from_name(&scene.shading.method).ok();
     let default_count = method.map_or(0, Method::default_count);
     (method, scene.shading.threads.unwrap_or(default_count))
-}
-
-/// The model and the parameters of a material.
-///
-/// # Errors
-/// A file that cannot be read; a measured table, which has no parameters.
-pub fn model_of(material: &MaterialSettings) -> Result<(String, toml::Table)> {
-    let none = || Error::input(&material.name, "has no parameters", "choose a material that is a model");
-    match &material.source {
-        MaterialSource::Model { model, parameters } => Ok((model.clone(), parameters.clone())),
-        MaterialSource::Builtin(name) => Brdf::builtin_model(name).ok_or_else(none),
-        MaterialSource::File(path) if path.extension().is_some_and(|extension| extension == "toml") => {
-            Brdf::load_model(path)
-        }
-        MaterialSource::File(_) | MaterialSource::Custom(_) => Err(none()),
-    }
-}
-
-fn set_parameter(scene: &mut Scene, name: &str, key: &str, value: &toml::Value) -> Result<()> {
-    let names: Vec<_> = scene.materials.iter().map(|material| material.name.clone()).collect();
-    let material = scene.materials.iter_mut().find(|material| material.name == name).ok_or_else(|| {
-        let remedy = format!("name one of {}", names.join(", "));
-        Error::input(format!("material \"{name}\""), "is not in the scene", remedy)
-    })?;
-    let (model, mut parameters) = model_of(material)?;
-    parameters.insert(key.into(), value.clone());
-    Brdf::from_parameters(&model, parameters.clone()).map_err(|error| error.within(format!("material \"{name}\"")))?;
-    material.source = MaterialSource::Model { model, parameters };
-    Ok(())
 }
 
 #[cfg(test)]

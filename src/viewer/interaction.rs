@@ -75,6 +75,8 @@ pub struct Viewer {
     /// The drafts that were shown, where they are to be measured: each with the number of the answer that it was.
     drafts: Vec<(usize, Arc<Prepared>)>,
     dynamic_resolution: DynamicResolution,
+    /// Whether a frame has run the shader that shades what is loaded.
+    is_compiled: bool,
     last_motion: Option<Instant>,
     last_turn: Option<Instant>,
     #[cfg(feature = "hot-reload")]
@@ -109,6 +111,7 @@ impl Viewer {
             record: Record::default(),
             drafts: Vec::new(),
             dynamic_resolution: DynamicResolution::default(),
+            is_compiled: false,
             last_motion: None,
             last_turn: None,
             #[cfg(feature = "hot-reload")]
@@ -400,7 +403,8 @@ impl Viewer {
             match result {
                 Ok(loaded) => {
                     self.session.loaded(loaded.prepared.scene.clone());
-                    self.loaded = Some(loaded);
+                    let before = self.loaded.replace(loaded.clone());
+                    self.is_compiled &= before.is_some_and(|before| before.renderer.shades_as(&loaded.renderer));
                     self.request_after_frame = was_drafting;
                 }
                 Err(Error::Cancelled) => {}
@@ -516,7 +520,11 @@ impl Viewer {
             let size = [view.width, view.height];
             if drawn.ran.iter().any(|pass| pass == "shade") {
                 let full = &self.session.shown().image;
-                self.dynamic_resolution.drawn(size, [full.width, full.height], drawn.picture_time().unwrap_or(frame));
+                // Drivers may compile a shader where it first runs.
+                if std::mem::replace(&mut self.is_compiled, true) {
+                    let time = drawn.picture_time().unwrap_or(frame);
+                    self.dynamic_resolution.drawn(size, [full.width, full.height], time);
+                }
             }
             tracing::debug!("{} x {} in {:.1} ms", size[0], size[1], frame.as_secs_f64() * 1e3);
             self.measured.frames += 1;

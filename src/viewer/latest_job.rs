@@ -10,6 +10,8 @@ use crate::progress::Observer;
 
 /// Progress wakes the event loop this often at most: a bar is no smoother for more.
 const WAKE_INTERVAL: Duration = Duration::from_millis(40);
+/// And not before the work has taken this long: a bar that flashes disturbs, and drawing it holds the work up.
+const UNTOLD: Duration = Duration::from_millis(500);
 /// Work that does not stop within this time of closing is left behind, as the window is to be gone within a second.
 const CLOSING_TIME: Duration = Duration::from_millis(800);
 
@@ -51,6 +53,8 @@ struct State<T> {
     results: VecDeque<Result<T>>,
     progress: Option<Progress>,
     last_wake: Instant,
+    /// When the work that is running was begun.
+    begun: Instant,
     closing: bool,
 }
 
@@ -72,6 +76,7 @@ impl<T: Send + 'static> LatestJob<T> {
             results: VecDeque::new(),
             progress: None,
             last_wake: Instant::now(),
+            begun: Instant::now(),
             closing: false,
         };
         let shared = Arc::new(Shared {
@@ -172,7 +177,7 @@ fn serve<T>(shared: &Arc<Shared<T>>) {
                 None => state = shared.called.wait(state).unwrap_or_else(PoisonError::into_inner),
             }
         };
-        state.running = Some(number);
+        (state.running, state.begun) = (Some(number), Instant::now());
         drop(state);
         let task = Task { number, shared: shared.clone() };
         // What the work leaves half done is dropped with it.
@@ -214,7 +219,7 @@ impl<T: Send> Task<T> {
             return;
         }
         change(state.progress.get_or_insert(Progress { what: String::new(), done: 0, total: 0 }));
-        let due = state.last_wake.elapsed() >= WAKE_INTERVAL;
+        let due = state.begun.elapsed() >= UNTOLD && state.last_wake.elapsed() >= WAKE_INTERVAL;
         if due {
             state.last_wake = Instant::now();
         }

@@ -3,6 +3,7 @@ mod arguments;
 mod error;
 mod fit;
 mod gallery;
+mod live;
 mod report;
 mod speed;
 
@@ -20,6 +21,7 @@ enum What {
     Error(Box<error::BenchError>),
     Speed(Box<speed::BenchSpeed>),
     Fit(fit::BenchFit),
+    Live(Box<live::BenchLive>),
     Gallery(Box<gallery::BenchGallery>),
     Report(Box<report::BenchReport>),
 }
@@ -30,6 +32,7 @@ impl Bench {
             What::Error(bench) => bench.run(),
             What::Speed(bench) => bench.run(),
             What::Fit(bench) => bench.run(),
+            What::Live(bench) => bench.run(),
             What::Gallery(bench) => bench.run(),
             What::Report(bench) => bench.run(),
         }

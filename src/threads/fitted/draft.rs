@@ -1,8 +1,7 @@
 //! Threads of an edited material at once: a few steps from those that are on screen, in few rows.
 use glam::DVec3;
-use rayon::prelude::*;
 
-use super::generate::{carried, scaled};
+use super::generate::{Neighbour, Row, carried, from_the_middle, scaled};
 use super::kernel::Kernel;
 use super::lights::{Quadrature, TestLights};
 use super::solve::{Effort, Fit};
@@ -16,19 +15,22 @@ use crate::threads::theta_o;
 /// Every so many rows one is fitted, and the last; the others are between them.
 const ROW_STEP: usize = 5;
 
-/// Small changes need two or three.
-const EFFORT: Effort = Effort { steps: 8, least_gain: 0.02 };
+/// Steps of the first row, from where its threads were, and of the others.
+const FIRST: Effort = Effort { steps: 12, least_gain: 5e-3 };
+const NEXT: Effort = Effort { steps: 12, least_gain: 0.01 };
 
-/// How strongly threads are tied to where they were: [`Fit::tied`]. With a hundredth of this they wander in a drag of a hundred drafts,
-/// each row its own way, until those between them err; with three times as much it is the same.
-const TIED: f64 = 3e-4;
+/// How strongly the first row is tied to where its threads were, and the others to their neighbours: [`Fit::tied`]. Tied to where they were
+/// themselves, rows stay together too, but all of them near where a drag began: over gold of all roughnesses that errs by half as much
+/// again. A third of this, and rows part; ten times, and a narrow lobe is not followed.
+const FIRST_TIED: f64 = 1e-6;
+const TIED: f64 = 1e-5;
 
 /// Test lights of a row: a third of those of a fit.
 const FEWEST_LIGHTS: usize = 256;
 const LIGHTS_A_THREAD: usize = 16;
 
 /// Threads of `brdf` that continue those of `before`, of a BRDF not far away: their error is up to three times that of [`super::generate()`],
-/// in a fortieth of the time. The same to the last bit on any number of cores.
+/// in a twentieth of the time. The same to the last bit on any number of cores.
 ///
 /// # Errors
 /// Cancelled by `observer`.
@@ -38,19 +40,26 @@ pub fn draft(brdf: &Brdf, before: &FittedTable, observer: &dyn Observer) -> Resu
     if !places.contains(&(rows - 1)) {
         places.push(rows - 1);
     }
-    let fit = |&row: &usize| -> Result<(Vec<Kernel>, DVec3, f64)> {
+    let angle = |row: usize| theta_o(row, rows);
+    let fit = |at: usize, neighbour: Neighbour| -> Result<Row> {
         observer.check()?;
-        let slices = Slice::with_lobes(brdf, theta_o(row, rows), Resolution::DRAFT);
+        let row = places[at];
+        let slices = Slice::with_lobes(brdf, angle(row), Resolution::DRAFT);
         let lights = TestLights::new(&slices, FEWEST_LIGHTS + LIGHTS_A_THREAD * count, 0, Quadrature::DRAFT);
         let albedo = slices[0].albedo();
         let start = scaled(&in_proportion(before, row, albedo), 1.0 / lights.unit);
-        let mut kernels = start.clone();
-        let fit = Fit::new(&lights, albedo / lights.unit).tied(&start, TIED);
-        fit.solve(&mut kernels, EFFORT, observer)?;
+        // Only directions and levels are tied, so weights may be in any unit.
+        let (tied_to, strength, effort) = match neighbour {
+            Some((from, (kernels, ..))) => (carried(kernels, angle(places[from]), angle(row)), TIED, NEXT),
+            None => (start.clone(), FIRST_TIED, FIRST),
+        };
+        let mut kernels = start;
+        let fit = Fit::new(&lights, albedo / lights.unit).tied(&tied_to, strength);
+        fit.solve(&mut kernels, effort, observer)?;
         let error = fit.relative_error(&kernels);
         Ok((scaled(&kernels, lights.unit), albedo, error))
     };
-    let fitted: Vec<_> = places.par_iter().map(fit).collect::<Result<_>>()?;
+    let fitted = from_the_middle(places.len(), &fit)?;
     let row = |row: usize| {
         let high = places.partition_point(|&place| place < row);
         if places[high] == row {
@@ -58,7 +67,7 @@ pub fn draft(brdf: &Brdf, before: &FittedTable, observer: &dyn Observer) -> Resu
         }
         let low = high - 1;
         let t = (row - places[low]) as f64 / (places[high] - places[low]) as f64;
-        let [a, b] = [low, high].map(|i| carried(&fitted[i].0, theta_o(places[i], rows), theta_o(row, rows)));
+        let [a, b] = [low, high].map(|i| carried(&fitted[i].0, angle(places[i]), angle(row)));
         let kernels = a.iter().zip(&b).map(|(a, b)| a.between(b, t)).collect();
         let ((_, albedo_a, error_a), (_, albedo_b, error_b)) = (&fitted[low], &fitted[high]);
         (kernels, albedo_a.lerp(*albedo_b, t), error_a + t * (error_b - error_a))

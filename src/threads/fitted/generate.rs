@@ -34,7 +34,10 @@ const LIGHTS_A_THREAD: usize = 8;
 const FOLLOWS_BELOW_RAD: f64 = 0.15;
 
 /// A row: its kernels, the albedo and the relative error.
-type Row = (Vec<Kernel>, DVec3, f64);
+pub(super) type Row = (Vec<Kernel>, DVec3, f64);
+
+/// A row that has been fitted, and its number; none for the first one.
+pub(super) type Neighbour<'a> = Option<(usize, &'a Row)>;
 
 /// Fits `settings.count` threads to `brdf`, the same to the last bit on any number of cores.
 ///
@@ -44,7 +47,7 @@ pub fn generate(brdf: &Brdf, settings: &ThreadSettings, observer: &dyn Observer)
     settings.check()?;
     let rows = settings.rows;
     let done = AtomicUsize::new(0);
-    let fit = |row: usize, from: Option<(usize, &[Kernel])>| -> Result<Row> {
+    let fit = |row: usize, from: Neighbour| -> Result<Row> {
         if observer.cancelled() {
             return Err(Error::Cancelled);
         }
@@ -56,7 +59,7 @@ pub fn generate(brdf: &Brdf, settings: &ThreadSettings, observer: &dyn Observer)
             return Err(Error::Cancelled);
         }
         let (start, effort) = match from {
-            Some((before, kernels)) => (carried(kernels, theta_o(before, rows), theta_o(row, rows)), NEXT),
+            Some((before, (kernels, ..))) => (carried(kernels, theta_o(before, rows), theta_o(row, rows)), NEXT),
             None => (cells(lobes, settings.count), FIRST),
         };
         let start = scaled(&start, 1.0 / lights.unit);
@@ -69,25 +72,33 @@ pub fn generate(brdf: &Brdf, settings: &ThreadSettings, observer: &dyn Observer)
         observer.progress(done.fetch_add(1, Ordering::Relaxed) + 1, rows);
         Ok((kernels, slice.albedo(), error))
     };
-    let middle = rows / 2;
+    Ok(FittedTable::pack(&from_the_middle(rows, &fit)?))
+}
+
+/// `fit` of each of `count` rows: of the middle one, then of the others one after the other outwards, each with the number of its neighbour
+/// and what came of that.
+pub(super) fn from_the_middle(
+    count: usize,
+    fit: &(impl Fn(usize, Neighbour) -> Result<Row> + Sync),
+) -> Result<Vec<Row>> {
+    let middle = count / 2;
     let first = fit(middle, None)?;
     let chain = |order: &mut dyn Iterator<Item = usize>| -> Result<Vec<Row>> {
         let mut chain: Vec<Row> = Vec::new();
         let mut before = middle;
         for row in order {
-            let kernels = &chain.last().unwrap_or(&first).0;
-            let next = fit(row, Some((before, kernels)))?;
+            let next = fit(row, Some((before, chain.last().unwrap_or(&first))))?;
             chain.push(next);
             before = row;
         }
         Ok(chain)
     };
-    let (down, up) = rayon::join(|| chain(&mut (0..middle).rev()), || chain(&mut (middle + 1..rows)));
+    let (down, up) = rayon::join(|| chain(&mut (0..middle).rev()), || chain(&mut (middle + 1..count)));
     let mut all = down?;
     all.reverse();
     all.push(first);
     all.extend(up?);
-    Ok(FittedTable::pack(&all))
+    Ok(all)
 }
 
 /// The same with `scale` times the weights.

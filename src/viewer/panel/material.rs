@@ -2,7 +2,7 @@
 use super::{group, on_change, source};
 use crate::brdf::{Brdf, Domain, Parameter, Spacing, as_number, channels};
 use crate::scene::{MaterialSettings, MaterialSource};
-use crate::viewer::change::{Change, model_of};
+use crate::viewer::change::Change;
 use crate::viewer::input::Input;
 use crate::viewer::interaction::Viewer;
 use egui::{SliderClamping, Ui};
@@ -56,7 +56,7 @@ impl State {
 
 /// The parameters of a material with their values; none if it has no model.
 fn parameters_of(settings: &MaterialSettings) -> Option<Vec<(Parameter, toml::Value)>> {
-    let (model, table) = model_of(settings).ok()?;
+    let (model, table) = settings.model().ok()?;
     let parameters = Brdf::parameters(&model, &table).ok()?;
     Some(
         parameters

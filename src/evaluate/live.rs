@@ -1,0 +1,192 @@
+//! What drafts of threads are worth while a parameter is dragged, there and back: `threadlight bench live`.
+use std::sync::Arc;
+use std::time::Instant;
+
+use super::reference::{ReferenceSettings, reference};
+use super::tables::{Section, Table};
+use super::{Comparable, Display, compare};
+use crate::error::{Error, Result};
+use crate::memo::{Memo, Round};
+use crate::pipeline::{DeviceScene, Wanted, median};
+use crate::prepare::{Prepared, prepare, prepare_draft};
+use crate::progress::{Observer, OnlyCancels};
+use crate::scene::{Background, Scene};
+use crate::vulkan::Device;
+
+/// A parameter that is dragged.
+#[derive(Clone, Debug)]
+pub struct Drag {
+    /// What is looked at, by fitted threads.
+    pub scene: Scene,
+    /// Name of a material of it.
+    pub material: String,
+    /// Key of a parameter of that.
+    pub key: String,
+    /// Its values, at least two: from the first to the last and back.
+    pub values: Vec<toml::Value>,
+}
+
+/// One value of a drag, on its way there or back. Errors are RMS of display values, over the pixels that see a surface.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct LiveStep {
+    /// Of the parameter.
+    pub value: toml::Value,
+    /// From threads of the value before to those of this one.
+    pub draft_ms: f64,
+    /// From nothing to finished threads.
+    pub fit_ms: f64,
+    /// Of the draft's picture.
+    pub draft_rms: f64,
+    /// Of the finished picture.
+    pub finished_rms: f64,
+    /// Largest change of a display value from the draft before.
+    pub draft_change: f64,
+    /// That of the reference.
+    pub reference_change: f64,
+}
+
+/// What a value of the parameter has, whichever way it is come to.
+struct Truth {
+    reference: Comparable,
+    fit_ms: f64,
+    finished_rms: f64,
+}
+
+/// Drags and measures; `found` has the steps until an error or an interruption. `memo` keeps references and filtered environments.
+///
+/// # Errors
+/// A parameter or values that there are not, a scene that cannot be prepared, a material whose threads cannot be drafted,
+/// [`Error::Cancelled`].
+pub fn run(
+    drag: &Drag,
+    settings: &ReferenceSettings,
+    device: &Arc<Device>,
+    memo: &Memo,
+    observer: &dyn Observer,
+    found: &mut Vec<LiveStep>,
+) -> Result<()> {
+    let values = &drag.values;
+    let total = 3 * values.len() - 2;
+    let mut done = 0;
+    let mut next = || {
+        done += 1;
+        observer.progress(done, total);
+        observer.check()
+    };
+    let inner = OnlyCancels(observer);
+    let mut truths = Vec::new();
+    for value in values {
+        truths.push(truth(&drag.scene_at(value)?, settings, device, &memo.round(&inner))?);
+        next()?;
+    }
+    // Threads are neither read from disk nor remembered: what is known needs no draft.
+    let drafts = Memo::default();
+    let (mut held, mut shown) = {
+        let round = drafts.round(&inner);
+        let shown = prepare(&drag.scene_at(&values[0])?, &round)?;
+        let picture = picture(&shown, device, &memo.round(&inner))?;
+        (round.held(), (shown, picture))
+    };
+    let there_and_back = (1..values.len()).chain((0..values.len() - 1).rev());
+    let mut before = 0;
+    for at in there_and_back {
+        let round = drafts.round(&inner);
+        let start = Instant::now();
+        let draft = prepare_draft(&drag.scene_at(&values[at])?, &shown.0, &round)?.ok_or_else(|| {
+            Error::input(format!("material \"{}\"", drag.material), "cannot be drafted", "drag a model's parameter")
+        })?;
+        let draft_ms = start.elapsed().as_secs_f64() * 1e3;
+        held = round.held();
+        let picture = picture(&draft, device, &memo.round(&inner))?;
+        let Truth { reference, fit_ms, finished_rms } = &truths[at];
+        found.push(LiveStep {
+            value: values[at].clone(),
+            draft_ms,
+            fit_ms: *fit_ms,
+            draft_rms: compare(&picture, reference, true)?.rms,
+            finished_rms: *finished_rms,
+            draft_change: largest_change(&shown.1, &picture),
+            reference_change: largest_change(&truths[before].reference, reference),
+        });
+        (shown, before) = ((draft, picture), at);
+        next()?;
+    }
+    drop(held);
+    Ok(())
+}
+
+impl Drag {
+    fn scene_at(&self, value: &toml::Value) -> Result<Scene> {
+        let mut scene = self.scene.clone();
+        scene.image.background = Background::None;
+        scene.set_parameter(&self.material, &self.key, value)?;
+        Ok(scene)
+    }
+}
+
+fn truth(scene: &Scene, settings: &ReferenceSettings, device: &Arc<Device>, round: &Round) -> Result<Truth> {
+    let start = Instant::now();
+    let finished = prepare(scene, &Memo::default().round(round.observer()))?;
+    let fit_ms = start.elapsed().as_secs_f64() * 1e3;
+    let truth = reference(&finished, device, settings, round)?;
+    let reference = comparable(&finished, &truth.radiance);
+    let finished_rms = compare(&picture(&finished, device, round)?, &reference, true)?.rms;
+    Ok(Truth { reference, fit_ms, finished_rms })
+}
+
+fn picture(prepared: &Prepared, device: &Arc<Device>, round: &Round) -> Result<Comparable> {
+    let renderer = DeviceScene::new(device, prepared, round)?;
+    let rendering = renderer.render(Wanted { radiance: true, ..Wanted::default() }, 1)?;
+    Ok(comparable(prepared, &rendering.radiance))
+}
+
+fn comparable(prepared: &Prepared, radiance: &[[f32; 4]]) -> Comparable {
+    let view = &prepared.view;
+    Comparable::from_radiance(view.width as usize, view.height as usize, radiance, true, Display::of(view))
+}
+
+fn largest_change(before: &Comparable, after: &Comparable) -> f64 {
+    let values = before.display.as_flattened().iter().zip(after.display.as_flattened());
+    values.map(|(before, after)| f64::from((after - before).abs())).fold(0.0, f64::max)
+}
+
+/// One row of medians and worst cases.
+pub fn table(drag: &Drag, found: &[LiveStep]) -> Section {
+    let of = |part: fn(&LiveStep) -> f64| found.iter().map(part).collect::<Vec<_>>();
+    let worst = |values: Vec<f64>| values.into_iter().fold(0.0, f64::max);
+    let mean = |values: Vec<f64>| values.iter().sum::<f64>() / values.len() as f64;
+    let ratio = |step: &LiveStep| step.draft_rms / step.finished_rms.max(f64::MIN_POSITIVE);
+    let row = |name: &str, cells: [String; 2]| (name.to_owned(), cells.to_vec());
+    let ms = |part: fn(&LiveStep) -> f64| [format!("{:.1}", median(of(part))), format!("{:.1}", worst(of(part)))];
+    let error = |part: fn(&LiveStep) -> f64| [format!("{:.5}", mean(of(part))), format!("{:.5}", worst(of(part)))];
+    let change = [of(|step| step.draft_change), of(|step| step.reference_change)].map(worst);
+    let table = |title: &str, head: [&str; 2], rows| Table {
+        title: title.to_owned(),
+        head: head.map(str::to_owned).to_vec(),
+        rows,
+    };
+    Section {
+        title: format!("{} of {}, {} steps there and back:", drag.key, drag.material, drag.values.len()),
+        tables: vec![
+            table(
+                "time, ms",
+                ["median", "worst"],
+                vec![row("draft", ms(|step| step.draft_ms)), row("fit", ms(|step| step.fit_ms))],
+            ),
+            table(
+                "RMS",
+                ["mean", "worst"],
+                vec![
+                    row("drafts", error(|step| step.draft_rms)),
+                    row("finished", error(|step| step.finished_rms)),
+                    row(
+                        "ratio",
+                        [mean(found.iter().map(ratio).collect()), worst(found.iter().map(ratio).collect())]
+                            .map(|value| format!("{value:.2}")),
+                    ),
+                ],
+            ),
+            table("change", ["drafts", "reference"], vec![row("largest", change.map(|value| format!("{value:.4}")))]),
+        ],
+    }
+}
