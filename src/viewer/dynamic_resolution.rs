@@ -11,6 +11,9 @@ const LEAVES: f64 = 1.3;
 /// A finer one is taken where it takes no more than this.
 const ENTERS: f64 = 0.8;
 
+/// Pictures get no coarser than by so many scales at once: a slow one, such as the first of another size, says little of the next.
+const FALLS: usize = 2;
+
 /// What a picture has cost.
 #[derive(Clone, Copy, Debug)]
 struct Cost {
@@ -50,7 +53,8 @@ impl DynamicResolution {
             };
             seconds(*scale) <= slack * TARGET_S
         };
-        self.scale = (0..SCALES.len()).find(fits).unwrap_or(SCALES.len() - 1);
+        let wanted = (0..SCALES.len()).find(fits).unwrap_or(SCALES.len() - 1);
+        self.scale = wanted.min(self.scale + FALLS);
         scaled(size, self.scale)
     }
 
@@ -130,6 +134,15 @@ mod tests {
             dynamic_resolution.drawn(size, FULL, cost(size, [0.0, if step % 2 == 0 { 170.0 } else { 240.0 }]));
         }
         dynamic_resolution.drawn([0, 0], FULL, Duration::from_millis(10));
+        assert_eq!(dynamic_resolution.moving(FULL), [320, 240]);
+    }
+
+    #[test]
+    fn one_slow_picture_does_not_make_the_next_one_tiny() {
+        let mut dynamic_resolution = DynamicResolution::default();
+        dynamic_resolution.drawn(FULL, FULL, cost(FULL, [5.0, 50.0]));
+        assert_eq!(dynamic_resolution.moving(FULL), FULL);
+        dynamic_resolution.drawn(FULL, FULL, cost(FULL, [5.0, 5000.0]));
         assert_eq!(dynamic_resolution.moving(FULL), [320, 240]);
     }
 }

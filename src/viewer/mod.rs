@@ -13,7 +13,9 @@
 //! | the threads of what is under the cursor | [`threads_seen`] | egui |
 //! | what frames have shown of themselves | [`measured`] | pure |
 //! | how long inputs wait to be seen | [`latency`] | pure |
-//! | what inputs do, and the frames that follow | [`interaction`] | |
+//! | what inputs do | [`interaction`] | |
+//! | what is made for them | `making` | |
+//! | the frames that follow | `drawing` | |
 //! | what is shown and set beside the picture | `panel` | egui |
 //! | frames into the window | [`presenter`] | Vulkan, by the frame graph |
 //! | the window | `window` | winit |
@@ -21,12 +23,14 @@
 pub mod change;
 pub mod comparer;
 pub mod comparison;
+mod drawing;
 pub mod dynamic_resolution;
 pub mod input;
 pub mod interaction;
 pub mod latency;
 pub mod latest_job;
 pub mod loaded;
+mod making;
 pub mod measured;
 pub mod orbit;
 mod panel;

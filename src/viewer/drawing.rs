@@ -1,0 +1,208 @@
+//! The frames of the session, and what is saved and told of them.
+use super::change::Change;
+use super::comparison::{Other, compare_with};
+use super::input::Input;
+use super::interaction::Viewer;
+use super::latency::{Answer, Latency, Record, Stats};
+use super::loaded::Loaded;
+use super::presenter::{Drawn, Extras, Presenter, ShownPicture};
+use crate::output::{self, Format};
+use crate::passes::{Area, View};
+use crate::pipeline::Wanted;
+use crate::prepare::{Prepared, view_of};
+use crate::scene::Background;
+use crate::vulkan::UiFrame;
+use crate::{Error, Result};
+use egui::TexturesDelta;
+use std::path::Path;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// A picture is still moving for so long after the last motion: a scroll wheel has no release.
+const SETTLING: Duration = Duration::from_millis(150);
+
+impl Viewer {
+    /// Records more, from now on, of how long inputs wait.
+    pub fn record(&mut self, record: Record) {
+        if record != Record::Latest {
+            self.latency = Latency::keeping(usize::MAX);
+        }
+        self.record = record;
+    }
+
+    /// How long inputs waited; none unless all were to be recorded.
+    ///
+    /// # Errors
+    /// Whatever goes wrong where drafts are measured.
+    pub fn stats(&self) -> Result<Option<Stats>> {
+        if self.record == Record::Latest {
+            return Ok(None);
+        }
+        let mut events: Vec<Answer> = self.latency.answers().iter().cloned().collect();
+        for (index, draft) in &self.drafts {
+            let finished = Other::Shading(draft.scene.shading.clone());
+            let rms = &mut events[*index].rms_to_finished;
+            compare_with(draft, &finished, &self.device, &self.memo, &(), &mut |compared| {
+                *rms = compared.metrics.map(|metrics| metrics.rms);
+            })?;
+        }
+        Ok(Some(Stats {
+            device: self.device.description().name.clone(),
+            size: [self.area.width, self.area.height],
+            median_shown_ms: self.latency.shown_ms(0.5),
+            p95_shown_ms: self.latency.shown_ms(0.95),
+            events,
+        }))
+    }
+
+    /// From where and how what is shown is looked at, at full resolution; none while nothing is.
+    pub fn shown_view(&self) -> Option<View> {
+        let loaded = self.loaded.as_ref()?;
+        view_of(self.session.shown(), loaded.prepared.bounding_sphere()).ok()
+    }
+
+    /// Gives the picture this size, in pixels.
+    pub fn resize(&mut self, area: Area) {
+        if self.area == area {
+            return;
+        }
+        self.area = area;
+        self.handle(&Input::Set(Change::Size(area.width.max(1), area.height.max(1))));
+    }
+
+    /// When a frame is due though nothing happens: none if nothing is.
+    pub fn next_frame(&self) -> Option<Instant> {
+        if self.turntable {
+            return Some(Instant::now());
+        }
+        self.last_motion.map(|last| last + SETTLING)
+    }
+
+    /// Whether the picture moves, and may be coarse. What `is_held` is being dragged.
+    pub(super) fn is_moving(&mut self, is_held: bool) -> bool {
+        let settled = self.last_motion.is_none_or(|last| last.elapsed() >= SETTLING) && !is_held;
+        if settled {
+            self.last_motion = None;
+        }
+        !settled || self.turntable
+    }
+
+    /// Turns the turntable to where it is now.
+    pub(super) fn turn(&mut self) {
+        if !self.turntable {
+            return;
+        }
+        let now = Instant::now();
+        let seconds = self.last_turn.replace(now).map_or(0.0, |last| (now - last).as_secs_f64());
+        if let Err(error) = self.move_camera(|orbit| orbit.turntable(seconds)) {
+            self.tell_error(&error);
+        }
+    }
+
+    /// Draws a frame. `is_held`: the user holds something that moves the picture.
+    ///
+    /// # Errors
+    /// Whatever Vulkan refuses.
+    pub fn draw(
+        &mut self,
+        stage: &mut Presenter,
+        size: [u32; 2],
+        panel: &UiFrame,
+        textures: &TexturesDelta,
+        is_held: bool,
+        screenshot: bool,
+    ) -> Result<Option<Drawn>> {
+        let start = Instant::now();
+        self.turn();
+        let loaded = self.loaded.clone();
+        let is_draft = loaded.as_ref().is_some_and(|loaded| loaded.is_draft);
+        let is_moving = (self.is_moving(is_held) || is_draft) && !screenshot;
+        let view = match &loaded {
+            Some(loaded) => {
+                let mut view = self.view(loaded)?;
+                if is_moving {
+                    [view.width, view.height] = self.dynamic_resolution.moving([view.width, view.height]);
+                }
+                Some(view)
+            }
+            None => None,
+        };
+        if let Some(loaded) = &loaded {
+            self.comparer.update(self.session.shown(), loaded, &self.device, &self.memo, is_moving)?;
+        }
+        let picture = loaded.as_ref().zip(view.as_ref()).map(|(loaded, view)| ShownPicture {
+            renderer: &loaded.renderer,
+            view,
+            area: self.area,
+        });
+        let change = loaded.as_ref().map_or(0, |loaded| loaded.change);
+        let is_awaited = loaded.is_some() && self.latency.is_awaited(change, is_draft);
+        let extras = Extras { counts: !is_moving, screenshot, completion: is_awaited };
+        let drawn = stage.draw(size, picture, panel, textures, extras)?;
+        self.frame_was_drawn();
+        if drawn.is_some() && is_awaited {
+            self.latency.shown(change, is_draft, Instant::now());
+            if let Some(draft) = loaded.as_ref().filter(|_| is_draft && self.record == Record::AllAndErrors) {
+                self.drafts.push((self.latency.answers().len() - 1, self.seen(draft)?));
+            }
+        }
+        if let (Some(drawn), Some(view)) = (&drawn, &view) {
+            let frame = start.elapsed();
+            let size = [view.width, view.height];
+            if drawn.ran.iter().any(|pass| pass == "shade") {
+                let full = &self.session.shown().image;
+                // Drivers may compile a shader where it first runs.
+                if std::mem::replace(&mut self.is_compiled, true) {
+                    let time = drawn.picture_time().unwrap_or(frame);
+                    self.dynamic_resolution.drawn(size, [full.width, full.height], time);
+                }
+            }
+            tracing::debug!("{} x {} in {:.1} ms", size[0], size[1], frame.as_secs_f64() * 1e3);
+            self.measured.frames += 1;
+            (self.measured.frame, self.measured.size) = (frame, size);
+            self.measured.ran.clone_from(&drawn.ran);
+            self.measured.time(&drawn.passes);
+            self.measured.counted = drawn.counted.or(self.measured.counted);
+        }
+        Ok(drawn)
+    }
+
+    /// What was loaded, as it is looked at now.
+    pub(super) fn seen(&self, loaded: &Loaded) -> Result<Arc<Prepared>> {
+        let view = self.view(loaded)?;
+        Ok(Arc::new(Prepared { scene: self.session.shown().clone(), view, ..(*loaded.prepared).clone() }))
+    }
+
+    /// How the scene that is shown is looked at.
+    pub(super) fn view(&self, loaded: &Loaded) -> Result<View> {
+        let mut view = view_of(self.session.shown(), loaded.prepared.bounding_sphere())?;
+        // Others have yet to be compiled.
+        view.subpixels = loaded.renderer.view.subpixels;
+        Ok(view)
+    }
+
+    /// Saves what is shown, as `threadlight render` would make it.
+    pub(super) fn save_picture(&mut self, path: &Path) -> Result<()> {
+        let format = Format::of(path)?;
+        output::check_writable(path)?;
+        let Some(loaded) = self.loaded.clone() else {
+            return Err(Error::input("the picture", "has not been loaded yet", "wait until it is shown"));
+        };
+        let loaded = if loaded.is_draft { self.finished(&loaded)? } else { loaded };
+        let mut renderer = (*loaded.renderer).clone();
+        renderer.view = self.view(&loaded)?;
+        let wanted = Wanted { radiance: format == Format::Exr, display: format == Format::Png, geometry: false };
+        let rendering = renderer.render(wanted, 1)?;
+        let (width, height) = (renderer.view.width, renderer.view.height);
+        let alpha = self.session.shown().image.background == Background::None;
+        match format {
+            Format::Png => output::write_png(path, width, height, &rendering.display, alpha)?,
+            Format::Exr => {
+                let header = rendering.exr_header(&loaded.prepared, &self.device.description().name);
+                output::write_exr(path, width, height, &rendering.radiance, alpha, &header)?;
+            }
+        }
+        self.tell(format!("saved {}", path.display()));
+        Ok(())
+    }
+}

@@ -1,0 +1,150 @@
+//! What the session asks for, made in the background: by drafts first where a parameter is dragged.
+use super::interaction::Viewer;
+use super::latest_job::Progress;
+use super::loaded::Loaded;
+use crate::memo::{Key, Round};
+use crate::pipeline::DeviceScene;
+use crate::prepare::{Prepared, can_draft, key_of, prepare, prepare_draft};
+#[cfg(feature = "hot-reload")]
+use crate::progress::Observer;
+use crate::{Error, Result};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// Frames wait for a draft so long at most.
+const DRAFT_PATIENCE: Duration = Duration::from_millis(100);
+/// Threads are finished when nobody has asked for others for so long: what is dragged moves more often.
+const BEFORE_FINISHING: Duration = Duration::from_millis(100);
+
+impl Viewer {
+    /// How far the loading of what is wanted is.
+    pub fn progress(&self) -> Option<Progress> {
+        self.loading.progress()
+    }
+
+    /// Whether something is being loaded or made that frames wait for.
+    pub fn is_loading(&self) -> bool {
+        self.loading.is_busy()
+    }
+
+    /// Until when frames wait for the draft that is being made, if one is: where a slider is and what it asks for are shown together.
+    pub fn draft_awaited_until(&self) -> Option<Instant> {
+        self.drafting_since.map(|since| since + DRAFT_PATIENCE)
+    }
+
+    /// A frame was drawn of what was loaded: what was wanted meanwhile is asked for.
+    pub fn frame_was_drawn(&mut self) {
+        if std::mem::take(&mut self.request_after_frame) {
+            self.request();
+        }
+    }
+
+    /// Whether the next frame shows a draft that no frame has shown yet.
+    pub fn has_new_draft(&self) -> bool {
+        self.request_after_frame
+    }
+
+    /// Whether anything is made in the background.
+    pub fn is_busy(&self) -> bool {
+        self.is_loading() || self.comparer.is_busy()
+    }
+
+    /// What is wanted is made of this; none where a file cannot be read.
+    pub(super) fn key(&self) -> Option<Key> {
+        key_of(self.session.wanted(), &self.memo).ok()
+    }
+
+    /// Asks for what is wanted, if that is another than what was asked for last: for a draft of it first, where that can be.
+    pub(super) fn request(&mut self) {
+        let scene = self.session.wanted().clone();
+        // Where a file cannot be read there is no key, and asking for it tells why.
+        let key = self.key();
+        if key.is_some() && self.requested == key {
+            return;
+        }
+        let before = self.loaded.as_ref().map(|loaded| loaded.prepared.clone());
+        let before = before.filter(|before| can_draft(&scene, before));
+        if before.is_some() && (self.drafting_since.is_some() || self.request_after_frame) {
+            // The draft that is being made is shown first: else one that moves would never be seen.
+            return;
+        }
+        (self.requested, self.drafting_since) = (key, before.is_some().then(Instant::now));
+        let (device, memo, change) = (self.device.clone(), self.memo.clone(), self.changes);
+        self.loading.request(move |task| {
+            let loaded = |prepared: Prepared, round: &Round, is_draft: bool| -> Result<Loaded> {
+                let renderer = Arc::new(DeviceScene::new(&device, &prepared, round)?);
+                Ok(Loaded { prepared: Arc::new(prepared), renderer, key, is_draft, change })
+            };
+            if let Some(before) = before {
+                let round = memo.round(task);
+                if let Some(draft) = prepare_draft(&scene, &before, &round)? {
+                    task.publish(loaded(draft, &round, true)?);
+                    task.rest(BEFORE_FINISHING)?;
+                }
+            }
+            let round = memo.round(task);
+            loaded(prepare(&scene, &round)?, &round, false)
+        });
+    }
+
+    /// Compiles the shaders anew, and everything that is made of them; if that fails, what is shown stays.
+    #[cfg(feature = "hot-reload")]
+    pub(super) fn reload_shaders(&mut self) {
+        let scene = self.session.wanted().clone();
+        let (key, change) = (self.key(), self.changes);
+        (self.requested, self.drafting_since) = (key, None);
+        let (device, memo) = (self.device.clone(), self.memo.clone());
+        self.loading.request(move |task| {
+            Observer::begin(task, "shaders");
+            let round = memo.round(task);
+            let prepared = prepare(&scene, &round)?;
+            let renderer = crate::vulkan::hot_reload::reload(|| DeviceScene::new(&device, &prepared, &round))?;
+            let (prepared, renderer) = (Arc::new(prepared), Arc::new(renderer));
+            Ok(Loaded { prepared, renderer, key, is_draft: false, change })
+        });
+    }
+
+    /// Shows what has been loaded meanwhile; gives whether there is anything new.
+    ///
+    /// # Errors
+    /// The scene that the viewer was started with cannot be loaded.
+    pub fn take_loaded(&mut self) -> Result<bool> {
+        #[cfg(feature = "hot-reload")]
+        if self.shaders.take() {
+            self.reload_shaders();
+        }
+        let mut is_new = self.comparer.take().unwrap_or_else(|error| {
+            self.tell_error(&error);
+            true
+        });
+        while let Some(result) = self.loading.take() {
+            is_new = true;
+            let was_drafting = self.drafting_since.take().is_some();
+            match result {
+                Ok(loaded) => {
+                    self.session.loaded(loaded.prepared.scene.clone());
+                    let before = self.loaded.replace(loaded.clone());
+                    self.is_compiled &= before.is_some_and(|before| before.renderer.shades_as(&loaded.renderer));
+                    self.request_after_frame = was_drafting;
+                }
+                Err(Error::Cancelled) => {}
+                Err(error) if self.loaded.is_none() => return Err(error),
+                Err(error) => {
+                    self.session.failed();
+                    self.latency.failed();
+                    self.requested = self.loaded.as_ref().and_then(|loaded| loaded.key);
+                    self.tell_error(&error);
+                }
+            }
+        }
+        Ok(is_new)
+    }
+
+    /// What is shown as a `draft`, with finished threads, which are waited for.
+    pub(super) fn finished(&self, draft: &Loaded) -> Result<Loaded> {
+        let round = self.memo.round(&());
+        let prepared = prepare(&draft.prepared.scene, &round)?;
+        let renderer = Arc::new(DeviceScene::new(&self.device, &prepared, &round)?);
+        Ok(Loaded { prepared: Arc::new(prepared), renderer, is_draft: false, ..draft.clone() })
+    }
+}

@@ -1,0 +1,73 @@
+//! The program as its user meets it: pictures, statistics, cache, scene files, help.
+//!
+//! Renders on the device that THREADLIGHT_TEST_DEVICE names, or else on the one that the program prefers, always validated.
+mod pictures;
+mod text;
+
+use assert_cmd::Command;
+use serde_json::Value;
+use std::fs;
+use std::path::Path;
+use tempfile::TempDir;
+use threadlight::low_level::output::{PictureFile, read_image};
+use threadlight::low_level::scene::{ImageSettings, MaterialSource, Scene, ShadingSettings, Source};
+use threadlight::low_level::threads::Threads;
+
+/// What makes a render quick: few pixels, few threads, and an environment that takes no time.
+const SMALL: &str = "--size 96x72 --threads 8 --environment map.hdr";
+
+/// A folder with a small environment in it, `map.hdr`: different in all directions.
+fn workplace() -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let mut map = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 8 +X 16\n".to_vec();
+    // Mantissas between 100 and 255; exponent 128 stands for 2^0 / 256.
+    map.extend((0..128_u32).flat_map(|i| [100 + i as u8, 200 - (i * i % 97) as u8, 100 + (i * 7 % 101) as u8, 128]));
+    fs::write(folder.path().join("map.hdr"), map).unwrap();
+    folder
+}
+
+/// The program in `folder`, with its cache there and `arguments` separated by spaces.
+fn threadlight(folder: &TempDir, arguments: &str) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_threadlight"));
+    command.current_dir(folder).env("THREADLIGHT_CACHE", cache(folder)).env_remove("RUST_LOG");
+    command.args(arguments.split(' ').filter(|argument| !argument.is_empty()));
+    command
+}
+
+fn cache(folder: &TempDir) -> std::path::PathBuf {
+    folder.path().join("cache")
+}
+
+/// `render` with validation on the device to test on.
+fn render(folder: &TempDir, arguments: &str) -> Command {
+    let mut command = threadlight(folder, &format!("render --validate {arguments}"));
+    if let Some(device) = std::env::var_os("THREADLIGHT_TEST_DEVICE") {
+        command.arg("--device").arg(device);
+    }
+    command
+}
+
+fn bytes(folder: &TempDir, name: &str) -> Vec<u8> {
+    fs::read(folder.path().join(name)).unwrap()
+}
+
+fn picture(folder: &TempDir, name: &str) -> PictureFile {
+    read_image(&folder.path().join(name)).unwrap()
+}
+
+/// The value at `column`, `row` of a picture.
+fn at(picture: &PictureFile, column: u32, row: u32) -> [f32; 4] {
+    picture.rgba[(row * picture.width + column) as usize]
+}
+
+fn stats(folder: &TempDir, name: &str) -> Value {
+    serde_json::from_slice(&bytes(folder, name)).unwrap()
+}
+
+/// What a command printed; it must succeed and have nothing to complain about.
+fn printed(command: &mut Command) -> String {
+    let output = command.output().unwrap();
+    let complaints = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success() && complaints.is_empty(), "{complaints}");
+    String::from_utf8(output.stdout).unwrap()
+}

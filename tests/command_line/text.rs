@@ -1,0 +1,169 @@
+//! What is listed, said and compared, and what happens to files.
+use super::*;
+
+#[test]
+fn the_plan_lists_passes_and_what_was_culled() {
+    let folder = workplace();
+    let linear = printed(&mut render(&folder, &format!("{SMALL} --print-plan -o image.exr")));
+    let (passes, rest) = linear.split_once("\nculled\n").expect("something is culled for an EXR");
+    for pass in ["geometry_cache", "classify", "shade", "background", "read_radiance"] {
+        assert!(passes.contains(&format!("  {pass}\n")), "{linear}");
+    }
+    assert!(rest.trim_start().starts_with("tone_map ") && rest.contains("aliasing"), "{linear}");
+    // With nothing to write but the plan.
+    let display = printed(&mut render(&folder, &format!("{SMALL} --print-plan --background none")));
+    assert!(display.contains("  tone_map\n") && !display.contains("background"), "{display}");
+}
+
+#[test]
+fn the_cpu_driver_answers_to_its_name() {
+    let folder = workplace();
+    if !printed(&mut threadlight(&folder, "devices")).contains("llvmpipe") {
+        return println!("skipped: this machine has no lavapipe");
+    }
+    for device in ["lavapipe", "llvmpipe", "LLVMPIPE"] {
+        printed(&mut threadlight(&folder, &format!("render {SMALL} --validate --device {device} -o {device}.png")));
+        assert!(bytes(&folder, "lavapipe.png") == bytes(&folder, &format!("{device}.png")), "{device}");
+    }
+}
+
+#[test]
+fn a_machine_without_a_driver_is_told_what_to_install() {
+    let folder = workplace();
+    let absent = folder.path().join("absent.json");
+    let mut command = threadlight(&folder, &format!("render {SMALL} -o image.png"));
+    let output = command.env("VK_DRIVER_FILES", &absent).env("VK_ICD_FILENAMES", &absent).output().unwrap();
+    let reason = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{reason}");
+    assert!(reason.lines().count() == 1 && reason.contains("mesa-vulkan-drivers"), "{reason}");
+    assert!(!folder.path().join("image.png").exists());
+}
+
+#[test]
+fn threads_are_written_and_read_back_the_same() {
+    let folder = workplace();
+    for method in ["fitted", "paper"] {
+        for name in ["a.threads", "b.threads"] {
+            let flags = format!("threads gold --method {method} --count 4 --seed 3 --no-cache -o {name}");
+            threadlight(&folder, &flags).assert().success();
+        }
+        assert!(bytes(&folder, "a.threads") == bytes(&folder, "b.threads"), "{method}");
+        let threads = threadlight::low_level::threads::read(&folder.path().join("a.threads")).unwrap();
+        assert_eq!((threads.kind().name(), threads.size()), (method, [90, 4]));
+        match threads {
+            Threads::Fitted(table) => assert_eq!(table.material, "gold"),
+            Threads::Paper(table) => assert_eq!((table.material.as_str(), table.seed), ("gold", 3)),
+        }
+    }
+}
+
+#[test]
+fn what_can_be_named_is_listed() {
+    let folder = workplace();
+    let list = printed(&mut threadlight(&folder, "materials"));
+    for name in ["gold", "conductor", "lambert", "studio", "sphere", "paper", ".binary", ".hdr", ".obj"] {
+        assert!(list.contains(name), "{name} is not in\n{list}");
+    }
+}
+
+#[test]
+fn every_subcommand_has_help() {
+    let folder = workplace();
+    let help = printed(&mut threadlight(&folder, "--help"));
+    for subcommand in ["render", "threads", "materials", "devices", "completions"] {
+        assert!(help.contains(&format!("\n  {subcommand} ")), "{help}");
+        let help = printed(&mut threadlight(&folder, &format!("{subcommand} --help")));
+        assert!(help.contains("Usage: threadlight ") && help.contains("--verbose"), "{help}");
+    }
+    let help = printed(&mut threadlight(&folder, "render --help"));
+    for flag in [
+        "--mesh",
+        "--material",
+        "--environment",
+        "--method",
+        "--tolerance",
+        "--error",
+        "--reference-on",
+        "--threads",
+        "--subpixels",
+        "--size",
+        "--exposure",
+        "--gamma",
+        "--background",
+        "--rotation",
+        "--seed",
+        "--device",
+        "--validate",
+        "--repeat",
+        "--stats",
+        "--print-plan",
+        "--no-cache",
+        "--output",
+        "Examples:",
+    ] {
+        assert!(help.contains(flag), "{flag} is not in\n{help}");
+    }
+    assert!(printed(&mut threadlight(&folder, "--version")).contains(env!("CARGO_PKG_VERSION")));
+}
+
+#[test]
+fn shells_get_their_completions() {
+    let folder = workplace();
+    for shell in ["bash", "zsh", "fish"] {
+        let script = printed(&mut threadlight(&folder, &format!("completions {shell}")));
+        assert!(script.contains("print-plan") && script.contains("threadlight"), "{shell}");
+    }
+}
+
+#[test]
+fn a_reader_that_has_seen_enough_is_no_error() {
+    use std::process::{Command, Stdio};
+    let folder = workplace();
+    for arguments in [&["completions", "bash"][..], &["materials"], &["devices"]] {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_threadlight"));
+        let mut child = command.args(arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        drop(child.stdout.take());
+        let output = child.wait_with_output().unwrap();
+        let complaints = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success() && complaints.is_empty(), "{arguments:?} {complaints}");
+    }
+    assert!(!cache(&folder).exists());
+}
+
+#[test]
+fn pictures_replace_older_ones_whole_and_leave_nothing_beside_them() {
+    let folder = workplace();
+    fs::write(folder.path().join("image.png"), "older").unwrap();
+    printed(&mut render(&folder, &format!("{SMALL} --no-cache --stats stats.json -o image.png")));
+    assert_eq!(picture(&folder, "image.png").width, 96);
+    let mut files: Vec<_> =
+        fs::read_dir(Path::new(folder.path())).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+    files.sort();
+    assert_eq!(files, ["image.png", "map.hdr", "stats.json"]);
+}
+
+#[test]
+fn pictures_are_compared_as_a_table_as_json_and_as_a_heat_map() {
+    let folder = workplace();
+    for (name, value) in [("a.png", 51), ("b.png", 102)] {
+        let rgba = vec![value; 24 * 16 * 4];
+        threadlight::low_level::output::write_png(&folder.path().join(name), 24, 16, &rgba, false).unwrap();
+    }
+    let table = printed(&mut threadlight(&folder, "compare a.png b.png --difference where.png"));
+    let lines: Vec<Vec<_>> = table.lines().map(|line| line.split_whitespace().take(2).collect()).collect();
+    let names: Vec<_> = lines.iter().map(|line| line[0]).collect();
+    assert_eq!(names, ["rms", "rms_linear", "max", "ssim", "flip", "nan", "pixels"]);
+    assert_eq!((lines[0][1], lines[2][1], lines[6][1]), ("0.200000", "0.200000", "384"));
+
+    let json: Value = serde_json::from_str(&printed(&mut threadlight(&folder, "compare a.png b.png --json"))).unwrap();
+    let keys: Vec<_> = json.as_object().unwrap().keys().map(String::as_str).collect();
+    assert_eq!(keys, ["flip", "max", "nan", "pixels", "rms", "rms_linear", "ssim"]);
+    // Linear values of 0.2 and 0.4 for gamma 2.2.
+    let expected = 0.4_f64.powf(2.2) - 0.2_f64.powf(2.2);
+    assert!((json["rms_linear"].as_f64().unwrap() - expected).abs() < 1e-6);
+
+    // Below the picture there is the scale.
+    let map = picture(&folder, "where.png");
+    assert_eq!((map.width, map.height), (24, 32));
+    assert!((0..16).all(|row| at(&map, 3, row) == at(&map, 0, 0)) && at(&map, 23, 31) != at(&map, 0, 31));
+}
