@@ -16,8 +16,8 @@ use crate::threads::theta_o;
 const ROW_STEP: usize = 5;
 
 /// Steps of the first row, from where its threads were, and of the others.
-const FIRST: Effort = Effort { steps: 12, least_gain: 5e-3 };
-const NEXT: Effort = Effort { steps: 12, least_gain: 0.01 };
+const FIRST: Effort = Effort { steps: 24, least_gain: 1e-3 };
+const NEXT: Effort = Effort { steps: 12, least_gain: 3e-3 };
 
 /// How strongly the first row is tied to where its threads were, and the others to their neighbours: [`Fit::tied`]. Tied to where they were
 /// themselves, rows stay together too, but all of them near where a drag began: over gold of all roughnesses that errs by half as much
@@ -29,8 +29,8 @@ const TIED: f64 = 1e-5;
 const FEWEST_LIGHTS: usize = 256;
 const LIGHTS_A_THREAD: usize = 16;
 
-/// Threads of `brdf` that continue those of `before`, of a BRDF not far away: their error is up to three times that of [`super::generate()`],
-/// in a twentieth of the time. The same to the last bit on any number of cores.
+/// Threads of `brdf` that continue those of `before`, of a BRDF not far away: their error is about twice that of [`super::generate()`], in a
+/// twentieth of the time; the guide's chapter on results has where it is more. The same to the last bit on any number of cores.
 ///
 /// # Errors
 /// Cancelled by `observer`.
