@@ -80,9 +80,9 @@ pub fn prepare(scene: &Scene, round: &Round) -> Result<Prepared> {
 /// Whether threads of `scene` can be drafted from those of `before`: fitted ones, as many, of models whose parameters were changed.
 pub fn can_draft(scene: &Scene, before: &Prepared) -> bool {
     let Ok(method) = Method::from_name(&scene.shading.method) else { return false };
-    let source = |scene: &'_ Scene, name: &str| {
-        scene.materials.iter().find(|material| material.name == name).map(|material| material.source.clone())
-    };
+    fn source<'s>(scene: &'s Scene, name: &str) -> Option<&'s MaterialSource> {
+        scene.materials.iter().find(|material| material.name == name).map(|material| &material.source)
+    }
     let was_edited = |name: &str| match source(scene, name) {
         Some(MaterialSource::Model { .. }) => before.materials.iter().any(|material| material.name == name),
         other => other == source(&before.scene, name),

@@ -119,6 +119,30 @@ fn of_two_materials_that_are_edited_in_turn_each_keeps_its_threads() {
 }
 
 #[test]
+fn a_draft_is_finished_though_something_else_cannot_be_loaded_meanwhile() {
+    let gpu = Validated::new();
+    let folder = tempfile::tempdir().unwrap();
+    let broken = folder.path().join("broken.toml");
+    std::fs::write(&broken, "model = \"lambert\"\nreflectance = [nan").unwrap();
+    let material = |red: f64| common::model(&format!("model = 'lambert'\nreflectance = [{red}, 0.5, 0.5]"));
+    let mut viewer = Viewer::new(sphere(material(0.25), "white", 2, (32, 24)), &gpu.device, Memo::default(), || ());
+    wait(&mut viewer);
+    let value = vec![0.75, 0.5, 0.5].into();
+    viewer.handle(&Input::Set(Change::Parameter { material: "m".into(), key: "reflectance".into(), value }));
+    let start = Instant::now();
+    while !viewer.loaded().unwrap().is_draft {
+        viewer.take_loaded().unwrap();
+        assert!(start.elapsed() < Duration::from_secs(100), "no draft");
+    }
+    viewer.handle(&Input::Drop(broken));
+    wait(&mut viewer);
+    assert!(viewer.notice.as_ref().is_some_and(|notice| notice.is_error));
+    assert!(!viewer.loaded().unwrap().is_draft && (red(&viewer) - 0.75).abs() < 1e-9);
+    drop(viewer);
+    gpu.finish();
+}
+
+#[test]
 fn moving_the_camera_does_not_begin_again_what_is_being_made() {
     let gpu = Validated::new();
     let scene = sphere(MaterialSource::Builtin("clay".into()), "white", 2, (32, 24));

@@ -81,12 +81,9 @@ pub fn run(
     }
     // Threads are neither read from disk nor remembered: what is known needs no draft.
     let drafts = Memo::default();
-    let (mut held, mut shown) = {
-        let round = drafts.round(&inner);
-        let shown = prepare(&drag.scene_at(&values[0])?, &round)?;
-        let picture = picture(&shown, device, &memo.round(&inner))?;
-        (round.held(), (shown, picture))
-    };
+    let start = prepare(&drag.scene_at(&values[0])?, &drafts.round(&inner))?;
+    let start_picture = picture(&start, device, &memo.round(&inner))?;
+    let mut shown = (start, start_picture);
     let there_and_back = (1..values.len()).chain((0..values.len() - 1).rev());
     let mut before = 0;
     for at in there_and_back {
@@ -96,7 +93,6 @@ pub fn run(
             Error::input(format!("material \"{}\"", drag.material), "cannot be drafted", "drag a model's parameter")
         })?;
         let draft_ms = start.elapsed().as_secs_f64() * 1e3;
-        held = round.held();
         let picture = picture(&draft, device, &memo.round(&inner))?;
         let Truth { reference, fit_ms, finished_rms } = &truths[at];
         found.push(LiveStep {
@@ -111,7 +107,6 @@ pub fn run(
         (shown, before) = ((draft, picture), at);
         next()?;
     }
-    drop(held);
     Ok(())
 }
 

@@ -5,7 +5,6 @@ use super::comparison::{Compared, Other, Wipe, compare_with};
 use super::latest_job::{LatestJob, Progress};
 use super::loaded::Loaded;
 use crate::memo::{Key, Memo};
-use crate::prepare::{Prepared, view_of};
 use crate::progress::Observer;
 use crate::scene::Scene;
 use crate::vulkan::Device;
@@ -93,8 +92,7 @@ impl Comparer {
         let Some((_, scene, other)) = wanted.clone().filter(|_| self.begun.is_none() && !is_moving) else {
             return Ok(());
         };
-        let view = view_of(&scene, loaded.prepared.bounding_sphere())?;
-        let prepared = Prepared { scene, view, ..(*loaded.prepared).clone() };
+        let prepared = loaded.seen_as(scene)?;
         let (device, memo) = (device.clone(), memo.clone());
         self.begun = wanted;
         self.jobs.request(move |task| {

@@ -9,7 +9,7 @@ use super::presenter::{Drawn, Extras, Presenter, ShownPicture};
 use crate::output::{self, Format};
 use crate::passes::{Area, View};
 use crate::pipeline::Wanted;
-use crate::prepare::{Prepared, view_of};
+use crate::prepare::view_of;
 use crate::scene::Background;
 use crate::vulkan::UiFrame;
 use crate::{Error, Result};
@@ -143,7 +143,8 @@ impl Viewer {
         if drawn.is_some() && is_awaited {
             self.latency.shown(change, is_draft, Instant::now());
             if let Some(draft) = loaded.as_ref().filter(|_| is_draft && self.record == Record::AllAndErrors) {
-                self.drafts.push((self.latency.answers().len() - 1, self.seen(draft)?));
+                let seen = Arc::new(draft.seen_as(self.session.shown().clone())?);
+                self.drafts.push((self.latency.answers().len() - 1, seen));
             }
         }
         if let (Some(drawn), Some(view)) = (&drawn, &view) {
@@ -165,12 +166,6 @@ impl Viewer {
             self.measured.counted = drawn.counted.or(self.measured.counted);
         }
         Ok(drawn)
-    }
-
-    /// What was loaded, as it is looked at now.
-    pub(super) fn seen(&self, loaded: &Loaded) -> Result<Arc<Prepared>> {
-        let view = self.view(loaded)?;
-        Ok(Arc::new(Prepared { scene: self.session.shown().clone(), view, ..(*loaded.prepared).clone() }))
     }
 
     /// How the scene that is shown is looked at.

@@ -47,6 +47,8 @@ pub struct Viewer {
     pub cursor: Option<[f64; 2]>,
     pub(super) loaded: Option<Loaded>,
     pub(super) loading: LatestJob<Loaded>,
+    /// What is wanted is made of this; none where a file cannot be read.
+    pub(super) wanted: Option<Key>,
     /// What was asked for last.
     pub(super) requested: Option<Key>,
     /// Since when a draft is being made of what was asked for last; none if it is there, or there is none.
@@ -89,6 +91,7 @@ impl Viewer {
             comparer: Comparer::new(move || wake_too()),
             cursor: None,
             loading: LatestJob::new("loading", move || wake()),
+            wanted: None,
             requested: None,
             drafting_since: None,
             request_after_frame: false,
@@ -125,7 +128,8 @@ impl Viewer {
         if let Err(error) = self.try_handle(input) {
             self.tell_error(&error);
         } else if self.changes > changes {
-            let is_loaded = self.loaded.as_ref().is_some_and(|loaded| loaded.key.is_some() && loaded.key == self.key());
+            let is_loaded =
+                self.loaded.as_ref().is_some_and(|loaded| loaded.key.is_some() && loaded.key == self.wanted);
             self.latency.asked(input, start, (!is_loaded).then_some(self.changes));
         }
     }

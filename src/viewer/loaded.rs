@@ -1,7 +1,9 @@
 //! What frames are made of.
+use crate::Result;
 use crate::memo::Key;
 use crate::pipeline::DeviceScene;
-use crate::prepare::Prepared;
+use crate::prepare::{Prepared, view_of};
+use crate::scene::Scene;
 use std::sync::Arc;
 
 /// All that a scene needs, on the device.
@@ -17,4 +19,15 @@ pub struct Loaded {
     pub is_draft: bool,
     /// The change that it was asked for by: [`super::latency::Latency::asked`].
     pub change: u64,
+}
+
+impl Loaded {
+    /// What was loaded, looked at as `scene` says, which names nothing else.
+    ///
+    /// # Errors
+    /// Objects that no camera can frame.
+    pub fn seen_as(&self, scene: Scene) -> Result<Prepared> {
+        let view = view_of(&scene, self.prepared.bounding_sphere())?;
+        Ok(Prepared { scene, view, ..(*self.prepared).clone() })
+    }
 }

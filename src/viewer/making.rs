@@ -2,7 +2,7 @@
 use super::interaction::Viewer;
 use super::latest_job::Progress;
 use super::loaded::Loaded;
-use crate::memo::{Key, Round};
+use crate::memo::Round;
 use crate::pipeline::DeviceScene;
 use crate::prepare::{Prepared, can_draft, key_of, prepare, prepare_draft};
 #[cfg(feature = "hot-reload")]
@@ -49,16 +49,12 @@ impl Viewer {
         self.is_loading() || self.comparer.is_busy()
     }
 
-    /// What is wanted is made of this; none where a file cannot be read.
-    pub(super) fn key(&self) -> Option<Key> {
-        key_of(self.session.wanted(), &self.memo).ok()
-    }
-
     /// Asks for what is wanted, if that is another than what was asked for last: for a draft of it first, where that can be.
     pub(super) fn request(&mut self) {
         let scene = self.session.wanted().clone();
         // Where a file cannot be read there is no key, and asking for it tells why.
-        let key = self.key();
+        let key = key_of(&scene, &self.memo).ok();
+        self.wanted = key;
         if key.is_some() && self.requested == key {
             return;
         }
@@ -91,7 +87,7 @@ impl Viewer {
     #[cfg(feature = "hot-reload")]
     pub(super) fn reload_shaders(&mut self) {
         let scene = self.session.wanted().clone();
-        let (key, change) = (self.key(), self.changes);
+        let (key, change) = (key_of(&scene, &self.memo).ok(), self.changes);
         (self.requested, self.drafting_since) = (key, None);
         let (device, memo) = (self.device.clone(), self.memo.clone());
         self.loading.request(move |task| {
@@ -125,15 +121,18 @@ impl Viewer {
                     self.session.loaded(loaded.prepared.scene.clone());
                     let before = self.loaded.replace(loaded.clone());
                     self.is_compiled &= before.is_some_and(|before| before.renderer.shades_as(&loaded.renderer));
-                    self.request_after_frame = was_drafting;
+                    self.request_after_frame |= was_drafting;
                 }
                 Err(Error::Cancelled) => {}
                 Err(error) if self.loaded.is_none() => return Err(error),
                 Err(error) => {
                     self.session.failed();
                     self.latency.failed();
-                    self.requested = self.loaded.as_ref().and_then(|loaded| loaded.key);
+                    // A draft is still to be finished.
+                    let loaded = self.loaded.as_ref().filter(|loaded| !loaded.is_draft);
+                    self.requested = loaded.and_then(|loaded| loaded.key);
                     self.tell_error(&error);
+                    self.request();
                 }
             }
         }
