@@ -1,6 +1,6 @@
 //! The pyramid of known kernels: the environment convolved with von Mises-Fisher kernels, level by level twice as wide.
-//! Fitted threads look these up. Twin: glsl/vmf_pyramid.comp, by which GPUs make it; processors make it here, thirty times as fast as
-//! drivers for them run that.
+//! Fitted threads look these up. Twin: glsl/vmf_pyramid.comp, by which GPUs make it; processors make it here, in a fifth of the time
+//! that lavapipe takes for that.
 use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 

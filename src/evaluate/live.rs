@@ -6,11 +6,12 @@ use super::reference::{ReferenceSettings, reference};
 use super::tables::{Section, Table};
 use super::{Comparable, Display, compare};
 use crate::error::{Error, Result};
-use crate::memo::{Memo, Round};
+use crate::memo::{Memo, Round, Step};
 use crate::pipeline::{DeviceScene, Wanted, median};
 use crate::prepare::{Prepared, prepare, prepare_draft};
 use crate::progress::{Observer, OnlyCancels};
 use crate::scene::{Background, Scene};
+use crate::steps::FitThreads;
 use crate::vulkan::Device;
 
 /// A parameter that is dragged.
@@ -33,7 +34,7 @@ pub struct LiveStep {
     pub value: toml::Value,
     /// From threads of the value before to those of this one.
     pub draft_ms: f64,
-    /// From nothing to finished threads.
+    /// From nothing to finished threads, the scene read.
     pub fit_ms: f64,
     /// Of the draft's picture.
     pub draft_rms: f64,
@@ -120,9 +121,11 @@ impl Drag {
 }
 
 fn truth(scene: &Scene, settings: &ReferenceSettings, device: &Arc<Device>, round: &Round) -> Result<Truth> {
-    let start = Instant::now();
-    let finished = prepare(scene, &Memo::default().round(round.observer()))?;
-    let fit_ms = start.elapsed().as_secs_f64() * 1e3;
+    // Threads are made, whatever is on disk.
+    let nothing = Memo::default();
+    let fits = nothing.round(round.observer());
+    let finished = prepare(scene, &fits)?;
+    let fit_ms = fits.asked(FitThreads::NAME).iter().map(|asked| asked.time.as_secs_f64() * 1e3).sum();
     let truth = reference(&finished, device, settings, round)?;
     let reference = comparable(&finished, &truth.radiance);
     let finished_rms = compare(&picture(&finished, device, round)?, &reference, true)?.rms;

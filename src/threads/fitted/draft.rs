@@ -25,7 +25,7 @@ const NEXT: Effort = Effort { steps: 12, least_gain: 3e-3 };
 const FIRST_TIED: f64 = 1e-6;
 const TIED: f64 = 1e-5;
 
-/// Test lights of a row: a third of those of a fit.
+/// Test lights of a row: of 16 threads, half of those of a fit.
 const FEWEST_LIGHTS: usize = 256;
 const LIGHTS_A_THREAD: usize = 16;
 
