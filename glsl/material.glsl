@@ -1,15 +1,20 @@
 // Materials as the GPU holds them. Twin of the layout: src/brdf/record.rs.
 #include "brdf/parameters.glsl"
 
+struct ThreadSet {
+    uint first;       // where its threads start in the thread buffer
+    uint count;
+    uint row_count;
+    uint sharp_count; // how many of its threads, the first ones, are sharper than the environment's pyramid in some row
+};
+
 struct Material {
     BrdfParameters parameters;
     uint model;        // position in src/brdf/models.rs
-    uint first_thread; // where its threads start in the thread buffer
-    uint thread_count;
-    uint row_count;
     uint first_slice;  // where its CDFs start in the buffer of slices
     float lobe_width;  // half_vector_width in src/brdf/lobe.rs, in radians
-    uint sharp_count;  // how many of its threads, the first ones, are sharper than the environment's pyramid in some row
+    ThreadSet threads;          // of a pixel whose sub-pixels share one sum
+    ThreadSet subpixel_threads; // of each sub-pixel of another pixel
 };
 
 layout(set = 0, binding = 5, std430) readonly buffer Materials {

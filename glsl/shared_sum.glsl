@@ -1,8 +1,8 @@
 // For methods by which the sub-pixels of a pixel that lies on one smooth surface share one sum, at their mean normal. Of another pixel,
-// each covered sub-pixel is a sum of its own. Twin: shade_shared in src/shading/mod.rs.
+// each covered sub-pixel is a sum of its own, over so many fewer threads. Twin: shade_shared in src/shading/mod.rs.
 
-// The sum over all threads of weight times environment.
-vec3 estimate(Surface surface, Material material);
+// The sum over these threads of the material of weight times environment.
+vec3 estimate(Surface surface, Material material, ThreadSet set);
 
 // Whether one sum does not do for a pixel within one smooth surface, whose mean is this.
 bool needs_subpixels(Surface surface, Material material);
@@ -38,7 +38,12 @@ vec4 shade_pixel(uvec2 pixel, bool interior) {
             if (!shares) {
                 surface = surface_at((vec2(place) + 0.5) / vec2(push.size_px * SUBPIXELS), geometry_normal(texel));
             }
-            sum += vec4(estimate(surface, materials[geometry_material(texel)]), 1.0);
+            Material material = materials[geometry_material(texel)];
+            ThreadSet set = material.subpixel_threads;
+            if (shares) {
+                set = material.threads;
+            }
+            sum += vec4(estimate(surface, material, set), 1.0);
         }
     } while (++j < parts);
     return sum / float(parts);

@@ -3,8 +3,8 @@ use crate::brdf::{Brdf, MIN_COS_THETA_D, half_vector_width};
 use crate::environment::sources::{CLEAR, clearance};
 use crate::environment::{Environment, Pyramid, VmfPyramid};
 use crate::memo::Keyed;
-use crate::threads::Threads;
 use crate::threads::fitted::kernel::FINEST_WIDTH_RAD;
+use crate::threads::{ThreadSets, Threads, WithThreads};
 
 /// What a method looks up of an environment, as far as it has to be filtered.
 #[derive(Clone, Default)]
@@ -46,18 +46,20 @@ pub fn finest_level(pyramid: &VmfPyramid) -> f32 {
 
 impl KernelNeeds {
     /// What those of `materials` do, where the environment without its small sources is blurred as `rest`.
-    pub fn of(environment: &Environment, materials: &[(&Brdf, Option<&Threads>)], rest: &VmfPyramid) -> Self {
+    pub fn of(environment: &Environment, materials: &[WithThreads], rest: &VmfPyramid) -> Self {
         let finest_level = finest_level(rest);
         let sources = &environment.small_sources().list;
         let mirrors = |brdf: &Brdf| {
             let lobe_width = (MIN_COS_THETA_D * half_vector_width(brdf)) as f32;
             sources.iter().any(|source| clearance(0.0, source.width_rad() as f32, lobe_width) < CLEAR[1])
         };
-        let is_sharp = |threads: &Option<&Threads>| {
-            threads.and_then(Threads::fitted).is_some_and(|table| table.sharp_count(finest_level) > 0)
+        let is_sharp = |threads: Option<ThreadSets<&Threads>>| {
+            let tables = threads.into_iter().flat_map(ThreadSets::both).filter_map(Threads::fitted);
+            let mut tables = tables;
+            tables.any(|table| table.sharp_count(finest_level) > 0)
         };
         Self {
-            map: materials.iter().any(|(_, threads)| is_sharp(threads)),
+            map: materials.iter().any(|(_, threads)| is_sharp(*threads)),
             sources: !sources.is_empty(),
             mirrored_sources: materials.iter().any(|(brdf, _)| mirrors(brdf)),
         }

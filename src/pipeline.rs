@@ -9,6 +9,7 @@ use crate::scene::Mesh;
 use crate::steps::{
     CompileCompute, CompileGeometryCache, UploadBackground, UploadLight, UploadMaterials, UploadMesh, light, pipelines,
 };
+use crate::threads::ThreadSets;
 use crate::vulkan::{Device, Frames, PassTime, Shader, compiled};
 use crate::{Error, Result};
 use std::sync::Arc;
@@ -98,7 +99,8 @@ impl DeviceScene {
         // Held, so that it is opened once for all that is compiled.
         pipelines(round, device)?;
         let geometry_cache = ask_geometry_cache(device, prepared, round)?;
-        let materials: Vec<_> = prepared.materials.iter().map(|m| (&m.brdf, m.threads.as_ref())).collect();
+        let materials: Vec<_> =
+            prepared.materials.iter().map(|m| (&m.brdf, m.threads.as_ref().map(ThreadSets::as_ref))).collect();
         let evaluates_brdf = method.evaluates_brdf(environment);
         let light = light(round, Some(device), method, environment, &prepared.shaded())?;
         let finest_level = light.blurred.as_ref().map(|blurred| finest_level(&blurred.rest));

@@ -6,7 +6,7 @@ use crate::method::Method;
 use crate::passes::{PlacedMesh, Sampling, View};
 use crate::scene::{Camera, MaterialSource, Mesh, Scene};
 use crate::steps::{DraftThreads, FitThreads, LoadEnvironment, LoadMaterial, LoadMesh};
-use crate::threads::{ThreadSettings, Threads};
+use crate::threads::{ThreadSets, ThreadSettings, Threads, WithThreads};
 use crate::{Error, Result};
 use glam::{DAffine3, DVec3};
 use std::cell::Cell;
@@ -45,10 +45,18 @@ pub struct PreparedMaterial {
     /// Its BRDF.
     pub brdf: Keyed<Brdf>,
     /// Its threads, for methods that use them.
-    pub threads: Option<Keyed<Threads>>,
+    pub threads: Option<ThreadSets<Keyed<Threads>>>,
 }
 
-/// The threads that `method` shades `brdf` by; none for a method that draws samples instead.
+impl PreparedMaterial {
+    /// Its BRDF and threads.
+    pub fn shaded(&self) -> WithThreads<'_> {
+        (&self.brdf, self.threads.as_ref().map(|sets| sets.as_ref().map(|threads| &**threads)))
+    }
+}
+
+/// The threads that `method` shades `brdf` by in a picture of `subpixels` x `subpixels` to the pixel; none for a method that draws
+/// samples instead.
 ///
 /// # Errors
 /// A number of threads that is out of range; cancelled.
@@ -57,15 +65,19 @@ pub fn ask_threads(
     method: Method,
     brdf: &Keyed<Brdf>,
     sampling: Sampling,
-) -> Result<Option<Keyed<Threads>>> {
-    let Some(settings) = thread_settings(method, sampling) else { return Ok(None) };
-    round.ask(&FitThreads { brdf, settings }).map(Some)
+    subpixels: u32,
+) -> Result<Option<ThreadSets<Keyed<Threads>>>> {
+    let sets = thread_settings(method, sampling, subpixels);
+    sets.map(|sets| sets.try_map(|settings| round.ask(&FitThreads { brdf, settings }))).transpose()
 }
 
 /// Which threads `method` shades by, if it does.
-fn thread_settings(method: Method, Sampling { count, seed }: Sampling) -> Option<ThreadSettings> {
-    let kind = method.threads()?;
-    Some(ThreadSettings { kind, count: count as usize, seed, ..Default::default() })
+fn thread_settings(method: Method, sampling: Sampling, subpixels: u32) -> Option<ThreadSets<ThreadSettings>> {
+    let Sampling { count, seed } = sampling;
+    let settings = ThreadSettings { kind: method.threads()?, count: count as usize, seed, ..ThreadSettings::default() };
+    let parts = if method.shares_surface() { subpixels * subpixels } else { 1 };
+    let of_subpixel = ThreadSettings { count: (count / parts).max(1) as usize, ..settings };
+    Some(ThreadSets { pixel: settings, subpixel: of_subpixel })
 }
 
 /// Asks `round` for all that `scene` names, and for the threads of its materials.
@@ -73,7 +85,8 @@ fn thread_settings(method: Method, Sampling { count, seed }: Sampling) -> Option
 /// # Errors
 /// The first file or setting that cannot be used; cancelled.
 pub fn prepare(scene: &Scene, round: &Round) -> Result<Prepared> {
-    let ask = |method, _: &str, brdf: &Keyed<Brdf>, sampling| ask_threads(round, method, brdf, sampling);
+    let subpixels = scene.image.subpixels;
+    let ask = |method, _: &str, brdf: &Keyed<Brdf>, sampling| ask_threads(round, method, brdf, sampling, subpixels);
     prepare_by(scene, round, &ask)
 }
 
@@ -90,6 +103,7 @@ pub fn can_draft(scene: &Scene, before: &Prepared) -> bool {
     method == Method::Fitted
         && before.method == method
         && before.sampling.count == scene.shading.threads.unwrap_or(method.default_count())
+        && before.view.subpixels == scene.image.subpixels
         && scene.used_materials().into_iter().all(was_edited)
 }
 
@@ -103,27 +117,30 @@ pub fn prepare_draft(scene: &Scene, before: &Prepared, round: &Round) -> Result<
         return Ok(None);
     }
     let is_draft = Cell::new(false);
+    let subpixels = scene.image.subpixels;
     let ask = |method, name: &str, brdf: &Keyed<Brdf>, sampling| {
-        let Some(settings) = thread_settings(method, sampling) else { return Ok(None) };
-        if let Some(finished) = round.known(&FitThreads { brdf, settings })? {
-            return Ok(Some(finished));
+        let Some(settings) = thread_settings(method, sampling, subpixels) else { return Ok(None) };
+        let finished = settings.try_map(|settings| round.known(&FitThreads { brdf, settings }))?;
+        if let ThreadSets { pixel: Some(pixel), subpixel: Some(subpixel) } = finished {
+            return Ok(Some(ThreadSets { pixel, subpixel }));
         }
         let mut shown =
             before.materials.iter().filter(|shown| shown.name == name && shown.brdf.model() == brdf.model());
         let Some((shown, threads)) = shown.find_map(|shown| Some((shown, shown.threads.as_ref()?))) else {
-            return ask_threads(round, method, brdf, sampling);
+            return ask_threads(round, method, brdf, sampling, subpixels);
         };
         is_draft.set(true);
         // While another material is edited, this one's draft serves on.
         let serves_on = shown.brdf.key == brdf.key;
-        if serves_on { Ok(Some(threads.clone())) } else { round.ask(&DraftThreads { brdf, before: threads }).map(Some) }
+        let draft = |before| round.ask(&DraftThreads { brdf, before });
+        if serves_on { Ok(Some(threads.clone())) } else { threads.as_ref().try_map(draft).map(Some) }
     };
     let prepared = prepare_by(scene, round, &ask)?;
     Ok(is_draft.get().then_some(prepared))
 }
 
 /// Gives the threads of a material by its name in the scene and its BRDF.
-type AskThreads<'a> = dyn Fn(Method, &str, &Keyed<Brdf>, Sampling) -> Result<Option<Keyed<Threads>>> + 'a;
+type AskThreads<'a> = dyn Fn(Method, &str, &Keyed<Brdf>, Sampling) -> Result<Option<ThreadSets<Keyed<Threads>>>> + 'a;
 
 fn prepare_by(scene: &Scene, round: &Round, ask_threads: &AskThreads) -> Result<Prepared> {
     let method = Method::from_name(&scene.shading.method)?;
@@ -242,8 +259,8 @@ impl Prepared {
     }
 
     /// BRDF and threads of each material.
-    pub fn shaded(&self) -> Vec<(&Brdf, Option<&Threads>)> {
-        self.materials.iter().map(|material| (&*material.brdf, material.threads.as_deref())).collect()
+    pub fn shaded(&self) -> Vec<WithThreads<'_>> {
+        self.materials.iter().map(PreparedMaterial::shaded).collect()
     }
 }
 

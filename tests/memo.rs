@@ -42,7 +42,8 @@ fn each_change_makes_what_it_needs_and_nothing_else() {
         ("camera", |scene| scene.camera = Some(Camera::framing(glam::DVec3::ZERO, 2.0, 1.0)), &[]),
         ("no background", |scene| scene.image.background = Background::None, &[]),
         ("place of an object", |scene| scene.objects[0].scale = 2.0, &[]),
-        ("sub-pixels", |scene| scene.image.subpixels = 1, &["shaders"]),
+        // Fewer threads are left for a sub-pixel of more.
+        ("sub-pixels", |scene| scene.image.subpixels = 1, &["upload of materials", "shaders"]),
         ("as many threads as there are", |scene| scene.shading.threads = Some(4), &[]),
         ("threads", |scene| scene.shading.threads = Some(2), &["threads", "upload of materials"]),
         (

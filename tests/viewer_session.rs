@@ -6,7 +6,9 @@ use common::{Validated, sphere};
 use glam::DVec3;
 use std::time::{Duration, Instant};
 use threadlight::low_level::memo::Memo;
+use threadlight::low_level::prepare::{Prepared, PreparedMaterial};
 use threadlight::low_level::scene::{MaterialSettings, MaterialSource, ObjectSettings, Source};
+use threadlight::low_level::threads::Threads;
 use threadlight::low_level::viewer::change::Change;
 use threadlight::low_level::viewer::input::Input;
 use threadlight::low_level::viewer::interaction::Viewer;
@@ -25,6 +27,12 @@ fn wait(viewer: &mut Viewer) {
 fn red(viewer: &Viewer) -> f64 {
     let brdf = &viewer.loaded().expect("something is shown").prepared.materials[0].brdf;
     std::f64::consts::PI * brdf.evaluate(DVec3::Z, DVec3::Z).x
+}
+
+/// The threads of each material, of pixels and of sub-pixels.
+fn threads_of(prepared: &Prepared) -> Vec<[Threads; 2]> {
+    let of = |material: &PreparedMaterial| material.threads.clone().unwrap().map(|threads| (*threads).clone()).both();
+    prepared.materials.iter().map(of).collect()
 }
 
 #[test]
@@ -87,13 +95,9 @@ fn of_two_materials_that_are_edited_in_turn_each_keeps_its_threads() {
             assert!(start.elapsed() < Duration::from_secs(100), "nothing was loaded");
         }
         let loaded = viewer.loaded().unwrap();
-        let threads = loaded.prepared.materials.iter().map(|material| (*material.threads.clone().unwrap()).clone());
-        (loaded.is_draft, threads.collect::<Vec<_>>())
+        (loaded.is_draft, threads_of(&loaded.prepared))
     };
-    let finished: Vec<_> = {
-        let loaded = viewer.loaded().unwrap();
-        loaded.prepared.materials.iter().map(|material| (*material.threads.clone().unwrap()).clone()).collect()
-    };
+    let finished = threads_of(&viewer.loaded().unwrap().prepared);
     let (is_draft, of_metal) = next(&mut viewer, &set("metal", "alpha", 0.31.into()));
     assert!(is_draft && of_metal[0] == finished[0] && of_metal[1] != finished[1]);
     // Another input before anything is finished: without a window, no frame asks for it, so it waits for the draft to be taken.
@@ -109,9 +113,7 @@ fn of_two_materials_that_are_edited_in_turn_each_keeps_its_threads() {
     let expected = common::ready(&scene(0.25, 0.31));
     let loaded = viewer.loaded().unwrap();
     assert!(!loaded.is_draft);
-    for (found, expected) in loaded.prepared.materials.iter().zip(&expected.materials) {
-        assert_eq!(**found.threads.as_ref().unwrap(), **expected.threads.as_ref().unwrap(), "{}", found.name);
-    }
+    assert!(threads_of(&loaded.prepared) == threads_of(&expected));
     viewer.handle(&Input::SavePicture(late.clone()));
     assert!(std::fs::read(early).unwrap() == std::fs::read(late).unwrap());
     drop(viewer);

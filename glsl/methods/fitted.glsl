@@ -109,10 +109,10 @@ struct Rows {
 };
 
 // Rows stand at multiples of 90 degrees / row_count; beyond the last one it holds.
-Rows rows_at(float theta_o, Material material) {
-    float row = min(theta_o * (float(material.row_count) / radians(90.0)), float(material.row_count - 1));
-    uint below = material.first_thread + uint(row) * words_a_row(material);
-    uint above = below + (uint(row) + 1 < material.row_count ? words_a_row(material) : 0);
+Rows rows_at(float theta_o, ThreadSet set) {
+    float row = min(theta_o * (float(set.row_count) / radians(90.0)), float(set.row_count - 1));
+    uint below = set.first + uint(row) * words_a_row(set);
+    uint above = below + (uint(row) + 1 < set.row_count ? words_a_row(set) : 0);
     return Rows(below, above, fract(row));
 }
 
@@ -127,17 +127,17 @@ Kernel kernel_at(Rows rows, uint k, Surface surface) {
 
 // Three loops, not one with three branches: where a driver masks lanes out, each pays for what none of its lanes does. For the same reason
 // tests are at the ends of loops.
-vec3 estimate(Surface surface, Material material) {
-    Rows rows = rows_at(surface.theta_o, material);
+vec3 estimate(Surface surface, Material material, ThreadSet set) {
+    Rows rows = rows_at(surface.theta_o, set);
     vec3 cosine_part = mix(unpack_cosine_part(rows.below), unpack_cosine_part(rows.above), rows.t);
     ++lookups;
     vec3 sum = cosine_part * textureLod(irradiance_map, surface.frame[2], 0.0).rgb;
-    uint k = material.sharp_count;
-    if (k < material.thread_count) {
+    uint k = set.sharp_count;
+    if (k < set.count) {
         do {
             Kernel kernel = kernel_at(rows, k, surface);
             sum += kernel.weight * blurred_radiance(kernel.direction, kernel.level);
-        } while (++k < material.thread_count);
+        } while (++k < set.count);
     }
     float of_kernels = 0.0;
     if (HAS_SOURCES != 0) {
@@ -152,7 +152,7 @@ vec3 estimate(Surface surface, Material material) {
         sum += mix(at.f_cos, at.cosine * cosine_part / radians(180.0), of_kernels);
     }
     k = 0;
-    if (HAS_SHARP_KERNELS != 0 && k < material.sharp_count) {
+    if (HAS_SHARP_KERNELS != 0 && k < set.sharp_count) {
         do {
             Kernel kernel = kernel_at(rows, k, surface);
             float sharp = sharp_part(kernel.level);
@@ -162,7 +162,7 @@ vec3 estimate(Surface surface, Material material) {
             if (sharp < 1.0) {
                 sum += kernel.weight * (1.0 - sharp) * blurred_radiance(kernel.direction, kernel.level);
             }
-        } while (++k < material.sharp_count);
+        } while (++k < set.sharp_count);
     }
     k = 0;
     if (HAS_MIRRORED_SOURCES != 0 && of_kernels > 0.0) {
@@ -172,7 +172,7 @@ vec3 estimate(Surface surface, Material material) {
             if (blurred > 0.0) {
                 sum += kernel.weight * blurred * of_kernels * blurred_sources(kernel.direction, kernel.level);
             }
-        } while (++k < material.thread_count);
+        } while (++k < set.count);
     }
     return max(sum, vec3(0.0));
 }

@@ -26,7 +26,7 @@ struct WeightedSum {
 // width: then each lookup has to stand for the 4 d beside it in either direction. For 2 x 2 sub-pixels the variance is d^2 / 4
 // along each axis, so (4 d)^2 is 64 times that, for each of the other sub-pixels.
 float lookup_solid_angle(Surface surface, Material material, Partition share, float log2_p) {
-    float share_sr = exp2(-log2_p) / float(material.thread_count);
+    float share_sr = exp2(-log2_p) / float(material.threads.count);
     float footprint_sr = 64.0 * float(share.stride - 1) * surface.normal_variance;
     return min(share_sr + footprint_sr, share_sr * float(share.stride));
 }
@@ -57,10 +57,10 @@ struct Rows {
 };
 
 Rows rows_at(float theta_o, Material material) {
-    float row = min(theta_o * (float(material.row_count) / radians(90.0)), float(material.row_count - 1));
+    float row = min(theta_o * (float(material.threads.row_count) / radians(90.0)), float(material.threads.row_count - 1));
     uint below = uint(row);
-    return Rows(below, min(below + 1, material.row_count - 1), row - float(below),
-                row * (radians(90.0) / float(material.row_count)));
+    return Rows(below, min(below + 1, material.threads.row_count - 1), row - float(below),
+                row * (radians(90.0) / float(material.threads.row_count)));
 }
 
 // The threads as published: row and frame follow the view.
@@ -69,7 +69,7 @@ vec3 threads_following_view(Surface surface, Material material, Rows rows, Parti
     uint below = row_start(material, rows.below);
     uint above = row_start(material, rows.above);
     WeightedSum sum = WeightedSum(vec3(0.0), vec3(0.0));
-    for (uint k = share.first; k < material.thread_count; k += share.stride) {
+    for (uint k = share.first; k < material.threads.count; k += share.stride) {
         vec4 between = mix(unpack_thread(below, k), unpack_thread(above, k), rows.t);
         float solid_angle_sr = lookup_solid_angle(surface, material, share, between.w);
         add_term(sum, material, surface.frame, normalize(between.xyz), w_o, between.w, solid_angle_sr);
@@ -84,7 +84,7 @@ vec3 threads_of_facing_view(Surface surface, Material material, Partition share)
     vec3 w_o = surface.w_o * frame;
     uint facing = row_start(material, 0);
     WeightedSum sum = WeightedSum(vec3(0.0), vec3(0.0));
-    for (uint k = share.first; k < material.thread_count; k += share.stride) {
+    for (uint k = share.first; k < material.threads.count; k += share.stride) {
         vec4 thread = unpack_thread(facing, k);
         vec3 h = normalize(thread.xyz + vec3(0.0, 0.0, 1.0));
         float cos_theta_d = dot(w_o, h);
@@ -101,7 +101,7 @@ vec3 threads_of_facing_view(Surface surface, Material material, Partition share)
 // Where the normal faces the eye the shading frame turns once around within a few pixels, and the threads with it: their
 // error would show as a pinwheel. There the sum over threads that do not turn takes over.
 vec3 estimate(Surface surface, Material material, uint first, uint stride) {
-    if (first >= material.thread_count) {
+    if (first >= material.threads.count) {
         return vec3(0.0);
     }
     Partition share = Partition(first, stride);
@@ -118,6 +118,6 @@ vec3 estimate(Surface surface, Material material, uint first, uint stride) {
     vec3 of_above = unpack_albedo(row_start(material, rows.above));
     vec3 albedo = mix(of_below, of_above, rows.t);
     // The partition's part of all threads.
-    float fraction = float((material.thread_count - first + stride - 1) / stride) / float(material.thread_count);
+    float fraction = float((material.threads.count - first + stride - 1) / stride) / float(material.threads.count);
     return fraction * albedo * mean;
 }

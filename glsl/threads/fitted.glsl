@@ -13,8 +13,8 @@ struct Kernel {
     vec3 weight;
 };
 
-uint words_a_row(Material material) {
-    return 3 * (material.thread_count + 1);
+uint words_a_row(ThreadSet set) {
+    return 3 * (set.count + 1);
 }
 
 // Thread k of the row that starts at `row`.

@@ -7,7 +7,7 @@ layout(set = 0, binding = 7, std430) readonly buffer Threads {
 };
 
 uint row_start(Material material, uint row) {
-    return material.first_thread + row * (material.thread_count + 1);
+    return material.threads.first + row * (material.threads.count + 1);
 }
 
 // Thread k of the row that starts at `row`: direction, and the logarithm of its pdf.

@@ -20,7 +20,7 @@ pub use custom::CustomBrdf;
 pub use lobe::{MIN_COS_THETA_D, half_vector_width, lobe_radius};
 pub use microfacet::{Distribution, fresnel_conductor, fresnel_dielectric};
 pub use parameters::{Domain, Parameter, Parameters, Spacing, as_number, channels};
-pub use record::MaterialRecord;
+pub use record::{MaterialRecord, ThreadSetRecord};
 
 file_formats!(Brdf: merl_file, toml_file);
 

@@ -1,6 +1,20 @@
 //! A material as shaders have it. Twin of the layout: glsl/material.glsl.
 use super::{Brdf, half_vector_width};
 
+/// `ThreadSet` in glsl/material.glsl.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
+pub struct ThreadSetRecord {
+    /// Where its threads start in the buffer of threads, in elements of that.
+    pub first: u32,
+    /// Number of its threads.
+    pub count: u32,
+    /// Number of their view angles.
+    pub row_count: u32,
+    /// How many of its threads, the first ones, are sharper than the environment's pyramid in some row.
+    pub sharp_count: u32,
+}
+
 /// `Material` in glsl/material.glsl.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
@@ -9,18 +23,14 @@ pub struct MaterialRecord {
     pub parameters: [f32; 12],
     /// Position of the model in models.rs.
     pub model: u32,
-    /// Where its threads start in the buffer of threads, in elements of that.
-    pub first_thread: u32,
-    /// Number of its threads.
-    pub thread_count: u32,
-    /// Number of their view angles.
-    pub row_count: u32,
     /// Where its CDFs start in the buffer of slices.
     pub first_slice: u32,
     /// [`half_vector_width`].
     pub lobe_width: f32,
-    /// How many of its threads, the first ones, are sharper than the environment's pyramid in some row.
-    pub sharp_count: u32,
+    /// Its threads.
+    pub threads: ThreadSetRecord,
+    /// Those of a sub-pixel that does not share a sum with the others.
+    pub subpixel_threads: ThreadSetRecord,
     /// The size of a structure in the buffer is a multiple of 16 bytes.
     pub padding: u32,
 }
@@ -31,12 +41,10 @@ impl MaterialRecord {
         Self {
             parameters: brdf.gpu_parameters(),
             model: brdf.model_index(),
-            first_thread: 0,
-            thread_count: 0,
-            row_count: 0,
             first_slice: 0,
             lobe_width: half_vector_width(brdf) as f32,
-            sharp_count: 0,
+            threads: ThreadSetRecord::default(),
+            subpixel_threads: ThreadSetRecord::default(),
             padding: 0,
         }
     }

@@ -11,7 +11,7 @@ use crate::prepare::{Prepared, PreparedMaterial, ask_threads, prepare};
 use crate::progress::{Observer, OnlyCancels};
 use crate::scene::{Background, MaterialSettings, MaterialSource, Scene, Source};
 use crate::steps::{LoadEnvironment, LoadMaterial};
-use crate::threads::Threads;
+use crate::threads::{ThreadSets, Threads};
 use crate::vulkan::Device;
 
 /// A method with its number of threads, or of samples.
@@ -152,7 +152,7 @@ pub struct Place<'a> {
     pub memo: &'a Memo,
     cases: &'a Cases,
     /// The threads made for the material so far.
-    tables: &'a mut Vec<Keyed<Threads>>,
+    tables: &'a mut Vec<ThreadSets<Keyed<Threads>>>,
     /// The last renderer in the environment: what the next one has in common with it is filtered, uploaded and compiled once.
     renderer: &'a mut Option<DeviceScene>,
     observer: &'a dyn Observer,
@@ -166,7 +166,13 @@ impl Place<'_> {
     pub fn choose(&mut self, estimator: Estimator) -> Result<()> {
         let Estimator { method, count } = estimator;
         let sampling = Sampling { count, seed: self.cases.seed };
-        let threads = ask_threads(&self.round(), method, &self.prepared.materials[0].brdf, sampling)?;
+        let threads = ask_threads(
+            &self.round(),
+            method,
+            &self.prepared.materials[0].brdf,
+            sampling,
+            self.prepared.view.subpixels,
+        )?;
         self.tables.extend(threads.clone());
         self.prepared.materials[0].threads = threads;
         self.prepared.method = method;

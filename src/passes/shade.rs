@@ -1,10 +1,10 @@
 //! Pass 2 of the paper (section 4.2): the radiance of every listed pixel, by its partition of the sample threads.
 use super::{CameraRays, Counters, DeviceLight, Tiles, View};
-use crate::brdf::{Brdf, MaterialRecord, MerlTable};
+use crate::brdf::{MaterialRecord, MerlTable, ThreadSetRecord};
 use crate::graph::{BufferDesc, BufferHandle, FrameGraph, ImageDesc, ImageHandle};
 use crate::memo::Keyed;
 use crate::method::Method;
-use crate::threads::{SliceTable, Threads};
+use crate::threads::{SliceTable, ThreadSets, Threads, WithThreads};
 use crate::vulkan::{self, Bound, Buffer, ComputePipeline, Device, ImageKind, ImageShape, Sampler, SamplerKind};
 use crate::{Error, Result};
 use ash::vk;
@@ -34,17 +34,17 @@ impl DeviceMaterials {
     pub fn new<'m>(
         device: &Arc<Device>,
         method: Method,
-        materials: impl IntoIterator<Item = (&'m Brdf, Option<&'m Threads>)>,
+        materials: impl IntoIterator<Item = WithThreads<'m>>,
         evaluates_brdf: bool,
         finest_level: Option<f32>,
     ) -> Result<Self> {
         let use_slices = method.lookups().slices;
         let mut records = Vec::new();
-        let mut threads: Vec<u32> = Vec::new();
+        let mut threads = ThreadWords { words: Vec::new(), finest_level };
         let mut slices: Vec<f32> = Vec::new();
         let mut tables = TableAtlas::default();
         let mut models_used = 0;
-        for (brdf, thread_table) in materials {
+        for (brdf, thread_sets) in materials {
             let mut record = MaterialRecord::new(brdf);
             if let Some(table) = evaluates_brdf.then(|| brdf.table()).flatten() {
                 record = record.with_table_at(tables.add(device, table)?);
@@ -53,14 +53,14 @@ impl DeviceMaterials {
                 models_used |= 1 << record.model;
             }
             if let Some(kind) = method.threads() {
-                assert_eq!(thread_table.map(Threads::kind), Some(kind), "threads of method {}", method.name());
+                let kinds = thread_sets.map(|sets| sets.map(Threads::kind).both());
+                assert_eq!(kinds, Some([kind; 2]), "threads of method {}", method.name());
             }
-            if let Some(table) = thread_table {
-                [record.row_count, record.thread_count] = table.size().map(|size| size as u32);
-                record.first_thread = (threads.len() / table.device_element_words()) as u32;
-                threads.extend(table.device_words());
-                let sharp_count = table.fitted().zip(finest_level).map(|(table, level)| table.sharp_count(level));
-                record.sharp_count = sharp_count.unwrap_or(0) as u32;
+            if let Some(ThreadSets { pixel, subpixel }) = thread_sets {
+                record.threads = threads.add(pixel);
+                // Where sub-pixels need no others, they are the same ones.
+                record.subpixel_threads =
+                    if std::ptr::eq(pixel, subpixel) { record.threads } else { threads.add(subpixel) };
             }
             record.first_slice = slices.len() as u32;
             records.push(record);
@@ -73,7 +73,7 @@ impl DeviceMaterials {
         let optional = |name, contents: &[u8]| (!contents.is_empty()).then(|| storage(name, contents)).transpose();
         Ok(Self {
             records: storage("materials", bytemuck::cast_slice(&records))?,
-            threads: optional("threads", bytemuck::cast_slice(&threads))?,
+            threads: optional("threads", bytemuck::cast_slice(&threads.words))?,
             slices: optional("slices", bytemuck::cast_slice(&slices))?,
             tables: tables.upload(device)?,
             table_sampler: Sampler::new(device, "brdf tables", SamplerKind::WrappedLinear)?,
@@ -89,6 +89,23 @@ impl DeviceMaterials {
         let optional = [("Threads", &self.threads), ("Slices", &self.slices)];
         let optional = optional.into_iter().filter_map(|(name, buffer)| Some((name, Bound::from(buffer.as_ref()?))));
         [("Materials", Bound::from(&self.records)), ("brdf_tables", tables)].into_iter().chain(optional).collect()
+    }
+}
+
+/// The shader's buffer of threads.
+struct ThreadWords {
+    words: Vec<u32>,
+    /// Level 0 of the blurred environment on the scale of kernels, if that is looked up.
+    finest_level: Option<f32>,
+}
+
+impl ThreadWords {
+    fn add(&mut self, threads: &Threads) -> ThreadSetRecord {
+        let [row_count, count] = threads.size().map(|size| size as u32);
+        let first = (self.words.len() / threads.device_element_words()) as u32;
+        self.words.extend(threads.device_words());
+        let sharp_count = threads.fitted().zip(self.finest_level).map(|(table, level)| table.sharp_count(level));
+        ThreadSetRecord { first, count, row_count, sharp_count: sharp_count.unwrap_or(0) as u32 }
     }
 }
 

@@ -159,7 +159,7 @@ fn at_sources(point: &Point, sources: &[SourceRecord], lobe_width: f32, w_o: Vec
 /// # Panics
 /// A scene prepared for another method has other threads.
 pub(super) fn estimate(point: &Point) -> Vec3 {
-    let Some(Threads::Fitted(threads)) = point.material().threads.as_deref() else {
+    let Some(Threads::Fitted(threads)) = point.threads() else {
         panic!("fitted threads are there")
     };
     let surface = &point.surface;

@@ -12,7 +12,7 @@ use crate::method::{Lookups, Method};
 use crate::passes::{SMOOTH_DEG, View, smooth_variance};
 use crate::prepare::{Prepared, PreparedMaterial};
 use crate::steps::light;
-use crate::threads::SliceTable;
+use crate::threads::{SliceTable, Threads};
 use glam::{Mat3, UVec2, Vec2, Vec3, Vec4};
 use random::random_bits;
 
@@ -178,6 +178,7 @@ impl<'a> CpuShader<'a> {
             point.surface = self.surface_at(position, normal_sum(texels).normalize());
             point.surface.normal_variance = normal_variance(texels);
             if !fitted::needs_subpixels(&point) {
+                point.is_pixel = true;
                 return point.estimate().extend(1.0);
             }
         }
@@ -205,7 +206,7 @@ impl<'a> CpuShader<'a> {
         let size = UVec2::new(view.width, view.height) * view.subpixels;
         let surface = self.surface_at((subpixel.as_vec2() + 0.5) / size.as_vec2(), normal);
         let axis = self.to_environment(view.camera_rays().right());
-        Some(Point { twin: self, surface, axis, material, subpixel, first: 0, stride: 1 })
+        Some(Point { twin: self, surface, axis, material, subpixel, first: 0, stride: 1, is_pixel: false })
     }
 }
 
@@ -220,6 +221,8 @@ struct Point<'a> {
     /// Threads or samples `first`, `first + stride`, ...
     first: u32,
     stride: usize,
+    /// Whether it stands for all sub-pixels.
+    is_pixel: bool,
 }
 
 impl Point<'_> {
@@ -229,6 +232,12 @@ impl Point<'_> {
 
     fn material(&self) -> &PreparedMaterial {
         &self.twin.prepared.materials[self.material]
+    }
+
+    /// The threads by which it is shaded, for methods that have any.
+    fn threads(&self) -> Option<&Threads> {
+        let sets = self.material().threads.as_ref()?;
+        Some(if self.is_pixel { &sets.pixel } else { &sets.subpixel })
     }
 
     fn lobe_width(&self) -> f32 {

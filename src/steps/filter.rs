@@ -1,13 +1,12 @@
 //! Filters environments: what the methods look up of them, in memory.
 use crate::Result;
-use crate::brdf::Brdf;
 use crate::environment::{Environment, Pyramid, VmfPyramid, irradiance_map, vmf_file};
 use crate::light::{BlurredLight, KernelNeeds, Light};
 use crate::memo::{Key, Keyed, Memo, Round, Step, Stored};
 use crate::method::Method;
 use crate::passes::vmf_pyramid;
 use crate::steps::pipelines;
-use crate::threads::Threads;
+use crate::threads::WithThreads;
 use crate::vulkan::{Device, DeviceKind};
 use std::sync::Arc;
 
@@ -124,7 +123,7 @@ pub fn light(
     device: Option<&Arc<Device>>,
     method: Method,
     environment: &Keyed<Environment>,
-    materials: &[(&Brdf, Option<&Threads>)],
+    materials: &[WithThreads],
 ) -> Result<Light> {
     let lookups = method.lookups();
     Ok(Light {
@@ -147,7 +146,7 @@ pub fn blurred_light(
     round: &Round,
     device: Option<&Arc<Device>>,
     environment: &Keyed<Environment>,
-    materials: &[(&Brdf, Option<&Threads>)],
+    materials: &[WithThreads],
 ) -> Result<BlurredLight> {
     let has_sources = !environment.small_sources().list.is_empty();
     let part = |of_sources| match has_sources {

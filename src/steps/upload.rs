@@ -8,7 +8,7 @@ use crate::memo::{Key, Keyed, Memo, Round, Step};
 use crate::method::Method;
 use crate::passes::{BackgroundMap, DeviceLight, DeviceMaterials, DeviceMesh};
 use crate::scene::Mesh;
-use crate::threads::Threads;
+use crate::threads::{ThreadSets, Threads, WithThreads};
 use crate::vulkan::Device;
 use std::sync::Arc;
 
@@ -36,7 +36,7 @@ impl Step for UploadMesh<'_> {
 }
 
 /// A material as shading needs it: its BRDF, and its threads for methods that have any.
-pub type Shaded<'a> = (&'a Keyed<Brdf>, Option<&'a Keyed<Threads>>);
+pub type Shaded<'a> = (&'a Keyed<Brdf>, Option<ThreadSets<&'a Keyed<Threads>>>);
 
 /// Uploads what a method looks up of materials.
 pub struct UploadMaterials<'a> {
@@ -58,18 +58,24 @@ impl Step for UploadMaterials<'_> {
 
     fn key(&self, _: &Memo) -> Result<Key> {
         let key = on(self.device, self.method.name()).number(u64::from(self.evaluates_brdf));
-        let of = |(brdf, threads): &Shaded| [Some(brdf.key), threads.map(|threads| threads.key)];
-        let key = key.keys(self.materials.iter().flat_map(of).flatten());
+        let keys = self.materials.iter().flat_map(|(brdf, threads)| {
+            let threads = threads.iter().copied().flat_map(ThreadSets::both);
+            std::iter::once(brdf.key).chain(threads.map(|threads| threads.key))
+        });
+        let key = key.keys(keys);
         // Of the light, only how many threads are sharper than it.
         let sharp = self.finest_level.map(|level| {
-            let threads = self.materials.iter().filter_map(|(_, threads)| threads.and_then(|table| table.fitted()));
-            threads.map(|table| table.sharp_count(level) as u64).collect::<Vec<_>>()
+            let threads = self.materials.iter().filter_map(|(_, threads)| *threads).flat_map(ThreadSets::both);
+            threads.filter_map(|table| table.fitted()).map(|table| table.sharp_count(level) as u64).collect::<Vec<_>>()
         });
         Ok(sharp.into_iter().flatten().fold(key, |key, count| key.number(count)).build())
     }
 
     fn make(&self, _: &Round) -> Result<DeviceMaterials> {
-        let materials = self.materials.iter().map(|(brdf, threads)| (&***brdf, threads.map(|threads| &**threads)));
+        let materials = self
+            .materials
+            .iter()
+            .map(|&(brdf, threads)| -> WithThreads { (brdf, threads.map(|sets| sets.map(|threads| &**threads))) });
         DeviceMaterials::new(self.device, self.method, materials, self.evaluates_brdf, self.finest_level)
     }
 }

@@ -25,6 +25,7 @@ pub mod forces;
 mod generate;
 pub mod peaks;
 mod plot;
+mod sets;
 pub mod slice;
 pub mod slice_table;
 pub mod smoothing;
@@ -35,6 +36,7 @@ pub(crate) mod test_materials;
 pub use file::{FORMAT_VERSION, read, write};
 pub use fitted::FittedTable;
 pub use plot::plot;
+pub use sets::{ThreadSets, WithThreads};
 pub use slice_table::SliceTable;
 pub use table::{Sample, ThreadTable};
 

@@ -34,7 +34,8 @@ impl State {
                 }
                 None => ui.weak("move the cursor over an object"),
             };
-            match material.threads.as_deref() {
+            let threads = material.threads.as_ref().map(|sets| &*sets.pixel);
+            match threads {
                 Some(threads) => threads_seen::draw_hemisphere(ui, threads, surface.as_ref()),
                 None => drop(ui.weak("this method has no threads")),
             }
@@ -50,7 +51,7 @@ impl State {
                 self.thumbnail = Some((prepared.environment.key, intensity, display, texture));
             }
             if let Some((.., texture)) = &self.thumbnail {
-                threads_seen::draw_environment(ui, texture.id(), material.threads.as_deref(), surface.as_ref());
+                threads_seen::draw_environment(ui, texture.id(), threads, surface.as_ref());
             }
         });
     }
