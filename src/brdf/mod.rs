@@ -15,12 +15,14 @@ mod lobe;
 mod microfacet;
 mod parameters;
 mod record;
+mod tabulate;
 
 pub use custom::CustomBrdf;
 pub use lobe::{MIN_COS_THETA_D, half_vector_width, lobe_radius};
 pub use microfacet::{Distribution, fresnel_conductor, fresnel_dielectric};
 pub use parameters::{Domain, Parameter, Parameters, Spacing, as_number, channels};
 pub use record::MaterialRecord;
+pub use tabulate::tabulate;
 
 file_formats!(Brdf: merl_file, toml_file);
 
@@ -165,25 +167,20 @@ impl Brdf {
         builtin::MATERIALS.iter().map(|(name, _)| *name)
     }
 
-    /// Id of the model by which shaders evaluate it: its position in models.rs, or that of measured tables if it has no twin.
+    /// Id of the model by which shaders evaluate it: its position in models.rs, or that of `tabulated` if it has no twin.
     pub fn model_index(&self) -> u32 {
-        let twin = if TWINS.contains(&self.model()) { self.model() } else { "merl" };
+        let twin = if self.has_twin() { self.model() } else { "tabulated" };
         Brdf::MODELS.iter().position(|name| *name == twin).expect("MODELS holds every model") as u32
+    }
+
+    /// Whether shaders evaluate it by themselves; otherwise they look it up in a table that [`tabulate`] makes.
+    pub fn has_twin(&self) -> bool {
+        TWINS.contains(&self.model())
     }
 
     /// The model's parameters for its GLSL twin, `BrdfParameters { vec4 a, b, c }` in memory order.
     pub fn gpu_parameters(&self) -> [f32; 12] {
         dispatch!(self, model => model.gpu_parameters())
-    }
-
-    /// What shaders look the BRDF up in, if they do not evaluate it: the measured table, or one that is made of a model without a twin.
-    pub fn table(&self) -> Option<MerlTable> {
-        match self {
-            Brdf::MerlTable(table) => Some(table.clone()),
-            Brdf::Custom(custom) => Some(custom.table()),
-            model if TWINS.contains(&model.model()) => None,
-            model => Some(MerlTable::of(|w_i, w_o| model.evaluate(w_i, w_o))),
-        }
     }
 
     /// Digest of everything the BRDF's values depend on: equal digests, equal BRDFs.

@@ -8,5 +8,6 @@ brdf_models! {
     conductor => Conductor,
     plastic => Plastic,
     merl => MerlTable,
+    tabulated => Tabulated,
     custom => Custom,
 }
