@@ -12,6 +12,7 @@ use crate::file_format::{self, FileKind, file_formats};
 
 mod builtin;
 mod lobe;
+mod metals;
 mod microfacet;
 mod parameters;
 mod record;
@@ -240,6 +241,14 @@ pub fn luminance(rgb: DVec3) -> f64 {
     rgb.dot(dvec3(0.2126, 0.7152, 0.0722))
 }
 
+/// Warns where `most`, that `what` is, exceeds 1 in some channel: such a surface reflects more light than it receives.
+fn warn_of_excess(what: &str, most: DVec3) {
+    let most = most.max_element();
+    if most > 1.0 + 1e-9 {
+        tracing::warn!("{what} is {most:.3}: the surface reflects more light than it receives");
+    }
+}
+
 /// Adds numbers to a fingerprint, independent of the machine's byte order.
 fn hash_numbers(hasher: &mut blake3::Hasher, numbers: impl IntoIterator<Item = f64>) {
     for number in numbers {
@@ -247,5 +256,13 @@ fn hash_numbers(hasher: &mut blake3::Hasher, numbers: impl IntoIterator<Item = f
     }
 }
 
+#[cfg(test)]
+mod closed_form_tests;
+#[cfg(test)]
+mod fit_tests;
+#[cfg(test)]
+mod model_tests;
+#[cfg(test)]
+mod samples;
 #[cfg(test)]
 mod tests;

@@ -1,9 +1,9 @@
-//! A BRDF that shaders do not evaluate, as a table over tan(theta_h / 2), cos theta_d and cos^2 phi_d. Twin: glsl/brdf/tabulated.glsl.
+//! A BRDF that shaders do not evaluate, as a table over tan(theta_h / 2), cos theta_d and |cos phi_d|. Twin: glsl/brdf/tabulated.glsl.
 //!
 //! Half and difference angles are Rusinkiewicz's (1998). A BRDF that is isotropic, reciprocal and the same in a mirror is a function
-//! of cos^2 phi_d, since phi_d, phi_d + 180 degrees and -phi_d are then the same. All three coordinates are algebraic: no lookup takes an
+//! of |cos phi_d|, since phi_d, phi_d + 180 degrees and -phi_d are then the same. All three coordinates are algebraic: no lookup takes an
 //! arc tangent. Nodes lie where coordinates are 0 and 1, so a lobe's peak is a node, and between them
-//! - linearly in cos^2 phi_d, in which shadowing and off-plane widening are nearly linear,
+//! - linearly in |cos phi_d|, in which both cosines to the normal are linear, and so the edges of shadows and horizon,
 //! - logarithmically in cos theta_d above a knee, as f grows by its powers towards grazing angles,
 //! - logarithmically in tan(theta_h / 2) above a knee in the lobe's width: equally many nodes for each doubling of the angle.
 //!
@@ -20,7 +20,7 @@ use super::{Model, Parameters};
 use crate::error::{Error, Result};
 
 /// Cosine of theta_d below which nodes are equally spaced rather than by factors.
-const KNEE_COS_THETA_D: f64 = 0.02;
+const KNEE_COS_THETA_D: f64 = 0.2;
 
 /// Nodes stay this far, in parts of the cosine, from the horizon, where some BRDFs are infinite.
 const FROM_HORIZON: f64 = 1e-2;
@@ -28,7 +28,7 @@ const FROM_HORIZON: f64 = 1e-2;
 /// A BRDF as shaders look it up. Cheap to clone.
 #[derive(Clone)]
 pub struct Tabulated {
-    /// Values over `scale`, index (cos^2 phi_d) + nodes[0] ((cos theta_d) + nodes[1] (tan(theta_h / 2))); the fourth channel is not used.
+    /// Values over `scale`, index (|cos phi_d|) + nodes[0] ((cos theta_d) + nodes[1] (tan(theta_h / 2))); the fourth channel is not used.
     texels: Arc<[Vec4]>,
     grid: Grid,
     /// 1/sr: the greatest value.
@@ -38,7 +38,7 @@ pub struct Tabulated {
 /// Where nodes lie.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Grid {
-    /// Along cos^2 phi_d, cos theta_d and tan(theta_h / 2); at least two each.
+    /// Along |cos phi_d|, cos theta_d and tan(theta_h / 2); at least two each.
     pub nodes: [usize; 3],
     /// tan(theta_h / 2) below which nodes are equally spaced rather than by factors.
     pub knee: f64,
@@ -59,9 +59,9 @@ impl Grid {
         let along = h.z * (w_i.x * x + w_i.y * y) - sin_theta_h * w_i.z;
         let across = w_i.y * x - w_i.x * y;
         let square = along * along + across * across;
-        let cos2_phi_d = if square > 0.0 { along * along / square } else { 0.0 };
+        let cos_phi_d = if square > 0.0 { along.abs() / square.sqrt() } else { 0.0 };
         let unit = dvec3(
-            cos2_phi_d,
+            cos_phi_d.min(1.0),
             logarithmic(w_i.dot(h).clamp(0.0, 1.0), KNEE_COS_THETA_D),
             logarithmic((sin_theta_h / (1.0 + h.z)).min(1.0), self.knee),
         );
@@ -70,7 +70,7 @@ impl Grid {
 
     /// The directions w_i and w_o at a node, moved above the horizon.
     fn directions(&self, node: [usize; 3]) -> (DVec3, DVec3) {
-        let [q, c, t] = std::array::from_fn(|axis| node[axis] as f64 / (self.nodes[axis] - 1) as f64);
+        let [p, c, t] = std::array::from_fn(|axis| node[axis] as f64 / (self.nodes[axis] - 1) as f64);
         let cos_theta_d = exponential(c, KNEE_COS_THETA_D).clamp(1e-3, 1.0);
         let tangent = exponential(t, self.knee).min(1.0 - 1e-6);
         let square = tangent * tangent;
@@ -78,7 +78,7 @@ impl Grid {
         let sin_theta_d = (1.0 - cos_theta_d * cos_theta_d).sqrt();
         // n . w = cos theta_h cos theta_d -+ tan(theta_h / 2) `along`.
         let most = (1.0 - FROM_HORIZON) * cos_theta_h * cos_theta_d / sin_theta_h;
-        let along = (sin_theta_d * q.sqrt()).min(most);
+        let along = (sin_theta_d * p).min(most);
         let across = (sin_theta_d * sin_theta_d - along * along).max(0.0).sqrt();
         let direction = |along: f64, across: f64| {
             let x = cos_theta_h * along + sin_theta_h * cos_theta_d;
@@ -99,8 +99,8 @@ fn exponential(x: f64, knee: f64) -> f64 {
 }
 
 impl Tabulated {
-    /// Nodes along cos^2 phi_d and along cos theta_d: of all tables alike, so that an image packs them without gaps.
-    pub const NODES: [usize; 2] = [13, 97];
+    /// Nodes along |cos phi_d| and along cos theta_d: of all tables alike, so that an image packs them without gaps.
+    pub const NODES: [usize; 2] = [17, 75];
 
     /// The table of `f` on `grid`.
     pub(super) fn of(f: &(impl Fn(DVec3, DVec3) -> DVec3 + Sync), grid: Grid) -> Self {
@@ -116,7 +116,7 @@ impl Tabulated {
         Self { texels, grid, scale }
     }
 
-    /// Number of texels along x, y and z of a 3D texture: cos^2 phi_d, cos theta_d, tan(theta_h / 2).
+    /// Number of texels along x, y and z of a 3D texture: |cos phi_d|, cos theta_d, tan(theta_h / 2).
     pub fn size(&self) -> [usize; 3] {
         self.grid.nodes
     }
