@@ -27,3 +27,10 @@ layout(set = 0, binding = 6) uniform sampler3D brdf_tables;
 vec4 brdf_table_texel(vec3 texel_coordinate) {
     return textureLod(brdf_tables, texel_coordinate / vec3(textureSize(brdf_tables, 0)), 0.0);
 }
+
+layout(set = 0, binding = 16) uniform sampler3D made_brdf_tables;
+
+// Texel (|cos phi_d|, cos theta_d, tan(theta_h / 2)) of the atlas of tables that were made, between texel centres trilinearly.
+vec4 made_table_texel(vec3 texel_coordinate) {
+    return textureLod(made_brdf_tables, texel_coordinate / vec3(textureSize(made_brdf_tables, 0)), 0.0);
+}

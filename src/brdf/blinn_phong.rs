@@ -3,7 +3,7 @@ use std::f64::consts::{FRAC_1_PI, PI};
 
 use glam::DVec3;
 
-use super::{Model, Parameters, Spacing, hash_numbers};
+use super::{Model, Parameters, Spacing, hash_numbers, warn_of_excess};
 use crate::error::Result;
 
 /// Blinn's half-vector form of the Phong model.
@@ -45,12 +45,7 @@ impl Model for BlinnPhong {
             )?,
             exponent: parameters.number("exponent", 0.0..=1e5, Spacing::Logarithmic, help)?,
         };
-        let most = (model.diffuse + model.specular).max_element();
-        if most > 1.0 + 1e-9 {
-            tracing::warn!(
-                "blinn_phong: diffuse + specular is {most:.3}: the surface reflects more light than it receives"
-            );
-        }
+        warn_of_excess("blinn_phong: diffuse + specular", model.diffuse + model.specular);
         Ok(model)
     }
 

@@ -1,6 +1,7 @@
 //! Rough metal: f = F D G / (4 cos_theta_i cos_theta_o), exact conductor Fresnel. Twin: glsl/brdf/conductor.glsl.
 use glam::DVec3;
 
+use super::metals::index_of_refraction;
 use super::microfacet::{Distribution, fresnel_conductor};
 use super::{Model, Parameters, hash_numbers};
 use crate::error::Result;
@@ -26,11 +27,7 @@ impl Model for Conductor {
 
     fn from_parameters(parameters: &mut Parameters) -> Result<Self> {
         let (distribution, alpha) = Distribution::from_parameters(parameters)?;
-        // No material is outside: the bounds only keep the Fresnel terms far from overflow in single precision.
-        let help = "Real part of the conductor's index of refraction, for red, green and blue.";
-        let eta = parameters.colour("eta", 1e-3..=100.0, help)?;
-        let help = "Extinction: imaginary part of the conductor's index of refraction, for red, green and blue.";
-        let k = parameters.colour("k", 0.0..=100.0, help)?;
+        let (eta, k) = index_of_refraction(parameters)?;
         Ok(Self { distribution, alpha, eta, k })
     }
 

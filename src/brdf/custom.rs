@@ -25,21 +25,21 @@
 //! [`MaterialSource::Custom`](crate::scene::MaterialSource::Custom) puts it into a scene.
 //!
 //! On the CPU, and so in threads, pdfs and the reference, the BRDF is the function itself. Where a shader evaluates BRDFs it looks
-//! them up in a table that is made of the function, as it does for measured ones: cells of about a degree, finer towards the mirror
-//! direction, between which it is linear. So the function has to be isotropic and reciprocal. The error of that table, as the integral
-//! of |difference| cos over that of f cos, is for GGX, by roughness and view angle:
+//! them up in a table that is made of the function, as it does for models without a form in GLSL. So the function has to be isotropic,
+//! reciprocal and the same in a mirror. The table is as fine as the function's lobe needs. Its error, as the integral of |difference| cos
+//! over that of f cos, is found when it is made, and logged. For GGX, by roughness and view angle:
 //!
 //! | alpha | 0 to 60 degrees | 80 degrees | 87 degrees |
 //! |---|---|---|---|
-//! | 0.3 | 0.06 % | 0.10 % | 0.11 % |
-//! | 0.03 | 0.6 % | 1.0 % | 3.8 % |
-//! | 0.01 | 1.8 % | 2.1 % | 8 % |
-//! | 0.003 | 5.8 % | 6.2 % | 13 % |
-use std::sync::{Arc, OnceLock};
+//! | 0.3 | 0.09 % | 0.14 % | 0.17 % |
+//! | 0.03 | 0.04 % | 0.08 % | 0.42 % |
+//! | 0.01 | 0.04 % | 0.07 % | 0.33 % |
+//! | 0.001 | 0.07 % | 0.09 % | 0.33 % |
+use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::{Brdf, MerlTable, Model, Parameters};
+use super::{Brdf, Model, Parameters};
 use crate::error::{Error, Result};
 
 /// What a user of the crate has to give.
@@ -77,7 +77,7 @@ pub trait CustomBrdf: Send + Sync {
     /// Bytes that stand for all values: of equal name and key are only equal BRDFs, today and in the next run. Caches go by them.
     fn key(&self) -> Vec<u8>;
 
-    /// f(w_i, w_o) in 1/sr, linear Rec. 709, for unit vectors with both z positive; z is the normal. Isotropic and reciprocal. A channel
+    /// f(w_i, w_o) in 1/sr, linear Rec. 709, for unit vectors with both z positive; z is the normal. Isotropic, reciprocal and the same in a mirror. A channel
     /// that is negative, infinite or NaN counts as 0.
     fn evaluate(&self, w_i: DVec3, w_o: DVec3) -> DVec3;
 }
@@ -86,24 +86,17 @@ pub trait CustomBrdf: Send + Sync {
 #[derive(Clone)]
 pub struct Custom {
     function: Arc<dyn CustomBrdf>,
-    /// Made when first asked for.
-    table: Arc<OnceLock<MerlTable>>,
 }
 
 impl Custom {
     /// The BRDF of these values.
     pub fn new(function: impl CustomBrdf + 'static) -> Self {
-        Self { function: Arc::new(function), table: Arc::default() }
+        Self { function: Arc::new(function) }
     }
 
     /// What to call it.
     pub fn name(&self) -> &str {
         self.function.name()
-    }
-
-    /// What shaders look up: made in a second or less, once for all clones.
-    pub(super) fn table(&self) -> MerlTable {
-        self.table.get_or_init(|| MerlTable::of(|w_i, w_o| self.evaluate(w_i, w_o))).clone()
     }
 }
 
@@ -149,7 +142,7 @@ impl Model for Custom {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::brdf::{half_vector_width, lobe_radius};
+    use crate::brdf::{half_vector_width, lobe_radius, tabulate};
     use glam::{DVec2, dvec3};
     use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -217,13 +210,13 @@ mod tests {
     #[test]
     fn the_table_of_a_function_errs_as_documented() {
         for (alpha, bounds) in [
-            (0.3, [0.001, 0.001, 0.0015, 0.002]),
-            (0.03, [0.007, 0.007, 0.012, 0.045]),
-            (0.01, [0.02, 0.02, 0.025, 0.1]),
-            (0.003, [0.065, 0.065, 0.07, 0.15]),
+            (0.3, [0.001, 0.001, 0.0016, 0.002]),
+            (0.03, [0.0005, 0.0005, 0.001, 0.005]),
+            (0.01, [0.0005, 0.0006, 0.001, 0.004]),
+            (0.001, [0.0008, 0.001, 0.0012, 0.004]),
         ] {
             let custom = Brdf::custom(Wrapped(ggx(alpha)));
-            let table = Brdf::MerlTable(custom.table().unwrap());
+            let table = Brdf::Tabulated(tabulate(&custom).0);
             for (theta_o_deg, bound) in [0.0, 60.0, 80.0, 87.0].into_iter().zip(bounds) {
                 let error = relative_error(&custom, &table, theta_o_deg);
                 println!("alpha {alpha}, {theta_o_deg} degrees: {:.2} %", 100.0 * error);
@@ -248,10 +241,10 @@ mod tests {
     fn values_that_are_no_reflectance_count_as_none() {
         let brdf = Brdf::custom(Constant(dvec3(f64::NAN, -1.0, f64::INFINITY)));
         assert_eq!(brdf.evaluate(DVec3::Z, DVec3::Z), DVec3::ZERO);
-        assert!(brdf.table().unwrap().texels().iter().all(|texel| texel.truncate() == glam::Vec3::ZERO));
+        assert!(tabulate(&brdf).0.texels().iter().all(|texel| texel.truncate() == glam::Vec3::ZERO));
         assert_eq!((half_vector_width(&brdf), lobe_radius(&brdf)), (FRAC_PI_2, FRAC_PI_2));
         let brdf = Brdf::custom(Constant(dvec3(0.1, f64::NAN, 0.3)));
-        let table = Brdf::MerlTable(brdf.table().unwrap());
+        let table = Brdf::Tabulated(tabulate(&brdf).0);
         assert!((table.evaluate(DVec3::Z, DVec3::Z) - dvec3(0.1, 0.0, 0.3)).abs().max_element() < 1e-7);
     }
 }

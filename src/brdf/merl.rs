@@ -5,8 +5,7 @@
 use std::f64::consts::{FRAC_1_PI, FRAC_2_PI, FRAC_PI_2, PI};
 use std::sync::Arc;
 
-use glam::{DMat3, DVec2, DVec3, Vec4, dvec2, dvec3};
-use rayon::prelude::*;
+use glam::{DVec2, DVec3, Vec4, dvec2, dvec3};
 
 use super::{Model, Parameters};
 use crate::error::{Error, Result};
@@ -80,24 +79,6 @@ impl MerlTable {
         Ok(Self::from_texels(texels))
     }
 
-    /// The table of the values of `f` in the middle of each cell. `f` has to be isotropic, reciprocal, finite and not negative.
-    pub fn of(f: impl Fn(DVec3, DVec3) -> DVec3 + Sync) -> Self {
-        let line = |line: usize| {
-            let (theta_h, theta_d) = (line / THETA_D_BINS, line % THETA_D_BINS);
-            let horizon = Horizon::of_bins(theta_h, theta_d);
-            let f = &f;
-            (0..PHI_D_BINS).map(move |phi_d| {
-                let (w_i, w_o) = middle_of_cell(theta_h, theta_d, phi_d);
-                if horizon.is_above(phi_d) && w_i.z > 0.0 && w_o.z > 0.0 {
-                    f(w_i, w_o).min(DVec3::splat(f64::from(f32::MAX))).as_vec3().extend(1.0)
-                } else {
-                    Vec4::ZERO
-                }
-            })
-        };
-        Self::from_texels((0..THETA_H_BINS * THETA_D_BINS).into_par_iter().flat_map_iter(line).collect())
-    }
-
     fn from_texels(texels: Vec<Vec4>) -> Self {
         let mut hasher = blake3::Hasher::new();
         for texel in &texels {
@@ -110,18 +91,9 @@ impl MerlTable {
 
     /// The table for a 3D texture: RGBA = (rgb valid, valid) with f in 1/sr and valid 0 or 1; x = phi_d (180), y = theta_d
     /// (90), z = theta_h (90), x fastest. Interpolate all four, then divide rgb by a.
-    pub fn texels(&self) -> &[Vec4] {
+    pub fn texels(&self) -> &Arc<[Vec4]> {
         &self.texels
     }
-}
-
-/// The directions w_i and w_o in the middle of a cell, with the half vector in the plane of x and z.
-fn middle_of_cell(theta_h: usize, theta_d: usize, phi_d: usize) -> (DVec3, DVec3) {
-    let x = (theta_h as f64 + 0.5) / THETA_H_BINS as f64;
-    let to_shading_frame = DMat3::from_rotation_y(FRAC_PI_2 * x * x);
-    let (sin_theta_d, cos_theta_d) = (FRAC_PI_2 * (theta_d as f64 + 0.5) / THETA_D_BINS as f64).sin_cos();
-    let across = sin_theta_d * DVec2::from_angle(PI * (phi_d as f64 + 0.5) / PHI_D_BINS as f64);
-    (to_shading_frame * across.extend(cos_theta_d), to_shading_frame * (-across).extend(cos_theta_d))
 }
 
 /// Tells which cells of one (theta_h, theta_d) have both light and view above the horizon at their centre.

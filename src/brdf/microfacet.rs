@@ -1,4 +1,4 @@
-//! Microfacet distributions, shadowing and Fresnel reflectance, shared by `conductor` and `plastic`.
+//! Microfacet distributions, shadowing and Fresnel reflectance, shared by the models that are made of them.
 //!
 //! Walter et al., "Microfacet Models for Refraction through Rough Surfaces" (2007). roughness_alpha is used as it is, not
 //! squared, and masking-shadowing is separable, G = G1(w_i) G1(w_o). Twin: glsl/brdf/microfacet.glsl.
@@ -79,6 +79,18 @@ impl Distribution {
             Distribution::Beckmann => 1.0,
         }
     }
+}
+
+/// Shadowing and masking of long V-shaped grooves: G of Torrance and Sparrow (1967) in the form of Blinn (1977). `h` is the half vector.
+#[inline]
+pub fn v_cavities(w_i: DVec3, w_o: DVec3, h: DVec3) -> f64 {
+    (2.0 * h.z * w_i.z.min(w_o.z) / w_o.dot(h)).min(1.0)
+}
+
+/// Schlick's approximation (1994) of the Fresnel reflectance of what reflects `f0` at normal incidence.
+#[inline]
+pub fn fresnel_schlick(cos_theta: f64, f0: DVec3) -> DVec3 {
+    f0 + (1.0 - f0) * (1.0 - cos_theta.clamp(0.0, 1.0)).powi(5)
 }
 
 /// Exact unpolarised Fresnel reflectance of a conductor with refractive index `eta` + i `k` in air.

@@ -12,15 +12,18 @@ use crate::file_format::{self, FileKind, file_formats};
 
 mod builtin;
 mod lobe;
+mod metals;
 mod microfacet;
 mod parameters;
 mod record;
+mod tabulate;
 
 pub use custom::CustomBrdf;
 pub use lobe::{MIN_COS_THETA_D, half_vector_width, lobe_radius};
 pub use microfacet::{Distribution, fresnel_conductor, fresnel_dielectric};
 pub use parameters::{Domain, Parameter, Parameters, Spacing, as_number, channels};
 pub use record::{MaterialRecord, ThreadSetRecord};
+pub use tabulate::tabulate;
 
 file_formats!(Brdf: merl_file, toml_file);
 
@@ -165,25 +168,20 @@ impl Brdf {
         builtin::MATERIALS.iter().map(|(name, _)| *name)
     }
 
-    /// Id of the model by which shaders evaluate it: its position in models.rs, or that of measured tables if it has no twin.
+    /// Id of the model by which shaders evaluate it: its position in models.rs, or that of `tabulated` if it has no twin.
     pub fn model_index(&self) -> u32 {
-        let twin = if TWINS.contains(&self.model()) { self.model() } else { "merl" };
+        let twin = if self.has_twin() { self.model() } else { "tabulated" };
         Brdf::MODELS.iter().position(|name| *name == twin).expect("MODELS holds every model") as u32
+    }
+
+    /// Whether shaders evaluate it by themselves; otherwise they look it up in a table that [`tabulate`] makes.
+    pub fn has_twin(&self) -> bool {
+        TWINS.contains(&self.model())
     }
 
     /// The model's parameters for its GLSL twin, `BrdfParameters { vec4 a, b, c }` in memory order.
     pub fn gpu_parameters(&self) -> [f32; 12] {
         dispatch!(self, model => model.gpu_parameters())
-    }
-
-    /// What shaders look the BRDF up in, if they do not evaluate it: the measured table, or one that is made of a model without a twin.
-    pub fn table(&self) -> Option<MerlTable> {
-        match self {
-            Brdf::MerlTable(table) => Some(table.clone()),
-            Brdf::Custom(custom) => Some(custom.table()),
-            model if TWINS.contains(&model.model()) => None,
-            model => Some(MerlTable::of(|w_i, w_o| model.evaluate(w_i, w_o))),
-        }
     }
 
     /// Digest of everything the BRDF's values depend on: equal digests, equal BRDFs.
@@ -243,6 +241,14 @@ pub fn luminance(rgb: DVec3) -> f64 {
     rgb.dot(dvec3(0.2126, 0.7152, 0.0722))
 }
 
+/// Warns where `most`, that `what` is, exceeds 1 in some channel: such a surface reflects more light than it receives.
+fn warn_of_excess(what: &str, most: DVec3) {
+    let most = most.max_element();
+    if most > 1.0 + 1e-9 {
+        tracing::warn!("{what} is {most:.3}: the surface reflects more light than it receives");
+    }
+}
+
 /// Adds numbers to a fingerprint, independent of the machine's byte order.
 fn hash_numbers(hasher: &mut blake3::Hasher, numbers: impl IntoIterator<Item = f64>) {
     for number in numbers {
@@ -250,5 +256,13 @@ fn hash_numbers(hasher: &mut blake3::Hasher, numbers: impl IntoIterator<Item = f
     }
 }
 
+#[cfg(test)]
+mod closed_form_tests;
+#[cfg(test)]
+mod fit_tests;
+#[cfg(test)]
+mod model_tests;
+#[cfg(test)]
+mod samples;
 #[cfg(test)]
 mod tests;

@@ -54,6 +54,11 @@ impl Parameters {
         self.read
     }
 
+    /// Whether `key` is given and not yet read: what a parameter that may be left out is read by.
+    pub fn has(&self, key: &str) -> bool {
+        self.table.contains_key(key)
+    }
+
     /// The number `key`, within `range` (NaN and infinities never are).
     pub fn number(
         &mut self,

@@ -1,5 +1,5 @@
 //! A material as shaders have it. Twin of the layout: glsl/material.glsl.
-use super::{Brdf, half_vector_width};
+use super::{Brdf, Tabulated, half_vector_width};
 
 /// `ThreadSet` in glsl/material.glsl.
 #[repr(C)]
@@ -49,9 +49,15 @@ impl MaterialRecord {
         }
     }
 
-    /// The same with its table at this y and z in the atlas of all tables, in texels: what glsl/brdf/merl.glsl reads from a.xy.
-    pub fn with_table_at(mut self, [y, z]: [usize; 2]) -> Self {
+    /// The same with its measured table at this y and z in the atlas of these, in texels: what glsl/brdf/merl.glsl reads from a.xy.
+    pub fn with_measured_table_at(mut self, [y, z]: [usize; 2]) -> Self {
         self.parameters[..2].copy_from_slice(&[y as f32, z as f32]);
+        self
+    }
+
+    /// The same with `table` at this y and z in the atlas of tables that were made.
+    pub fn with_table_at(mut self, table: &Tabulated, place: [usize; 2]) -> Self {
+        self.parameters = table.parameters_at(place);
         self
     }
 }

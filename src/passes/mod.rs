@@ -4,6 +4,7 @@
 
 mod background;
 mod bare_lookups;
+mod brdf_atlas;
 mod classify;
 mod geometry_cache;
 mod light;
@@ -25,7 +26,7 @@ pub use light::DeviceLight;
 #[cfg(feature = "viewer")]
 pub use present::{Area, present};
 pub use readback::{Readbacks, texels};
-pub use shade::{DeviceMaterials, Sampling, Shade, Shaded, shade};
+pub use shade::{DeviceMaterials, Sampling, Shade, Shaded, ShadedMaterial, shade};
 pub use tone_map::{ToneMap, tone_map};
 #[cfg(feature = "viewer")]
 pub use ui::ui;

@@ -1,12 +1,13 @@
 //! Pass 2 of the paper (section 4.2): the radiance of every listed pixel, by its partition of the sample threads.
+use super::brdf_atlas::BrdfAtlas;
 use super::{CameraRays, Counters, DeviceLight, Tiles, View};
-use crate::brdf::{MaterialRecord, MerlTable, ThreadSetRecord};
+use crate::Result;
+use crate::brdf::{Brdf, MaterialRecord, Tabulated, ThreadSetRecord, merl};
 use crate::graph::{BufferDesc, BufferHandle, FrameGraph, ImageDesc, ImageHandle};
 use crate::memo::Keyed;
 use crate::method::Method;
-use crate::threads::{SliceTable, ThreadSets, Threads, WithThreads};
-use crate::vulkan::{self, Bound, Buffer, ComputePipeline, Device, ImageKind, ImageShape, Sampler, SamplerKind};
-use crate::{Error, Result};
+use crate::threads::{SliceTable, ThreadSets, Threads};
+use crate::vulkan::{self, Bound, Buffer, ComputePipeline, Device, Sampler, SamplerKind};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 use std::sync::Arc;
@@ -16,10 +17,22 @@ pub struct DeviceMaterials {
     records: Buffer,
     threads: Option<Buffer>,
     slices: Option<Buffer>,
-    tables: vulkan::Image,
+    measured_tables: vulkan::Image,
+    made_tables: vulkan::Image,
     table_sampler: Sampler,
     /// Bit i: the BRDF of model i is evaluated.
     pub models_used: u32,
+}
+
+/// A material as shading needs it.
+#[derive(Clone, Copy)]
+pub struct ShadedMaterial<'a> {
+    /// What it is.
+    pub brdf: &'a Brdf,
+    /// Its threads, for methods that have any.
+    pub threads: Option<ThreadSets<&'a Threads>>,
+    /// What shaders look up of a BRDF without a twin, where they evaluate it.
+    pub table: Option<&'a Tabulated>,
 }
 
 impl DeviceMaterials {
@@ -27,14 +40,14 @@ impl DeviceMaterials {
     /// `evaluates_brdf`. `finest_level` is level 0 of the blurred environment on the scale of kernels, if that is looked up.
     ///
     /// # Errors
-    /// No device memory left, or more measured tables than a 3D image of the device holds.
+    /// No device memory left, or more tables than a 3D image of the device holds.
     ///
     /// # Panics
-    /// Threads of another kind than the method's: its shader would take one for the other.
+    /// Threads of another kind than the method's, since its shader would take one for the other; no table where one is looked up.
     pub fn new<'m>(
         device: &Arc<Device>,
         method: Method,
-        materials: impl IntoIterator<Item = WithThreads<'m>>,
+        materials: impl IntoIterator<Item = ShadedMaterial<'m>>,
         evaluates_brdf: bool,
         finest_level: Option<f32>,
     ) -> Result<Self> {
@@ -42,15 +55,19 @@ impl DeviceMaterials {
         let mut records = Vec::new();
         let mut threads = ThreadWords { words: Vec::new(), finest_level };
         let mut slices: Vec<f32> = Vec::new();
-        let mut tables = TableAtlas::default();
+        let mut measured = BrdfAtlas::new([merl::PHI_D_BINS, merl::THETA_D_BINS]);
+        let mut made = BrdfAtlas::new(Tabulated::NODES);
         let mut models_used = 0;
-        for (brdf, thread_sets) in materials {
+        for ShadedMaterial { brdf, threads: thread_sets, table } in materials {
             let mut record = MaterialRecord::new(brdf);
-            if let Some(table) = evaluates_brdf.then(|| brdf.table()).flatten() {
-                record = record.with_table_at(tables.add(device, table)?);
-            }
             if evaluates_brdf {
                 models_used |= 1 << record.model;
+                if let Brdf::MerlTable(table) = brdf {
+                    record = record.with_measured_table_at(measured.add(device, table.texels())?);
+                } else if !brdf.has_twin() {
+                    let table = table.expect("a table of a BRDF without a twin");
+                    record = record.with_table_at(table, made.add(device, table.texels())?);
+                }
             }
             if let Some(kind) = method.threads() {
                 let kinds = thread_sets.map(|sets| sets.map(Threads::kind).both());
@@ -75,7 +92,8 @@ impl DeviceMaterials {
             records: storage("materials", bytemuck::cast_slice(&records))?,
             threads: optional("threads", bytemuck::cast_slice(&threads.words))?,
             slices: optional("slices", bytemuck::cast_slice(&slices))?,
-            tables: tables.upload(device)?,
+            measured_tables: measured.upload(device, "measured BRDFs")?,
+            made_tables: made.upload(device, "tabulated BRDFs")?,
             table_sampler: Sampler::new(device, "brdf tables", SamplerKind::WrappedLinear)?,
             models_used,
         })
@@ -85,10 +103,11 @@ impl DeviceMaterials {
 impl DeviceMaterials {
     /// All of it, by name in the shader; the last two as the method declares them.
     fn bindings(&self) -> Vec<(&'static str, Bound<'_>)> {
-        let tables = Bound::Sampled(&self.tables, &self.table_sampler);
+        let tables = [("brdf_tables", &self.measured_tables), ("made_brdf_tables", &self.made_tables)];
+        let tables = tables.map(|(name, image)| (name, Bound::Sampled(image, &self.table_sampler)));
         let optional = [("Threads", &self.threads), ("Slices", &self.slices)];
         let optional = optional.into_iter().filter_map(|(name, buffer)| Some((name, Bound::from(buffer.as_ref()?))));
-        [("Materials", Bound::from(&self.records)), ("brdf_tables", tables)].into_iter().chain(optional).collect()
+        [("Materials", Bound::from(&self.records))].into_iter().chain(tables).chain(optional).collect()
     }
 }
 
@@ -106,62 +125,6 @@ impl ThreadWords {
         self.words.extend(threads.device_words());
         let sharp_count = threads.fitted().zip(self.finest_level).map(|(table, level)| table.sharp_count(level));
         ThreadSetRecord { first, count, row_count, sharp_count: sharp_count.unwrap_or(0) as u32 }
-    }
-}
-
-/// All measured tables in one 3D image: side by side along theta_d (y) and theta_h (z), since phi_d (x) repeats.
-#[derive(Default)]
-struct TableAtlas(Vec<MerlTable>);
-
-/// Texels of a table along phi_d, and along each of theta_d and theta_h.
-const TABLE_WIDTH: usize = crate::brdf::merl::PHI_D_BINS;
-const TABLE_SIDE: usize = crate::brdf::merl::THETA_D_BINS;
-
-impl TableAtlas {
-    /// Adds a table; returns its offset in y and z, in texels.
-    fn add(&mut self, device: &Device, table: MerlTable) -> Result<[usize; 2]> {
-        let per_axis = device.limits().max_image_dimension3_d as usize / TABLE_SIDE;
-        let index = self.0.len();
-        if index >= per_axis * per_axis {
-            let problem =
-                format!("has more measured materials than the {} that this device holds", per_axis * per_axis);
-            return Err(Error::input("the scene", problem, "use fewer"));
-        }
-        self.0.push(table);
-        Ok([index % per_axis, index / per_axis].map(|place| place * TABLE_SIDE))
-    }
-
-    /// The image; a single empty texel if there is no table, since the shader's binding needs something.
-    fn upload(&self, device: &Arc<Device>) -> Result<vulkan::Image> {
-        let single = vk::Format::R32G32B32A32_SFLOAT;
-        let format = if device.filters_linearly(single) { single } else { vk::Format::R16G16B16A16_SFLOAT };
-        let per_axis = device.limits().max_image_dimension3_d as usize / TABLE_SIDE;
-        let (columns, rows) = (self.0.len().min(per_axis), self.0.len().div_ceil(per_axis));
-        let extent = match self.0.len() {
-            0 => [1, 1, 1],
-            _ => [TABLE_WIDTH, TABLE_SIDE * columns, TABLE_SIDE * rows],
-        };
-        let mut texels = vec![glam::Vec4::ZERO; extent.iter().product()];
-        for (index, table) in self.0.iter().enumerate() {
-            let (y_0, z_0) = (index % per_axis * TABLE_SIDE, index / per_axis * TABLE_SIDE);
-            for (line, source) in table.texels().chunks_exact(TABLE_WIDTH).enumerate() {
-                let (y, z) = (y_0 + line % TABLE_SIDE, z_0 + line / TABLE_SIDE);
-                let start = TABLE_WIDTH * (y + extent[1] * z);
-                texels[start..start + TABLE_WIDTH].copy_from_slice(source);
-            }
-        }
-        let bytes = if format == single {
-            bytemuck::cast_slice(&texels).to_vec()
-        } else {
-            let half = texels
-                .iter()
-                .flat_map(|texel| texel.to_array().map(|value| half::f16::from_f32(value.min(65504.0))))
-                .collect::<Vec<_>>();
-            bytemuck::cast_slice(&half).to_vec()
-        };
-        let extent = extent.map(|size| size as u32);
-        let shape = ImageShape { format, extent, levels: 1, kind: ImageKind::Volume };
-        Ok(vulkan::Image::with_texels(device, "brdf tables", shape, &[bytes])?)
     }
 }
 

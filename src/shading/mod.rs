@@ -3,7 +3,7 @@
 //! It starts from the texels of the geometry cache, so that the two can be compared pixel by pixel. BRDFs are evaluated
 //! in double precision; everything else follows the shader line by line.
 use crate::Result;
-use crate::brdf::MaterialRecord;
+use crate::brdf::{Brdf, MaterialRecord};
 use crate::environment::{Alias, LightMap, SourceRecord};
 use crate::geometry_texel::GeometryTexel;
 use crate::light::Light;
@@ -11,7 +11,7 @@ use crate::memo::Round;
 use crate::method::{Lookups, Method};
 use crate::passes::{SMOOTH_DEG, View, smooth_variance};
 use crate::prepare::{Prepared, PreparedMaterial};
-use crate::steps::light;
+use crate::steps::{Tabulate, light};
 use crate::threads::{SliceTable, Threads};
 use glam::{Mat3, UVec2, Vec2, Vec3, Vec4};
 use random::random_bits;
@@ -113,6 +113,8 @@ pub struct CpuShader<'a> {
     slices: Vec<SliceTable>,
     /// One for each material.
     records: Vec<MaterialRecord>,
+    /// The table of each material that shaders look up in one.
+    tables: Vec<Option<Brdf>>,
     /// The small bright sources of the environment.
     sources: Vec<SourceRecord>,
 }
@@ -132,6 +134,10 @@ impl<'a> CpuShader<'a> {
             _ => None,
         };
         let slices = lookups.slices.then(|| materials.iter().map(|material| SliceTable::new(&material.brdf)).collect());
+        let table = |material: &PreparedMaterial| match material.brdf.has_twin() {
+            true => Ok(None),
+            false => Ok(Some(Brdf::Tabulated((*round.ask(&Tabulate(&material.brdf))?).clone()))),
+        };
         Ok(Self {
             prepared,
             light,
@@ -139,6 +145,7 @@ impl<'a> CpuShader<'a> {
             map,
             slices: slices.unwrap_or_default(),
             records: materials.iter().map(|material| MaterialRecord::new(&material.brdf)).collect(),
+            tables: materials.iter().map(table).collect::<Result<_>>()?,
             sources: environment.small_sources().list.iter().map(|source| source.record(1.0)).collect(),
         })
     }
@@ -253,7 +260,8 @@ impl Point<'_> {
     }
 
     fn brdf(&self, w_i: Vec3, w_o: Vec3) -> Vec3 {
-        self.material().brdf.evaluate(w_i.as_dvec3(), w_o.as_dvec3()).as_vec3()
+        let brdf = self.twin.tables[self.material].as_ref().unwrap_or(&self.material().brdf);
+        brdf.evaluate(w_i.as_dvec3(), w_o.as_dvec3()).as_vec3()
     }
 
     fn random_bits(&self, index: u32) -> [u32; 4] {

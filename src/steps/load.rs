@@ -1,10 +1,10 @@
-//! Loads what scenes name: meshes, environments and BRDFs. A file is its contents, so an edited one is another.
+//! Loads what scenes name: meshes, environments and BRDFs, with their tables. A file is its contents, so an edited one is another.
 use crate::Result;
-use crate::brdf::Brdf;
+use crate::brdf::{Brdf, Tabulated, tabulate};
 use crate::environment::Environment;
 use crate::error::Error;
 use crate::file_format::FileKind;
-use crate::memo::{Key, Memo, Round, Step};
+use crate::memo::{Key, Keyed, Memo, Round, Step};
 use crate::scene::{MaterialSource, Mesh, Source};
 use std::path::Path;
 
@@ -98,5 +98,21 @@ fn load(memo: &Memo, source: &MaterialSource) -> Result<Brdf> {
         }),
         MaterialSource::Model { model, parameters } => Brdf::from_parameters(model, parameters.clone()),
         MaterialSource::Custom(custom) => Ok(Brdf::Custom(custom.clone())),
+    }
+}
+
+/// Makes the table by which shaders know a BRDF that they do not evaluate. Its error is logged.
+pub struct Tabulate<'a>(pub &'a Keyed<Brdf>);
+
+impl Step for Tabulate<'_> {
+    type Output = Tabulated;
+    const NAME: &'static str = "table of a BRDF";
+
+    fn key(&self, _: &Memo) -> Result<Key> {
+        Ok(self.0.key)
+    }
+
+    fn make(&self, _: &Round) -> Result<Tabulated> {
+        Ok(tabulate(self.0).0)
     }
 }

@@ -8,5 +8,5 @@ mod upload;
 pub use compile::{CompileCompute, CompileGeometryCache, pipelines};
 pub use filter::{Blur, BoxFilter, blurred_light, light};
 pub use fit::{DraftThreads, FitThreads};
-pub use load::{LoadEnvironment, LoadMaterial, LoadMesh};
+pub use load::{LoadEnvironment, LoadMaterial, LoadMesh, Tabulate};
 pub use upload::{UploadBackground, UploadLight, UploadMaterials, UploadMesh};

@@ -1,14 +1,15 @@
 //! Uploads to the device what passes read.
 use super::compile::on;
+use super::load::Tabulate;
 use crate::Result;
 use crate::brdf::Brdf;
 use crate::environment::Environment;
 use crate::light::Light;
 use crate::memo::{Key, Keyed, Memo, Round, Step};
 use crate::method::Method;
-use crate::passes::{BackgroundMap, DeviceLight, DeviceMaterials, DeviceMesh};
+use crate::passes::{BackgroundMap, DeviceLight, DeviceMaterials, DeviceMesh, ShadedMaterial};
 use crate::scene::Mesh;
-use crate::threads::{ThreadSets, Threads, WithThreads};
+use crate::threads::{ThreadSets, Threads};
 use crate::vulkan::Device;
 use std::sync::Arc;
 
@@ -71,11 +72,16 @@ impl Step for UploadMaterials<'_> {
         Ok(sharp.into_iter().flatten().fold(key, |key, count| key.number(count)).build())
     }
 
-    fn make(&self, _: &Round) -> Result<DeviceMaterials> {
-        let materials = self
-            .materials
-            .iter()
-            .map(|&(brdf, threads)| -> WithThreads { (brdf, threads.map(|sets| sets.map(|threads| &**threads))) });
+    fn make(&self, round: &Round) -> Result<DeviceMaterials> {
+        let has_table = |brdf: &Brdf| self.evaluates_brdf && !brdf.has_twin();
+        let tables =
+            self.materials.iter().map(|(brdf, _)| has_table(brdf).then(|| round.ask(&Tabulate(brdf))).transpose());
+        let tables = tables.collect::<Result<Vec<_>>>()?;
+        let materials = self.materials.iter().zip(&tables).map(|((brdf, threads), table)| ShadedMaterial {
+            brdf,
+            threads: threads.map(|sets| sets.map(|threads| &**threads)),
+            table: table.as_deref(),
+        });
         DeviceMaterials::new(self.device, self.method, materials, self.evaluates_brdf, self.finest_level)
     }
 }

@@ -1,0 +1,194 @@
+//! Metallic-roughness as glTF 2.0 defines it, under a sheen and a clear coat.
+//!
+//! Khronos, "glTF 2.0 Specification", appendix B, for the base; names of layers as in OpenPBR. alpha = roughness^2, GGX facets with
+//! Smith's separable shadowing, Schlick's Fresnel:
+//!
+//! ```text
+//! base = (1 - metallic) ((1 - F(w_o . h)) base_colour / pi + F(w_o . h) D G / (4 cos cos)) + metallic F_m(w_o . h) D G / (4 cos cos)
+//! where F has f0 = ((ior - 1) / (ior + 1))^2 and F_m has f0 = base_colour.
+//! ```
+//!
+//! Sheen (keys `sheen` and `sheen_roughness`) is Estevez and Kulla's distribution D_s = (2 + 1/r) sin(theta_h)^(1/r) / (2 pi), "Production
+//! Friendly Microfacet Sheen BRDF" (2017), r = sheen_roughness^2, as in glTF's KHR_materials_sheen, with Neubelt's and Pettineo's 1 / (4
+//! (cos_i + cos_o - cos_i cos_o)) for its visibility. What is below gets what it leaves: times 1 - max(sheen) E_s, of the direction of
+//! which E_s, its albedo, is greater.
+//!
+//! The coat (keys `coat`, `coat_roughness`, `coat_ior`) is a dielectric GGX lobe times `coat`. What is below is seen through it twice:
+//! times (1 - coat F(cos theta_i)) (1 - coat F(cos theta_o)).
+//!
+//! glTF's and OpenPBR's own layers look only at the viewer; these are reciprocal, so they differ from them by some per cent, most at grazing
+//! angles. The base without layers is glTF's. Energy is at most 1 but for the excess of the base, 2 % at most, at grazing views of
+//! white dielectrics: (1 - F) of the facet is not (1 - F) of the surface.
+use std::f64::consts::{FRAC_1_PI, PI};
+use std::sync::{Arc, OnceLock};
+
+use glam::{DVec2, DVec3, dvec3};
+
+use super::microfacet::{Distribution, fresnel_schlick};
+use super::{Model, Parameters, Spacing, hash_numbers};
+use crate::error::Result;
+
+/// Metallic-roughness with sheen and coat.
+#[derive(Clone, Debug)]
+pub struct Principled {
+    /// Colour of the diffuse part of dielectrics, of reflection of metals; 0 to 1.
+    pub base_colour: DVec3,
+    /// 0 for dielectrics, 1 for metals.
+    pub metallic: f64,
+    /// 0.05 to 1; alpha is its square.
+    pub roughness: f64,
+    /// Index of refraction of dielectrics, 1 to 3.
+    pub ior: f64,
+    /// The layer of fibres, if there is one.
+    pub sheen: Option<Sheen>,
+    /// The clear coat, if there is one.
+    pub coat: Option<Coat>,
+}
+
+/// A layer of upright fibres.
+#[derive(Clone, Debug)]
+pub struct Sheen {
+    /// Its colour, 0 to 1.
+    pub colour: DVec3,
+    /// 0.1 to 1; alpha is its square.
+    pub roughness: f64,
+    /// Albedo of the layer with colour 1, at equally spaced cosines; made when first asked for.
+    albedo: Arc<OnceLock<Vec<f64>>>,
+}
+
+/// A clear coat.
+#[derive(Clone, Copy, Debug)]
+pub struct Coat {
+    /// How much of it there is, 0 to 1.
+    pub weight: f64,
+    /// 0.05 to 1; alpha is its square.
+    pub roughness: f64,
+    /// Its index of refraction, 1 to 3.
+    pub ior: f64,
+}
+
+/// Reflectance of a dielectric at normal incidence.
+fn f0(ior: f64) -> f64 {
+    ((ior - 1.0) / (ior + 1.0)).powi(2)
+}
+
+/// The index of refraction `key`, which may be left out.
+fn index_of_refraction(parameters: &mut Parameters, key: &str) -> Result<f64> {
+    let help = "Index of refraction, against air; 1.5 where left out.";
+    if parameters.has(key) { parameters.number(key, 1.0..=3.0, Spacing::Linear, help) } else { Ok(1.5) }
+}
+
+impl Coat {
+    fn from_parameters(parameters: &mut Parameters) -> Result<Option<Self>> {
+        if !parameters.has("coat") {
+            return Ok(None);
+        }
+        let weight = parameters.number("coat", 0.0..=1.0, Spacing::Linear, "How much clear coat there is.")?;
+        let help = "Roughness of the clear coat, of which alpha is the square.";
+        let roughness = parameters.number("coat_roughness", 0.05..=1.0, Spacing::Linear, help)?;
+        Ok(Some(Self { weight, roughness, ior: index_of_refraction(parameters, "coat_ior")? }))
+    }
+}
+
+impl Sheen {
+    fn from_parameters(parameters: &mut Parameters) -> Result<Option<Self>> {
+        if !parameters.has("sheen") {
+            return Ok(None);
+        }
+        let colour = parameters.colour("sheen", 0.0..=1.0, "Colour of a layer of fibres, linear Rec. 709.")?;
+        let help = "Roughness of the layer of fibres, of which alpha is the square.";
+        Ok(Some(Self::new(colour, parameters.number("sheen_roughness", 0.1..=1.0, Spacing::Linear, help)?)))
+    }
+
+    /// A layer of that colour and roughness.
+    pub fn new(colour: DVec3, roughness: f64) -> Self {
+        Self { colour, roughness, albedo: Arc::default() }
+    }
+
+    /// The layer's own reflection, with colour 1.
+    fn lobe(&self, w_i: DVec3, w_o: DVec3) -> f64 {
+        let h = (w_i + w_o).normalize();
+        let power = (self.roughness * self.roughness).recip();
+        let sin2 = h.x * h.x + h.y * h.y;
+        let d = (2.0 + power) * sin2.powf(0.5 * power) / (2.0 * PI);
+        // Both cosines may graze: then D is 1 at most, and 0 where the directions are opposite.
+        d / (4.0 * (w_i.z + w_o.z - w_i.z * w_o.z))
+    }
+
+    /// Its albedo at a cosine.
+    fn albedo(&self, cos_theta: f64) -> f64 {
+        const COUNT: usize = 64;
+        let table = self.albedo.get_or_init(|| {
+            (0..COUNT).map(|i| self.integral(((i as f64) / (COUNT - 1) as f64).max(1e-3)).min(1.0)).collect()
+        });
+        let position = cos_theta.clamp(0.0, 1.0) * (COUNT - 1) as f64;
+        let first = (position as usize).min(COUNT - 2);
+        table[first] + (table[first + 1] - table[first]) * (position - first as f64)
+    }
+
+    /// The integral of the lobe times cos over all light.
+    fn integral(&self, cos_theta: f64) -> f64 {
+        const STEPS: usize = 64;
+        let w_o = dvec3((1.0 - cos_theta * cos_theta).sqrt(), 0.0, cos_theta);
+        let pairs = (0..STEPS).flat_map(|i| (0..STEPS).map(move |j| (i, j)));
+        let term = |(i, j): (usize, usize)| {
+            let cos = (i as f64 + 0.5) / STEPS as f64;
+            let across = DVec2::from_angle(PI * (j as f64 + 0.5) / STEPS as f64) * (1.0 - cos * cos).sqrt();
+            self.lobe(across.extend(cos), w_o) * cos
+        };
+        2.0 * PI * pairs.map(term).sum::<f64>() / (STEPS * STEPS) as f64
+    }
+}
+
+impl Principled {
+    fn base(&self, w_i: DVec3, w_o: DVec3) -> DVec3 {
+        let h = (w_i + w_o).normalize();
+        let cos_theta_d = w_o.dot(h);
+        let lobe = Distribution::Ggx.torrance_sparrow(w_i, w_o, h, self.roughness * self.roughness);
+        let dielectric = fresnel_schlick(cos_theta_d, DVec3::splat(f0(self.ior)));
+        let metal = fresnel_schlick(cos_theta_d, self.base_colour);
+        ((1.0 - dielectric) * self.base_colour * FRAC_1_PI + dielectric * lobe) * (1.0 - self.metallic)
+            + metal * (lobe * self.metallic)
+    }
+}
+
+impl Model for Principled {
+    fn evaluate(&self, w_i: DVec3, w_o: DVec3) -> DVec3 {
+        let mut f = self.base(w_i, w_o);
+        if let Some(sheen) = &self.sheen {
+            let most = sheen.colour.max_element() * sheen.albedo(w_i.z).max(sheen.albedo(w_o.z));
+            f = f * (1.0 - most) + sheen.colour * sheen.lobe(w_i, w_o);
+        }
+        if let Some(Coat { weight, roughness, ior }) = self.coat {
+            let h = (w_i + w_o).normalize();
+            let fresnel = |cos: f64| weight * fresnel_schlick(cos, DVec3::splat(f0(ior))).x;
+            let lobe = Distribution::Ggx.torrance_sparrow(w_i, w_o, h, roughness * roughness);
+            f = f * ((1.0 - fresnel(w_i.z)) * (1.0 - fresnel(w_o.z))) + fresnel(w_o.dot(h)) * lobe;
+        }
+        f
+    }
+
+    fn from_parameters(parameters: &mut Parameters) -> Result<Self> {
+        let help = "Colour of the diffuse part of dielectrics, of the reflection of metals, linear Rec. 709.";
+        let base_colour = parameters.colour("base_colour", 0.0..=1.0, help)?;
+        let metallic = parameters.number("metallic", 0.0..=1.0, Spacing::Linear, "0 for dielectrics, 1 for metals.")?;
+        let help = "Roughness, of which alpha is the square.";
+        let roughness = parameters.number("roughness", 0.05..=1.0, Spacing::Linear, help)?;
+        let ior = index_of_refraction(parameters, "ior")?;
+        let (sheen, coat) = (Sheen::from_parameters(parameters)?, Coat::from_parameters(parameters)?);
+        Ok(Self { base_colour, metallic, roughness, ior, sheen, coat })
+    }
+
+    fn hash_content(&self, hasher: &mut blake3::Hasher) {
+        hash_numbers(hasher, self.base_colour.to_array());
+        hash_numbers(hasher, [self.metallic, self.roughness, self.ior]);
+        // A layer that is not there is not one of weight 0 at the place of the other.
+        hasher.update(&[u8::from(self.sheen.is_some()), u8::from(self.coat.is_some())]);
+        if let Some(Sheen { colour, roughness, .. }) = &self.sheen {
+            hash_numbers(hasher, colour.to_array().into_iter().chain([*roughness]));
+        }
+        if let Some(Coat { weight, roughness, ior }) = self.coat {
+            hash_numbers(hasher, [weight, roughness, ior]);
+        }
+    }
+}
