@@ -11,7 +11,7 @@ struct ThreadSet {
 struct Material {
     BrdfParameters parameters;
     uint model;        // position in src/brdf/models.rs
-    uint first_slice;  // where its CDFs start in the buffer of slices
+    uint first_slice;  // where its CDFs or its split sum start in the buffer of these
     float lobe_width;  // half_vector_width in src/brdf/lobe.rs, in radians
     ThreadSet threads;          // of a pixel whose sub-pixels share one sum
     ThreadSet subpixel_threads; // of each sub-pixel of another pixel

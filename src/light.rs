@@ -13,6 +13,17 @@ pub struct Light {
     pub box_filtered: Option<Keyed<Pyramid>>,
     /// What fitted threads look up.
     pub blurred: Option<BlurredLight>,
+    /// What the split sum looks up.
+    pub prefiltered: Option<PrefilteredLight>,
+}
+
+/// What the split sum looks up.
+#[derive(Clone)]
+pub struct PrefilteredLight {
+    /// Filtered by GGX lobes: [`crate::environment::ggx_pyramid`].
+    pub by_ggx: Keyed<Pyramid>,
+    /// Irradiance over pi.
+    pub irradiance: Keyed<Pyramid>,
 }
 
 /// What fitted threads look up.

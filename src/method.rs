@@ -33,12 +33,16 @@ pub struct Lookups {
     pub box_filtered: bool,
     /// The environment blurred by the kernels of fitted threads, with what belongs to that.
     pub blurred: bool,
+    /// The environment filtered by GGX and by the cosine, as the split sum has it.
+    pub prefiltered: bool,
     /// The environment as it is, with the density of its light.
     pub map: bool,
     /// The alias table of that density.
     pub aliases: bool,
     /// CDFs of BRDFs.
     pub slices: bool,
+    /// Albedos of BRDFs, and how rough the nearest GGX is.
+    pub split_sums: bool,
 }
 
 impl Properties {
@@ -51,7 +55,16 @@ impl Properties {
     }
 }
 
-const NOTHING: Lookups = Lookups { box_filtered: false, blurred: false, map: false, aliases: false, slices: false };
+const NOTHING: Lookups = Lookups {
+    box_filtered: false,
+    blurred: false,
+    prefiltered: false,
+    map: false,
+    aliases: false,
+    slices: false,
+    split_sums: false,
+};
+const PREFILTERED: Lookups = Lookups { prefiltered: true, split_sums: true, ..NOTHING };
 const BLURRED: Lookups = Lookups { blurred: true, ..NOTHING };
 const BOX_FILTERED: Lookups = Lookups { box_filtered: true, ..NOTHING };
 const MAP: Lookups = Lookups { map: true, ..NOTHING };
@@ -148,12 +161,24 @@ impl Method {
 
     /// How many threads or samples it has where none are asked for.
     pub fn default_count(self) -> u32 {
-        self.threads().map_or(DEFAULT_SAMPLES, |kind| kind.default_count() as u32)
+        let samples = if self.lookups().split_sums { 1 } else { DEFAULT_SAMPLES };
+        self.threads().map_or(samples, |kind| kind.default_count() as u32)
+    }
+
+    /// Most threads, or samples in a picture of `subpixels` x `subpixels` to the pixel.
+    pub fn max_count(self, subpixels: u32) -> u32 {
+        // A pixel at an edge takes all samples in each sub-pixel. lavapipe silently leaves loops after 65535 iterations in all.
+        const MOST_ITERATIONS: u32 = 65_000;
+        let samples = if self.lookups().split_sums { 1 } else { MOST_ITERATIONS / (subpixels * subpixels) };
+        self.threads().map_or(samples, |kind| kind.max_count() as u32)
     }
 
     /// Whether its shader evaluates BRDFs under `environment`: fitted threads hold all that is needed, but for small bright sources.
     pub fn evaluates_brdf(self, environment: &Environment) -> bool {
-        self.threads() != Some(ThreadKind::Fitted) || !environment.small_sources().list.is_empty()
+        match self.threads() {
+            Some(ThreadKind::Fitted) => !environment.small_sources().list.is_empty(),
+            _ => !self.lookups().split_sums,
+        }
     }
 
     /// Whether a pixel within one smooth surface is one sum at its mean normal, not a partition among its sub-pixels:
@@ -200,13 +225,16 @@ mod tests {
     fn what_methods_look_up_is_what_their_shaders_declare() {
         for method in Method::ALL.iter().filter(|method| method.runs_on_gpu()) {
             let declares = |name| method.shader().unwrap().declares(name).unwrap();
-            let blurred = declares("irradiance_map");
+            let split_sums = declares("SplitSums");
+            let blurred = declares("irradiance_map") && !split_sums;
             let declared = Lookups {
-                box_filtered: declares("environment_pyramid") && !blurred,
+                box_filtered: declares("environment_pyramid") && !declares("irradiance_map"),
                 blurred,
+                prefiltered: declares("irradiance_map") && split_sums,
                 map: declares("environment_map") && !blurred,
                 aliases: declares("LightAliases"),
                 slices: declares("Slices"),
+                split_sums,
             };
             assert_eq!(method.lookups(), declared, "{}", method.name());
         }

@@ -266,19 +266,14 @@ impl Prepared {
 
 /// An error for more threads than a table holds, or more samples than shaders may loop over.
 pub(crate) fn check_count(method: Method, count: u32, subpixels: u32) -> Result<()> {
-    // A pixel at an edge takes all samples in each sub-pixel. lavapipe silently leaves loops after 65535 iterations in all.
-    const MOST_ITERATIONS: u32 = 65_000;
-    let most = match method.threads() {
-        Some(kind) => kind.max_count() as u32,
-        None => MOST_ITERATIONS / (subpixels * subpixels),
-    };
+    let most = method.max_count(subpixels);
     if count <= most {
         return Ok(());
     }
     let problem = format!("are {count}, more than the {most} of method \"{}\"", method.name());
-    let remedy = match method.threads() {
-        Some(_) => format!("use at most {most}"),
-        None => format!("use at most {most}, or fewer sub-pixels than {subpixels} x {subpixels}"),
+    let remedy = match method.max_count(1) == most {
+        true => format!("use at most {most}"),
+        false => format!("use at most {most}, or fewer sub-pixels than {subpixels} x {subpixels}"),
     };
     Err(Error::input("threads", problem, remedy))
 }

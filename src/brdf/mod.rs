@@ -11,6 +11,7 @@ use crate::error::{Error, Result};
 use crate::file_format::{self, FileKind, file_formats};
 
 mod builtin;
+mod ggx_lobe;
 mod lobe;
 mod metals;
 mod microfacet;
@@ -19,6 +20,7 @@ mod record;
 mod tabulate;
 
 pub use custom::CustomBrdf;
+pub use ggx_lobe::{Tap, ggx_lobe};
 pub use lobe::{MIN_COS_THETA_D, half_vector_width, lobe_radius};
 pub use microfacet::{Distribution, fresnel_conductor, fresnel_dielectric};
 pub use parameters::{Domain, Parameter, Parameters, Spacing, as_number, channels};

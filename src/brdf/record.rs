@@ -23,7 +23,7 @@ pub struct MaterialRecord {
     pub parameters: [f32; 12],
     /// Position of the model in models.rs.
     pub model: u32,
-    /// Where its CDFs start in the buffer of slices.
+    /// Where its CDFs or its split sum start in the buffer of these.
     pub first_slice: u32,
     /// [`half_vector_width`].
     pub lobe_width: f32,

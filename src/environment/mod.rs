@@ -7,6 +7,7 @@ use glam::DVec3;
 use crate::file_format::file_formats;
 
 pub mod cube;
+mod ggx_pyramid;
 mod irradiance;
 mod light_map;
 mod load;
@@ -16,6 +17,7 @@ pub mod sources;
 pub mod vmf_file;
 mod vmf_pyramid;
 
+pub use ggx_pyramid::{FINEST_ALPHA, ggx_pyramid, level_of_alpha};
 pub use irradiance::irradiance_map;
 pub use light_map::{Alias, LightMap};
 pub use procedural::builtin_names;

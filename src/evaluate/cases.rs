@@ -43,9 +43,7 @@ pub struct Cases {
 impl Cases {
     /// Every method at every count that it can have, the count changing fastest.
     pub fn estimators(&self) -> Vec<Estimator> {
-        let possible = |method: Method, count: u32| {
-            method.threads().is_none_or(|kind| (1..=kind.max_count()).contains(&(count as usize)))
-        };
+        let possible = |method: Method, count: u32| (1..=method.max_count(1)).contains(&count);
         let of_method = |&method: &Method| {
             let counts = self.counts.iter().copied().filter(move |&count| possible(method, count));
             counts.map(move |count| Estimator { method, count })

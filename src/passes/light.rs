@@ -2,7 +2,7 @@
 use super::background::check_map_size;
 use crate::Result;
 use crate::environment::{Environment, LightMap, Pyramid};
-use crate::light::{BlurredLight, Light};
+use crate::light::{BlurredLight, Light, PrefilteredLight};
 use crate::method::Method;
 use crate::vulkan::{self, Bound, Buffer, Device, ImageKind, ImageShape, Sampler, SamplerKind};
 use ash::vk;
@@ -42,6 +42,11 @@ impl DeviceLight {
         if let Some(pyramid) = &light.box_filtered {
             let scale = pyramid.radiance_scale();
             on_device.pyramid = Some(DevicePyramid::new(device, "environment pyramid", pyramid, scale)?);
+        }
+        if let Some(PrefilteredLight { by_ggx, irradiance }) = &light.prefiltered {
+            let scale = by_ggx.radiance_scale();
+            on_device.pyramid = Some(DevicePyramid::new(device, "environment pyramid", by_ggx, scale)?);
+            on_device.irradiance = Some(DevicePyramid::new(device, "irradiance map", irradiance, scale)?);
         }
         if lookups.map {
             let map = LightMap::new(environment);

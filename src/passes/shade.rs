@@ -6,17 +6,19 @@ use crate::brdf::{Brdf, MaterialRecord, Tabulated, ThreadSetRecord, merl};
 use crate::graph::{BufferDesc, BufferHandle, FrameGraph, ImageDesc, ImageHandle};
 use crate::memo::Keyed;
 use crate::method::Method;
-use crate::threads::{SliceTable, ThreadSets, Threads};
+use crate::threads::{SliceTable, SplitSum, ThreadSets, Threads};
 use crate::vulkan::{self, Bound, Buffer, ComputePipeline, Device, Sampler, SamplerKind};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 use std::sync::Arc;
 
-/// Materials, their threads or CDFs, and their tables on the device.
+/// Materials, their threads, CDFs or split sums, and their tables on the device.
 pub struct DeviceMaterials {
     records: Buffer,
     threads: Option<Buffer>,
     slices: Option<Buffer>,
+    /// What the method's shader calls them.
+    slices_name: &'static str,
     measured_tables: vulkan::Image,
     made_tables: vulkan::Image,
     table_sampler: Sampler,
@@ -51,7 +53,7 @@ impl DeviceMaterials {
         evaluates_brdf: bool,
         finest_level: Option<f32>,
     ) -> Result<Self> {
-        let use_slices = method.lookups().slices;
+        let lookups = method.lookups();
         let mut records = Vec::new();
         let mut threads = ThreadWords { words: Vec::new(), finest_level };
         let mut slices: Vec<f32> = Vec::new();
@@ -81,8 +83,10 @@ impl DeviceMaterials {
             }
             record.first_slice = slices.len() as u32;
             records.push(record);
-            if use_slices {
+            if lookups.slices {
                 slices.extend(SliceTable::new(brdf).cdfs);
+            } else if lookups.split_sums {
+                slices.extend(SplitSum::new(brdf).device_floats());
             }
         }
         let storage =
@@ -92,6 +96,7 @@ impl DeviceMaterials {
             records: storage("materials", bytemuck::cast_slice(&records))?,
             threads: optional("threads", bytemuck::cast_slice(&threads.words))?,
             slices: optional("slices", bytemuck::cast_slice(&slices))?,
+            slices_name: if lookups.split_sums { "SplitSums" } else { "Slices" },
             measured_tables: measured.upload(device, "measured BRDFs")?,
             made_tables: made.upload(device, "tabulated BRDFs")?,
             table_sampler: Sampler::new(device, "brdf tables", SamplerKind::WrappedLinear)?,
@@ -105,7 +110,7 @@ impl DeviceMaterials {
     fn bindings(&self) -> Vec<(&'static str, Bound<'_>)> {
         let tables = [("brdf_tables", &self.measured_tables), ("made_brdf_tables", &self.made_tables)];
         let tables = tables.map(|(name, image)| (name, Bound::Sampled(image, &self.table_sampler)));
-        let optional = [("Threads", &self.threads), ("Slices", &self.slices)];
+        let optional = [("Threads", &self.threads), (self.slices_name, &self.slices)];
         let optional = optional.into_iter().filter_map(|(name, buffer)| Some((name, Bound::from(buffer.as_ref()?))));
         [("Materials", Bound::from(&self.records))].into_iter().chain(tables).chain(optional).collect()
     }

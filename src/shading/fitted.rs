@@ -159,9 +159,7 @@ fn at_sources(point: &Point, sources: &[SourceRecord], lobe_width: f32, w_o: Vec
 /// # Panics
 /// A scene prepared for another method has other threads.
 pub(super) fn estimate(point: &Point) -> Vec3 {
-    let Some(Threads::Fitted(threads)) = point.threads() else {
-        panic!("fitted threads are there")
-    };
+    let Some(Threads::Fitted(threads)) = point.threads() else { panic!("fitted threads are there") };
     let surface = &point.surface;
     let light = blurred_light(point.twin);
     let sources = &point.twin.sources;

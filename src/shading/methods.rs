@@ -11,6 +11,10 @@ methods! {
         threads: Some(ThreadKind::Paper),
         ..Properties::biased("Sample threads as published by Kim, Kyung and Lee (2010), box-filtered lookups.", BOX_FILTERED)
     },
+    split_sum => SplitSum: Properties {
+        shares_surface: true,
+        ..Properties::biased("The split sum of engines (Karis 2013): the light filtered by the GGX nearest to the BRDF, times the BRDF's albedo.", PREFILTERED)
+    },
     uniform => Uniform: Properties::unbiased("Monte Carlo, uniform over the hemisphere.", MAP),
     cosine => Cosine: Properties::unbiased("Monte Carlo, by the cosine to the normal.", MAP),
     importance => Importance: Properties::unbiased("Monte Carlo by a 2D CDF of BRDF times cosine (Matusik et al. 2003).", MAP.and_slices()),

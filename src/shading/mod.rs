@@ -12,7 +12,7 @@ use crate::method::{Lookups, Method};
 use crate::passes::{SMOOTH_DEG, View, smooth_variance};
 use crate::prepare::{Prepared, PreparedMaterial};
 use crate::steps::{Tabulate, light};
-use crate::threads::{SliceTable, Threads};
+use crate::threads::{SliceTable, SplitSum, Threads};
 use glam::{Mat3, UVec2, Vec2, Vec3, Vec4};
 use random::random_bits;
 
@@ -111,6 +111,8 @@ pub struct CpuShader<'a> {
     aliases: Vec<Alias>,
     /// One for each material, for methods that draw by them.
     slices: Vec<SliceTable>,
+    /// One for each material, for the method that looks them up.
+    split_sums: Vec<SplitSum>,
     /// One for each material.
     records: Vec<MaterialRecord>,
     /// The table of each material that shaders look up in one.
@@ -138,12 +140,15 @@ impl<'a> CpuShader<'a> {
             true => Ok(None),
             false => Ok(Some(Brdf::Tabulated((*round.ask(&Tabulate(&material.brdf))?).clone()))),
         };
+        let split_sums =
+            lookups.split_sums.then(|| materials.iter().map(|material| SplitSum::new(&material.brdf)).collect());
         Ok(Self {
             prepared,
             light,
             aliases: map.as_ref().filter(|_| lookups.aliases).map(LightMap::aliases).unwrap_or_default(),
             map,
             slices: slices.unwrap_or_default(),
+            split_sums: split_sums.unwrap_or_default(),
             records: materials.iter().map(|material| MaterialRecord::new(&material.brdf)).collect(),
             tables: materials.iter().map(table).collect::<Result<_>>()?,
             sources: environment.small_sources().list.iter().map(|source| source.record(1.0)).collect(),
@@ -285,6 +290,10 @@ impl Point<'_> {
 
     fn map(&self) -> &LightMap {
         self.twin.map.as_ref().expect("the method declares the map")
+    }
+
+    fn split_sum(&self) -> &SplitSum {
+        &self.twin.split_sums[self.material]
     }
 
     fn slices(&self) -> &SliceTable {

@@ -50,9 +50,7 @@ struct Paper<'a> {
 /// # Panics
 /// A scene prepared for another method has no threads.
 pub(super) fn estimate(point: &Point) -> Vec3 {
-    let Some(Threads::Paper(threads)) = point.threads() else {
-        panic!("the paper's method has its threads")
-    };
+    let Some(Threads::Paper(threads)) = point.threads() else { panic!("the paper's method has its threads") };
     Paper { point, threads }.estimate(&point.surface, point.axis)
 }
 

@@ -1,7 +1,7 @@
 //! Filters environments: what the methods look up of them, in memory.
 use crate::Result;
-use crate::environment::{Environment, Pyramid, VmfPyramid, irradiance_map, vmf_file};
-use crate::light::{BlurredLight, KernelNeeds, Light};
+use crate::environment::{Environment, Pyramid, VmfPyramid, ggx_pyramid, irradiance_map, vmf_file};
+use crate::light::{BlurredLight, KernelNeeds, Light, PrefilteredLight};
 use crate::memo::{Key, Keyed, Memo, Round, Step, Stored};
 use crate::method::Method;
 use crate::passes::vmf_pyramid;
@@ -58,6 +58,23 @@ impl Step for Irradiance<'_> {
 
     fn make(&self, round: &Round) -> Result<Pyramid> {
         irradiance_map(self.0, round.observer())
+    }
+}
+
+/// The environment filtered by GGX lobes.
+struct GgxFilter<'a>(&'a Keyed<Environment>);
+
+impl Step for GgxFilter<'_> {
+    type Output = Pyramid;
+    const NAME: &'static str = "environment";
+
+    fn key(&self, _: &Memo) -> Result<Key> {
+        Ok(Key::builder("ggx").key(self.0.key).build())
+    }
+
+    fn make(&self, round: &Round) -> Result<Pyramid> {
+        let source = round.ask(&BoxFilter { environment: self.0, face_size: None })?;
+        ggx_pyramid(&source, round.observer())
     }
 }
 
@@ -133,6 +150,13 @@ pub fn light(
         },
         blurred: match lookups.blurred {
             true => Some(blurred_light(round, device, environment, materials)?),
+            false => None,
+        },
+        prefiltered: match lookups.prefiltered {
+            true => Some(PrefilteredLight {
+                by_ggx: round.ask(&GgxFilter(environment))?,
+                irradiance: round.ask(&Irradiance(environment))?,
+            }),
             false => None,
         },
     })

@@ -9,6 +9,7 @@
 //! | 3.2.3, peaks | [`peaks`] |
 //! | the whole | [`generate()`] |
 //! | beyond it: threads fitted to the BRDF | [`fitted`] |
+//! | beside it: the split sum of engines | [`split_sum`] |
 //!
 use std::f64::consts::FRAC_PI_2;
 
@@ -29,6 +30,7 @@ mod sets;
 pub mod slice;
 pub mod slice_table;
 pub mod smoothing;
+pub mod split_sum;
 mod table;
 #[cfg(test)]
 pub(crate) mod test_materials;
@@ -38,6 +40,7 @@ pub use fitted::FittedTable;
 pub use plot::plot;
 pub use sets::{ThreadSets, WithThreads};
 pub use slice_table::SliceTable;
+pub use split_sum::SplitSum;
 pub use table::{Sample, ThreadTable};
 
 /// Lowest n . s of a sample: 0.006 degrees above the horizon, a thousand times what rounding theta to single precision moves

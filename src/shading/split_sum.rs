@@ -1,0 +1,22 @@
+//! The split sum. Twin of glsl/methods/split_sum.glsl, by functions of the same names.
+use std::f32::consts::FRAC_PI_2;
+
+use glam::Vec3;
+
+use super::Point;
+use crate::environment::level_of_alpha;
+use crate::threads::split_sum::ROWS;
+
+/// Twin of `estimate`.
+pub(super) fn estimate(point: &Point) -> Vec3 {
+    let surface = &point.surface;
+    let split_sum = point.split_sum();
+    let light = point.twin.light.prefiltered.as_ref().expect("the method looks prefiltered light up");
+    let row = (surface.theta_o * (ROWS as f32 / FRAC_PI_2)).min((ROWS - 1) as f32);
+    let [below, above] = [row as usize, (row as usize + 1).min(ROWS - 1)].map(|row| split_sum.albedos[row]);
+    let [diffuse, specular] = [0, 1].map(|part| below[part].as_vec3().lerp(above[part].as_vec3(), row.fract()));
+    let w_o = surface.view_direction();
+    let mirror = surface.frame * Vec3::new(-w_o.x, -w_o.y, w_o.z);
+    let level = level_of_alpha(split_sum.roughness_alpha as f32);
+    diffuse * light.irradiance.lookup(surface.frame.z_axis, 0.0) + specular * light.by_ggx.lookup(mirror, level)
+}
