@@ -1,5 +1,5 @@
 // A table over tan(theta_h / 2), cos theta_d and |cos phi_d|. Twin of src/brdf/tabulated.rs, which says why these.
-// a.x: nodes along |cos phi_d|, less 1; a.y, a.z: nodes per doubling of cos theta_d and of tan(theta_h / 2); a.w: twice the greatest value;
+// a.x: nodes along |cos phi_d|, less 1; a.y, a.z: nodes per doubling of cos theta_d and of tan(theta_h / 2); a.w: twice what a texel of 1 stands for;
 // b.x, b.y: reciprocals of the two knees; b.z, b.w: y and z offset of the table in the atlas, in texels.
 //
 // The including shader defines `vec4 made_table_texel(vec3 texel_coordinate)`: a trilinear fetch from the atlas at a position in

@@ -9,7 +9,7 @@ use super::{Brdf, half_vector_width, lobe_radius};
 /// Relative error of a table at which nodes are no longer added.
 pub const TARGET_ERROR: f64 = 2e-3;
 
-/// Nodes along tan(theta_h / 2) of the coarsest and of the finest table: 0.7 and 5.1 MB of 16 bytes a texel.
+/// Nodes along tan(theta_h / 2) of the coarsest and of the finest table: 0.3 and 2.5 MB of 8 bytes a texel.
 const TANGENT_NODES: [usize; 2] = [32, 249];
 
 /// View angles at which the error is measured.

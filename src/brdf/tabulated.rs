@@ -7,13 +7,14 @@
 //! - logarithmically in cos theta_d above a knee, as f grows by its powers towards grazing angles,
 //! - logarithmically in tan(theta_h / 2) above a knee in the lobe's width: equally many nodes for each doubling of the angle.
 //!
-//! What is stored is f (n . w_i + n . w_o) / 2 = f cos theta_h cos theta_d, which stays finite where both directions graze, over its
-//! greatest value. Nodes below the horizon hold what is found above it at the same theta_h and theta_d. How many nodes, and what error
+//! What is stored is f (n . w_i + n . w_o) / 2 = f cos theta_h cos theta_d, which stays finite where both directions graze, in
+//! half precision. Nodes below the horizon hold what is found above it at the same theta_h and theta_d. How many nodes, and what error
 //! they leave: `tabulate.rs`.
 use std::f64::consts::LN_2;
 use std::sync::Arc;
 
-use glam::{DVec3, Vec4, dvec3};
+use glam::{DVec3, Vec3, dvec3};
+use half::f16;
 use rayon::prelude::*;
 
 use super::{Model, Parameters};
@@ -25,13 +26,16 @@ const KNEE_COS_THETA_D: f64 = 0.2;
 /// Nodes stay this far, in parts of the cosine, from the horizon, where some BRDFs are infinite.
 const FROM_HORIZON: f64 = 1e-2;
 
+/// What the greatest value is stored as. Half precision then keeps eleven bits of all that is above a billionth of it.
+const GREATEST_TEXEL: f64 = 6e4;
+
 /// A BRDF as shaders look it up. Cheap to clone.
 #[derive(Clone)]
 pub struct Tabulated {
     /// Values over `scale`, index (|cos phi_d|) + nodes[0] ((cos theta_d) + nodes[1] (tan(theta_h / 2))); the fourth channel is not used.
-    texels: Arc<[Vec4]>,
+    texels: Arc<[[f16; 4]]>,
     grid: Grid,
-    /// 1/sr: the greatest value.
+    /// 1/sr: what a texel of 1 stands for.
     scale: f64,
 }
 
@@ -110,9 +114,11 @@ impl Tabulated {
             f(w_i, w_o) * (0.5 * (w_i.z + w_o.z))
         };
         let values: Vec<DVec3> = (0..grid.cells()).into_par_iter().map(value).collect();
-        let scale = values.iter().fold(0.0, |scale: f64, value| scale.max(value.max_element()));
-        let over = if scale > 0.0 { scale.recip() } else { 0.0 };
-        let texels = values.iter().map(|value| (*value * over).as_vec3().extend(1.0)).collect();
+        let greatest = values.iter().fold(0.0, |greatest: f64, value| greatest.max(value.max_element()));
+        // A table that is black has any scale.
+        let scale = if greatest > 0.0 { greatest / GREATEST_TEXEL } else { 1.0 };
+        let texel = |value: &DVec3| (*value / scale).extend(1.0).to_array().map(f16::from_f64);
+        let texels = values.iter().map(texel).collect();
         Self { texels, grid, scale }
     }
 
@@ -122,7 +128,7 @@ impl Tabulated {
     }
 
     /// The texels, x fastest. Between them one interpolates linearly.
-    pub fn texels(&self) -> &Arc<[Vec4]> {
+    pub fn texels(&self) -> &Arc<[[f16; 4]]> {
         &self.texels
     }
 
@@ -163,10 +169,11 @@ impl Model for Tabulated {
         let first: [usize; 3] = std::array::from_fn(|axis| (position[axis] as usize).min(self.grid.nodes[axis] - 2));
         let [x, y, z] = std::array::from_fn(|axis| (position[axis] - first[axis] as f64) as f32);
         let start = first[0] + columns * (first[1] + rows * first[2]);
-        let line = |offset: usize| self.texels[start + offset].lerp(self.texels[start + offset + 1], x);
+        let texel = |place: usize| Vec3::from_slice(&self.texels[place].map(f16::to_f32));
+        let line = |offset: usize| texel(start + offset).lerp(texel(start + offset + 1), x);
         let plane = |offset: usize| line(offset).lerp(line(offset + columns), y);
         let value = plane(0).lerp(plane(columns * rows), z);
-        value.truncate().as_dvec3() * (2.0 * self.scale / (w_i.z + w_o.z))
+        value.as_dvec3() * (2.0 * self.scale / (w_i.z + w_o.z))
     }
 
     fn from_parameters(_: &mut Parameters) -> Result<Self> {
