@@ -12,6 +12,7 @@ use crate::file_format::{self, FileKind, file_formats};
 
 mod builtin;
 mod lobe;
+mod merl_export;
 mod metals;
 mod microfacet;
 mod parameters;
@@ -20,6 +21,7 @@ mod tabulate;
 
 pub use custom::CustomBrdf;
 pub use lobe::{MIN_COS_THETA_D, half_vector_width, lobe_radius};
+pub use merl_export::merl_bytes;
 pub use microfacet::{Distribution, fresnel_conductor, fresnel_dielectric};
 pub use parameters::{Domain, Parameter, Parameters, Spacing, as_number, channels};
 pub use record::MaterialRecord;
