@@ -167,7 +167,12 @@ impl Brdf {
 
     /// Names of the built-in materials, in the order in which to list them.
     pub fn builtin_names() -> impl Iterator<Item = &'static str> {
-        builtin::MATERIALS.iter().map(|(name, _)| *name)
+        builtin::materials().map(|(name, _)| *name)
+    }
+
+    /// Families of built-in materials, and the names in each.
+    pub fn builtin_families() -> impl Iterator<Item = (&'static str, Vec<&'static str>)> {
+        builtin::FAMILIES.iter().map(|(family, materials)| (*family, materials.iter().map(|(name, _)| *name).collect()))
     }
 
     /// Id of the model by which shaders evaluate it: its position in models.rs, or that of `tabulated` if it has no twin.

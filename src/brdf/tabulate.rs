@@ -19,8 +19,8 @@ const VIEW_DEG: [f64; 4] = [5.0, 45.0, 70.0, 85.0];
 /// of four view angles, 5 to 85 degrees.
 ///
 /// Starts coarse, then halves the steps along tan(theta_h / 2) until the error is at most [`TARGET_ERROR`] or the table has 249 nodes
-/// along it. Over the range of all models, errors end between 0.02 and 0.5 %, of which grazing views are the most. They are greater, 2.5 %
-/// at most, for lobes that are narrow but not about the mirror direction, and where shadows have an edge.
+/// along it. Over the range of all models, errors end between 0.02 and 0.5 %, of which grazing views are the most. They are greater, 3 %
+/// at most there, for lobes that are narrow but not about the mirror direction, and where shadows have an edge.
 pub fn tabulate(brdf: &Brdf) -> (Tabulated, f64) {
     let width = half_vector_width(brdf).min(lobe_radius(brdf));
     // tan(theta_h / 2) is half of theta_h, and half of the width is where f is within a tenth or so of its peak.

@@ -61,7 +61,21 @@ fn threads_are_written_and_read_back_the_same() {
 fn what_can_be_named_is_listed() {
     let folder = workplace();
     let list = printed(&mut threadlight(&folder, "materials"));
-    for name in ["gold", "conductor", "lambert", "studio", "sphere", "paper", ".binary", ".hdr", ".obj"] {
+    assert_eq!(list, printed(&mut threadlight(&folder, "materials list")));
+    for name in [
+        "metals",
+        "blue-velvet",
+        "he_torrance",
+        "gold",
+        "conductor",
+        "lambert",
+        "studio",
+        "sphere",
+        "paper",
+        ".binary",
+        ".hdr",
+        ".obj",
+    ] {
         assert!(list.contains(name), "{name} is not in\n{list}");
     }
 }

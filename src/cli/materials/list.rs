@@ -9,9 +9,12 @@ use threadlight::low_level::scene::{Mesh, mesh};
 pub fn run() -> anyhow::Result<()> {
     let mut out = std::io::stdout().lock();
     writeln!(out, "Materials (--material; or {}):", Brdf::FILES.names())?;
-    for name in Brdf::builtin_names() {
-        let model = Brdf::builtin(name).map_or("", |brdf| brdf.model());
-        writeln!(out, "  {name:<24} {model}")?;
+    for (family, names) in Brdf::builtin_families() {
+        writeln!(out, "  {family}")?;
+        for name in names {
+            let model = Brdf::builtin(name).map_or("", |brdf| brdf.model());
+            writeln!(out, "    {name:<24} {model}")?;
+        }
     }
     let list = |names: &[&str]| names.join(", ");
     writeln!(out, "Models (in a .toml or a scene file): {}", list(&Brdf::models_with_parameters()))?;
