@@ -1,19 +1,34 @@
-//! The materials that come with the program: the files of assets/materials.
+//! The materials that come with the program: the files of assets/materials, by family.
+
+/// A name and the TOML text of its file.
+type Material = (&'static str, &'static str);
 
 macro_rules! materials {
-    ($($name:literal)+) => {
-        /// (name, TOML text), in the order in which to list them.
-        pub(super) const MATERIALS: &[(&str, &str)] =
-            &[$(($name, include_str!(concat!("../../assets/materials/", $name, ".toml")))),+];
+    ($($family:literal: $($name:literal)+;)+) => {
+        /// Families and their materials, in the order in which to list them.
+        pub(super) const FAMILIES: &[(&str, &[Material])] = &[$((
+            $family,
+            &[$(($name, include_str!(concat!("../../assets/materials/", $name, ".toml")))),+],
+        )),+];
     };
 }
 
 materials! {
-    "gold" "silver" "copper" "aluminium" "chrome" "tungsten" "titanium-nitride"
-    "red-plastic" "blue-plastic" "white-plastic" "billiard-ball" "clay"
+    "metals": "gold" "silver" "copper" "aluminium" "chrome" "tungsten" "titanium-nitride" "nickel" "sandblasted-aluminium"
+        "ground-chromium";
+    "plastics": "red-plastic" "blue-plastic" "white-plastic" "billiard-ball";
+    "paints": "flat-white-paint" "grey-primer" "green-enamel" "red-car-paint" "blue-flake-paint" "varnished-oak";
+    "fabrics": "linen" "satin" "blue-velvet" "reflective-tape";
+    "ceramics": "clay" "terracotta" "porcelain";
+    "others": "skin" "black-rubber" "eraser" "moon-dust";
+}
+
+/// All of them, family by family.
+pub(super) fn materials() -> impl Iterator<Item = &'static Material> {
+    FAMILIES.iter().flat_map(|(_, materials)| materials.iter())
 }
 
 /// The TOML text of the built-in material `name`, if there is one.
 pub(super) fn text(name: &str) -> Option<&'static str> {
-    MATERIALS.iter().find(|(known, _)| *known == name).map(|(_, text)| *text)
+    materials().find(|(known, _)| *known == name).map(|(_, text)| *text)
 }

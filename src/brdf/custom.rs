@@ -31,10 +31,10 @@
 //!
 //! | alpha | 0 to 60 degrees | 80 degrees | 87 degrees |
 //! |---|---|---|---|
-//! | 0.3 | 0.09 % | 0.14 % | 0.17 % |
-//! | 0.03 | 0.04 % | 0.08 % | 0.42 % |
-//! | 0.01 | 0.04 % | 0.07 % | 0.33 % |
-//! | 0.001 | 0.07 % | 0.09 % | 0.33 % |
+//! | 0.3 | 0.09 % | 0.14 % | 0.16 % |
+//! | 0.03 | 0.05 % | 0.08 % | 0.43 % |
+//! | 0.01 | 0.06 % | 0.08 % | 0.34 % |
+//! | 0.001 | 0.08 % | 0.11 % | 0.35 % |
 use std::sync::Arc;
 
 use glam::DVec3;
@@ -211,9 +211,9 @@ mod tests {
     fn the_table_of_a_function_errs_as_documented() {
         for (alpha, bounds) in [
             (0.3, [0.001, 0.001, 0.0016, 0.002]),
-            (0.03, [0.0005, 0.0005, 0.001, 0.005]),
-            (0.01, [0.0005, 0.0006, 0.001, 0.004]),
-            (0.001, [0.0008, 0.001, 0.0012, 0.004]),
+            (0.03, [0.0007, 0.0007, 0.001, 0.005]),
+            (0.01, [0.0008, 0.0008, 0.001, 0.004]),
+            (0.001, [0.0009, 0.001, 0.0013, 0.004]),
         ] {
             let custom = Brdf::custom(Wrapped(ggx(alpha)));
             let table = Brdf::Tabulated(tabulate(&custom).0);
@@ -241,7 +241,7 @@ mod tests {
     fn values_that_are_no_reflectance_count_as_none() {
         let brdf = Brdf::custom(Constant(dvec3(f64::NAN, -1.0, f64::INFINITY)));
         assert_eq!(brdf.evaluate(DVec3::Z, DVec3::Z), DVec3::ZERO);
-        assert!(tabulate(&brdf).0.texels().iter().all(|texel| texel.truncate() == glam::Vec3::ZERO));
+        assert!(tabulate(&brdf).0.texels().iter().all(|texel| texel[..3].iter().all(|value| value.to_f32() == 0.0)));
         assert_eq!((half_vector_width(&brdf), lobe_radius(&brdf)), (FRAC_PI_2, FRAC_PI_2));
         let brdf = Brdf::custom(Constant(dvec3(0.1, f64::NAN, 0.3)));
         let table = Brdf::Tabulated(tabulate(&brdf).0);

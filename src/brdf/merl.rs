@@ -22,7 +22,7 @@ const HEADER_BYTES: usize = 12;
 const FILE_BYTES: usize = HEADER_BYTES + 3 * 8 * CELLS;
 
 /// Stored value to 1/sr, per channel (the database's own reader, BRDFRead.cpp).
-const SCALE: [f64; 3] = [1.0 / 1500.0, 1.15 / 1500.0, 1.66 / 1500.0];
+pub(super) const SCALE: [f64; 3] = [1.0 / 1500.0, 1.15 / 1500.0, 1.66 / 1500.0];
 
 /// A measured BRDF. Cheap to clone.
 #[derive(Clone)]

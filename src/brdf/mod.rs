@@ -13,6 +13,7 @@ use crate::file_format::{self, FileKind, file_formats};
 mod builtin;
 mod ggx_lobe;
 mod lobe;
+mod merl_export;
 mod metals;
 mod microfacet;
 mod parameters;
@@ -22,6 +23,7 @@ mod tabulate;
 pub use custom::CustomBrdf;
 pub use ggx_lobe::{Tap, ggx_lobe};
 pub use lobe::{MIN_COS_THETA_D, half_vector_width, lobe_radius};
+pub use merl_export::merl_bytes;
 pub use microfacet::{Distribution, fresnel_conductor, fresnel_dielectric};
 pub use parameters::{Domain, Parameter, Parameters, Spacing, as_number, channels};
 pub use record::{MaterialRecord, ThreadSetRecord};
@@ -167,7 +169,12 @@ impl Brdf {
 
     /// Names of the built-in materials, in the order in which to list them.
     pub fn builtin_names() -> impl Iterator<Item = &'static str> {
-        builtin::MATERIALS.iter().map(|(name, _)| *name)
+        builtin::materials().map(|(name, _)| *name)
+    }
+
+    /// Families of built-in materials, and the names in each.
+    pub fn builtin_families() -> impl Iterator<Item = (&'static str, Vec<&'static str>)> {
+        builtin::FAMILIES.iter().map(|(family, materials)| (*family, materials.iter().map(|(name, _)| *name).collect()))
     }
 
     /// Id of the model by which shaders evaluate it: its position in models.rs, or that of `tabulated` if it has no twin.

@@ -82,13 +82,17 @@ fn no_model_reflects_more_than_it_receives_but_by_the_known_excess() {
 
 #[test]
 fn tables_of_every_model_err_by_what_the_guide_says() {
-    let all: Vec<_> = samples::all().filter(|(_, brdf)| !brdf.has_twin()).collect();
+    let builtin = Brdf::builtin_names().map(|name| (name.to_owned(), Brdf::builtin(name).unwrap()));
+    let all: Vec<_> = samples::all().chain(builtin).filter(|(_, brdf)| !brdf.has_twin()).collect();
     let errors: Vec<_> = all.par_iter().map(|(name, brdf)| (name, tabulate(brdf).1)).collect();
     for (name, error) in &errors {
         println!("{:.2} % {name}", 100.0 * error);
         // Lobes that are narrow off the mirror direction, and shadows with an edge, are what the table is not made for.
-        let most =
-            if ["lafortune", "sgd", "oren_nayar"].iter().any(|model| name.starts_with(model)) { 0.025 } else { 0.007 };
+        let most = if ["lafortune", "sgd", "reflective-tape"].iter().any(|model| name.starts_with(model)) {
+            0.035
+        } else {
+            0.007
+        };
         assert!(*error < most, "{name}: {error}");
     }
     let mean = errors.iter().map(|(_, error)| error).sum::<f64>() / errors.len() as f64;

@@ -1,44 +1,49 @@
-//! A BRDF that shaders do not evaluate, as a table over tan(theta_h / 2), cos theta_d and |cos phi_d|. Twin: glsl/brdf/tabulated.glsl.
+//! A BRDF that shaders do not evaluate, as a table over tan(theta_h / 2), tan(theta_d / 2) and |cos phi_d|. Twin: glsl/brdf/tabulated.glsl.
 //!
 //! Half and difference angles are Rusinkiewicz's (1998). A BRDF that is isotropic, reciprocal and the same in a mirror is a function
 //! of |cos phi_d|, since phi_d, phi_d + 180 degrees and -phi_d are then the same. All three coordinates are algebraic: no lookup takes an
 //! arc tangent. Nodes lie where coordinates are 0 and 1, so a lobe's peak is a node, and between them
 //! - linearly in |cos phi_d|, in which both cosines to the normal are linear, and so the edges of shadows and horizon,
-//! - logarithmically in cos theta_d above a knee, as f grows by its powers towards grazing angles,
+//! - logarithmically in 1 - tan(theta_d / 2) above a knee: near the normal that goes with theta_d, by steps of 3 degrees, and towards grazing
+//!   angles with cos theta_d, by whose powers f grows,
 //! - logarithmically in tan(theta_h / 2) above a knee in the lobe's width: equally many nodes for each doubling of the angle.
 //!
-//! What is stored is f (n . w_i + n . w_o) / 2 = f cos theta_h cos theta_d, which stays finite where both directions graze, over its
-//! greatest value. Nodes below the horizon hold what is found above it at the same theta_h and theta_d. How many nodes, and what error
+//! What is stored is f (n . w_i + n . w_o) / 2 = f cos theta_h cos theta_d, which stays finite where both directions graze, in
+//! half precision. Nodes below the horizon hold what is found above it at the same theta_h and theta_d. How many nodes, and what error
 //! they leave: `tabulate.rs`.
 use std::f64::consts::LN_2;
 use std::sync::Arc;
 
-use glam::{DVec3, Vec4, dvec3};
+use glam::{DVec3, Vec3, dvec3};
+use half::f16;
 use rayon::prelude::*;
 
 use super::{Model, Parameters};
 use crate::error::{Error, Result};
 
-/// Cosine of theta_d below which nodes are equally spaced rather than by factors.
-const KNEE_COS_THETA_D: f64 = 0.2;
+/// 1 - tan(theta_d / 2) below which nodes are equally spaced rather than by factors.
+const KNEE_THETA_D: f64 = 0.2;
 
 /// Nodes stay this far, in parts of the cosine, from the horizon, where some BRDFs are infinite.
 const FROM_HORIZON: f64 = 1e-2;
+
+/// What the greatest value is stored as. Half precision then keeps eleven bits of all that is above a billionth of it.
+const GREATEST_TEXEL: f64 = 6e4;
 
 /// A BRDF as shaders look it up. Cheap to clone.
 #[derive(Clone)]
 pub struct Tabulated {
     /// Values over `scale`, index (|cos phi_d|) + nodes[0] ((cos theta_d) + nodes[1] (tan(theta_h / 2))); the fourth channel is not used.
-    texels: Arc<[Vec4]>,
+    texels: Arc<[[f16; 4]]>,
     grid: Grid,
-    /// 1/sr: the greatest value.
+    /// 1/sr: what a texel of 1 stands for.
     scale: f64,
 }
 
 /// Where nodes lie.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Grid {
-    /// Along |cos phi_d|, cos theta_d and tan(theta_h / 2); at least two each.
+    /// Along |cos phi_d|, 1 - tan(theta_d / 2) and tan(theta_h / 2); at least two each.
     pub nodes: [usize; 3],
     /// tan(theta_h / 2) below which nodes are equally spaced rather than by factors.
     pub knee: f64,
@@ -62,7 +67,7 @@ impl Grid {
         let cos_phi_d = if square > 0.0 { along.abs() / square.sqrt() } else { 0.0 };
         let unit = dvec3(
             cos_phi_d.min(1.0),
-            logarithmic(w_i.dot(h).clamp(0.0, 1.0), KNEE_COS_THETA_D),
+            logarithmic((1.0 - square.sqrt() / (1.0 + w_i.dot(h))).clamp(0.0, 1.0), KNEE_THETA_D),
             logarithmic((sin_theta_h / (1.0 + h.z)).min(1.0), self.knee),
         );
         unit * DVec3::from_array(self.nodes.map(|count| (count - 1) as f64))
@@ -71,11 +76,10 @@ impl Grid {
     /// The directions w_i and w_o at a node, moved above the horizon.
     fn directions(&self, node: [usize; 3]) -> (DVec3, DVec3) {
         let [p, c, t] = std::array::from_fn(|axis| node[axis] as f64 / (self.nodes[axis] - 1) as f64);
-        let cos_theta_d = exponential(c, KNEE_COS_THETA_D).clamp(1e-3, 1.0);
+        let half_tangent = 1.0 - exponential(c, KNEE_THETA_D).clamp(1e-3, 1.0);
+        let (sin_theta_d, cos_theta_d) = of_half_tangent(half_tangent);
         let tangent = exponential(t, self.knee).min(1.0 - 1e-6);
-        let square = tangent * tangent;
-        let (sin_theta_h, cos_theta_h) = (2.0 * tangent / (1.0 + square), (1.0 - square) / (1.0 + square));
-        let sin_theta_d = (1.0 - cos_theta_d * cos_theta_d).sqrt();
+        let (sin_theta_h, cos_theta_h) = of_half_tangent(tangent);
         // n . w = cos theta_h cos theta_d -+ tan(theta_h / 2) `along`.
         let most = (1.0 - FROM_HORIZON) * cos_theta_h * cos_theta_d / sin_theta_h;
         let along = (sin_theta_d * p).min(most);
@@ -86,6 +90,12 @@ impl Grid {
         };
         (direction(along, across), direction(-along, -across))
     }
+}
+
+/// Sine and cosine of the angle whose half has this tangent.
+fn of_half_tangent(tangent: f64) -> (f64, f64) {
+    let square = tangent * tangent;
+    (2.0 * tangent / (1.0 + square), (1.0 - square) / (1.0 + square))
 }
 
 /// 0 to 1 for `x` of 0 to 1: linear below the knee, logarithmic above.
@@ -99,7 +109,7 @@ fn exponential(x: f64, knee: f64) -> f64 {
 }
 
 impl Tabulated {
-    /// Nodes along |cos phi_d| and along cos theta_d: of all tables alike, so that an image packs them without gaps.
+    /// Nodes along |cos phi_d| and along 1 - tan(theta_d / 2): of all tables alike, so that an image packs them without gaps.
     pub const NODES: [usize; 2] = [17, 75];
 
     /// The table of `f` on `grid`.
@@ -110,19 +120,21 @@ impl Tabulated {
             f(w_i, w_o) * (0.5 * (w_i.z + w_o.z))
         };
         let values: Vec<DVec3> = (0..grid.cells()).into_par_iter().map(value).collect();
-        let scale = values.iter().fold(0.0, |scale: f64, value| scale.max(value.max_element()));
-        let over = if scale > 0.0 { scale.recip() } else { 0.0 };
-        let texels = values.iter().map(|value| (*value * over).as_vec3().extend(1.0)).collect();
+        let greatest = values.iter().fold(0.0, |greatest: f64, value| greatest.max(value.max_element()));
+        // A table that is black has any scale.
+        let scale = if greatest > 0.0 { greatest / GREATEST_TEXEL } else { 1.0 };
+        let texel = |value: &DVec3| (*value / scale).extend(1.0).to_array().map(f16::from_f64);
+        let texels = values.iter().map(texel).collect();
         Self { texels, grid, scale }
     }
 
-    /// Number of texels along x, y and z of a 3D texture: |cos phi_d|, cos theta_d, tan(theta_h / 2).
+    /// Number of texels along x, y and z of a 3D texture: |cos phi_d|, 1 - tan(theta_d / 2), tan(theta_h / 2).
     pub fn size(&self) -> [usize; 3] {
         self.grid.nodes
     }
 
     /// The texels, x fastest. Between them one interpolates linearly.
-    pub fn texels(&self) -> &Arc<[Vec4]> {
+    pub fn texels(&self) -> &Arc<[[f16; 4]]> {
         &self.texels
     }
 
@@ -132,10 +144,10 @@ impl Tabulated {
         let per_doubling = |count: usize, knee: f64| (count - 1) as f64 * LN_2 / knee.recip().ln_1p();
         let numbers = [
             (nodes[0] - 1) as f64,
-            per_doubling(nodes[1], KNEE_COS_THETA_D),
+            per_doubling(nodes[1], KNEE_THETA_D),
             per_doubling(nodes[2], knee),
             2.0 * self.scale,
-            KNEE_COS_THETA_D.recip(),
+            KNEE_THETA_D.recip(),
             knee.recip(),
             y as f64,
             z as f64,
@@ -163,10 +175,11 @@ impl Model for Tabulated {
         let first: [usize; 3] = std::array::from_fn(|axis| (position[axis] as usize).min(self.grid.nodes[axis] - 2));
         let [x, y, z] = std::array::from_fn(|axis| (position[axis] - first[axis] as f64) as f32);
         let start = first[0] + columns * (first[1] + rows * first[2]);
-        let line = |offset: usize| self.texels[start + offset].lerp(self.texels[start + offset + 1], x);
+        let texel = |place: usize| Vec3::from_slice(&self.texels[place].map(f16::to_f32));
+        let line = |offset: usize| texel(start + offset).lerp(texel(start + offset + 1), x);
         let plane = |offset: usize| line(offset).lerp(line(offset + columns), y);
         let value = plane(0).lerp(plane(columns * rows), z);
-        value.truncate().as_dvec3() * (2.0 * self.scale / (w_i.z + w_o.z))
+        value.as_dvec3() * (2.0 * self.scale / (w_i.z + w_o.z))
     }
 
     fn from_parameters(_: &mut Parameters) -> Result<Self> {

@@ -21,6 +21,7 @@ pub mod expected;
 pub mod fit;
 pub mod gallery;
 pub mod live;
+pub mod material_plot;
 pub mod metrics;
 pub mod plots;
 pub mod reference;

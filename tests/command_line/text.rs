@@ -61,9 +61,72 @@ fn threads_are_written_and_read_back_the_same() {
 fn what_can_be_named_is_listed() {
     let folder = workplace();
     let list = printed(&mut threadlight(&folder, "materials"));
-    for name in ["gold", "conductor", "lambert", "studio", "sphere", "paper", ".binary", ".hdr", ".obj"] {
+    assert_eq!(list, printed(&mut threadlight(&folder, "materials list")));
+    for name in [
+        "metals",
+        "blue-velvet",
+        "he_torrance",
+        "gold",
+        "conductor",
+        "lambert",
+        "studio",
+        "sphere",
+        "paper",
+        ".binary",
+        ".hdr",
+        ".obj",
+    ] {
         assert!(list.contains(name), "{name} is not in\n{list}");
     }
+}
+
+/// What `materials evaluate` writes for `lines`: exit code, values, complaint.
+fn evaluated(folder: &TempDir, flags: &str, lines: &str) -> (Option<i32>, Vec<f64>, String) {
+    let mut command = threadlight(folder, &format!("materials evaluate {flags}"));
+    let output = command.write_stdin(lines.to_owned()).output().unwrap();
+    let values = String::from_utf8(output.stdout).unwrap();
+    let values = values.split_whitespace().map(|value| value.parse().unwrap()).collect();
+    (output.status.code(), values, String::from_utf8(output.stderr).unwrap())
+}
+
+#[test]
+fn a_material_is_evaluated_at_angles_and_at_vectors() {
+    let folder = workplace();
+    let lambert = "model = 'lambert'\nreflectance = [0.8, 0.5, 0.2]\n";
+    fs::write(folder.path().join("l.toml"), lambert).unwrap();
+    let (code, values, _) = evaluated(&folder, "l.toml", "# comment\n30 30 180\n\n95 0 0\n");
+    let expected = [0.8, 0.5, 0.2].map(|reflectance| reflectance / std::f64::consts::PI);
+    assert_eq!((code, values), (Some(0), [expected, [0.0; 3]].concat()));
+    // The same pair of directions in both forms, for a BRDF that they matter to.
+    let (_, by_angles, _) = evaluated(&folder, "gold", "90 0 0\n60 30 90\n");
+    let s = 0.75f64.sqrt();
+    let (_, by_vectors, _) = evaluated(&folder, "gold --directions", &format!("1 0 0 0 0 1\n0 {s} 0.5 0.5 0 {s}\n"));
+    for (a, b) in by_angles[3..].iter().zip(&by_vectors[3..]) {
+        assert!((a - b).abs() < 1e-9 * a, "{a} {b}");
+    }
+    for (flags, line) in
+        [("gold", "1 2"), ("gold", "200 0 0"), ("gold --directions", "1 0 1 0 0 1"), ("gold", "nan 0 0")]
+    {
+        let (code, _, complaint) = evaluated(&folder, flags, line);
+        assert!(
+            code == Some(2) && complaint.lines().count() == 1 && complaint.contains("line 1"),
+            "{line}: {complaint}"
+        );
+    }
+}
+
+#[test]
+fn a_material_is_exported_and_plotted() {
+    let folder = workplace();
+    threadlight(&folder, "materials export clay -o clay.binary").assert().success();
+    let (_, own, _) = evaluated(&folder, "clay", "20 50 70\n");
+    let (_, exported, _) = evaluated(&folder, "clay.binary", "20 50 70\n");
+    for (a, b) in own.iter().zip(&exported) {
+        assert!((a - b).abs() < 1e-6, "{a} {b}");
+    }
+    threadlight(&folder, "materials plot gold -o gold.svg").assert().success();
+    assert!(String::from_utf8(bytes(&folder, "gold.svg")).unwrap().contains("</svg>"));
+    threadlight(&folder, "materials export clay -o clay.png").assert().code(2);
 }
 
 #[test]

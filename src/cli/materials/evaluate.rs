@@ -1,0 +1,73 @@
+//! `threadlight materials evaluate`: values of a BRDF at directions that are read from standard input.
+use super::Named;
+use anyhow::Context;
+use glam::{DVec3, dvec3};
+use std::io::{BufRead, Write};
+use threadlight::{Error, Result};
+
+const EXAMPLES: &str = "\
+Examples:
+  echo 30 30 180 | threadlight materials evaluate gold
+  echo 0.6 0 0.8 -0.6 0 0.8 | threadlight materials evaluate gold --directions";
+
+/// Reads pairs of directions, a line each, and writes f for red, green and blue in 1/sr, linear Rec. 709.
+///
+/// A line is `theta_i theta_o phi` in degrees: the angles of light and view to the normal and the azimuth between them, so that 30 30 180 is a
+/// mirror direction. Empty lines, and what begins with #, are passed over.
+#[derive(clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub struct Evaluate {
+    #[command(flatten)]
+    named: Named,
+    /// A line is two unit vectors instead, `w_i w_o` towards light and view, six numbers; z is the normal.
+    #[arg(long)]
+    directions: bool,
+}
+
+impl Evaluate {
+    pub fn run(self) -> anyhow::Result<()> {
+        let brdf = self.named.load()?;
+        let parse = if self.directions { of_vectors } else { of_angles };
+        let mut out = std::io::BufWriter::new(std::io::stdout().lock());
+        for (number, line) in std::io::stdin().lock().lines().enumerate() {
+            let line = line.context("standard input cannot be read")?;
+            if line.trim().is_empty() || line.trim_start().starts_with('#') {
+                continue;
+            }
+            let (w_i, w_o) = parse(&line).map_err(|error| error.within(format!("line {}", number + 1)))?;
+            let f = brdf.evaluate(w_i, w_o);
+            writeln!(out, "{} {} {}", f.x, f.y, f.z)?;
+        }
+        Ok(out.flush()?)
+    }
+}
+
+/// The `N` numbers of a line.
+fn numbers<const N: usize>(line: &str, form: &str) -> Result<[f64; N]> {
+    let numbers: Option<Vec<f64>> = line.split_whitespace().map(|word| word.parse().ok()).collect();
+    let numbers = numbers.filter(|numbers| numbers.iter().all(|number| number.is_finite()));
+    let numbers = numbers.and_then(|numbers| <[f64; N]>::try_from(numbers).ok());
+    numbers.ok_or_else(|| {
+        Error::input(format!("\"{}\"", line.trim()), format!("is not {N} numbers"), format!("give {form}"))
+    })
+}
+
+fn of_angles(line: &str) -> Result<(DVec3, DVec3)> {
+    let [theta_i, theta_o, phi] = numbers(line, "theta_i theta_o phi, in degrees")?;
+    if !(0.0..=180.0).contains(&theta_i) || !(0.0..=180.0).contains(&theta_o) {
+        return Err(Error::input(line.trim(), "has an angle to the normal out of range", "use 0 to 180 degrees"));
+    }
+    let (sin_i, cos_i) = theta_i.to_radians().sin_cos();
+    let (sin_o, cos_o) = theta_o.to_radians().sin_cos();
+    let (sin_phi, cos_phi) = phi.to_radians().sin_cos();
+    Ok((dvec3(sin_i * cos_phi, sin_i * sin_phi, cos_i), dvec3(sin_o, 0.0, cos_o)))
+}
+
+fn of_vectors(line: &str) -> Result<(DVec3, DVec3)> {
+    let [a, b, c, d, e, f] = numbers(line, "two unit vectors, w_i and w_o")?;
+    let pair = [dvec3(a, b, c), dvec3(d, e, f)];
+    if pair.iter().any(|w| (w.length() - 1.0).abs() > 1e-3) {
+        return Err(Error::input(line.trim(), "has a vector whose length is not 1", "give unit vectors, w_i and w_o"));
+    }
+    Ok((pair[0].normalize(), pair[1].normalize()))
+}

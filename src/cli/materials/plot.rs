@@ -1,0 +1,25 @@
+//! `threadlight materials plot`: a BRDF drawn.
+use super::Named;
+use crate::cli::stem;
+use std::path::{Path, PathBuf};
+use threadlight::low_level::evaluate::material_plot;
+use threadlight::low_level::output;
+
+/// Draws the BRDF as SVG: lobes in the plane of incidence, the image over half and difference angle, albedo by angle.
+#[derive(clap::Args)]
+pub struct Plot {
+    #[command(flatten)]
+    named: Named,
+    /// Picture to write.
+    #[arg(short, long, value_name = "FILE.svg")]
+    output: PathBuf,
+}
+
+impl Plot {
+    pub fn run(self) -> anyhow::Result<()> {
+        output::check_writable(&self.output)?;
+        let name = stem(Path::new(&self.named.material));
+        let svg = material_plot::svg(&*self.named.load()?, &name, &self.output)?;
+        Ok(output::write_whole(&self.output, svg.as_bytes())?)
+    }
+}
