@@ -211,7 +211,7 @@ fn the_split_sum_of_a_metal_is_its_albedos_times_light_weighted_by_ggx_and_by_th
     let alpha = split_sum.roughness_alpha;
     let rays = prepared.view.camera_rays();
     let mut compared = 0;
-    for pixel in pixels(&prepared).into_iter().step_by(97) {
+    for pixel in pixels(&prepared).step_by(97) {
         let Some(GeometryTexel { normal, .. }) = GeometryTexel::unpack(texels_of(&prepared, &rendering, pixel)[0])
         else {
             continue;
