@@ -194,6 +194,15 @@ impl Device {
         if std::ptr::eq(self, other) { Ok(()) } else { Err(VulkanError::unfit(name, "it is of another device")) }
     }
 
+    /// Tells devices and versions of their drivers apart, as far as drivers do.
+    pub fn driver_id(&self) -> Vec<u8> {
+        let &vk::PhysicalDeviceProperties { vendor_id, device_id, driver_version, api_version, .. } = &self.properties;
+        let numbers = [vendor_id, device_id, driver_version, api_version].map(u32::to_le_bytes);
+        let DeviceDescription { name, driver, .. } = &self.description;
+        [name.as_bytes(), b"\0", driver.as_bytes(), b"\0", numbers.as_flattened(), &self.properties.pipeline_cache_uuid]
+            .concat()
+    }
+
     /// Limits, as the driver states them.
     pub fn limits(&self) -> &vk::PhysicalDeviceLimits {
         &self.properties.limits
