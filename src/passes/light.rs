@@ -74,7 +74,8 @@ impl DeviceLight {
         let pyramid = &blurred.rest.levels;
         let source_pyramid = blurred.sources.as_ref().map_or(&nothing, |pyramid| &pyramid.levels);
         // One scale for all that is added up.
-        let scale = pyramid.radiance_scale().max(source_pyramid.radiance_scale());
+        let of_sources = blurred.sources.as_ref().map(|sources| sources.levels.radiance_scale());
+        let scale = of_sources.unwrap_or(0.0).max(pyramid.radiance_scale());
         let map = match blurred.needs.map {
             true => LightMap::with_sources_marked(environment),
             false => LightMap { width: 1, height: 1, texels: vec![[0.0; 4]] },
