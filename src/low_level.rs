@@ -3,6 +3,8 @@
 //! What is here changes from version to version. The guide's [architecture](crate::guide::architecture) says what is where.
 #[path = "brdf/mod.rs"]
 pub mod brdf;
+#[path = "device_check.rs"]
+pub mod device_check;
 #[path = "environment/mod.rs"]
 pub mod environment;
 #[path = "evaluate/mod.rs"]

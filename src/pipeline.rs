@@ -7,7 +7,8 @@ use crate::passes::*;
 use crate::prepare::Prepared;
 use crate::scene::Mesh;
 use crate::steps::{
-    CompileCompute, CompileGeometryCache, UploadBackground, UploadLight, UploadMaterials, UploadMesh, light, pipelines,
+    CheckDevice, CompileCompute, CompileGeometryCache, UploadBackground, UploadLight, UploadMaterials, UploadMesh,
+    light, pipelines,
 };
 use crate::threads::ThreadSets;
 use crate::vulkan::{Device, Frames, PassTime, Shader, compiled};
@@ -57,6 +58,7 @@ pub struct DeviceScene {
     shade: Shade,
     background: Option<Background>,
     tone_map: ToneMap,
+    way_around: Option<WayAround>,
     device: Arc<Device>,
     /// All that its round was asked for: what the next renderer has in common with this one is not made again.
     _held: Held,
@@ -83,6 +85,8 @@ pub struct Rendering {
     pub device_memory_bytes: u64,
     /// The plan of the frame as text.
     pub plan: String,
+    /// How a fault of the device was got around, if it has one.
+    pub way_around: Option<WayAround>,
 }
 
 impl DeviceScene {
@@ -98,6 +102,7 @@ impl DeviceScene {
         let shader = method.shader()?;
         // Held, so that it is opened once for all that is compiled.
         pipelines(round, device)?;
+        let way_around = round.ask(&CheckDevice(device))?.way_around(device)?;
         let geometry_cache = ask_geometry_cache(device, prepared, round)?;
         let materials: Vec<_> =
             prepared.materials.iter().map(|m| (&m.brdf, m.threads.as_ref().map(ThreadSets::as_ref))).collect();
@@ -109,7 +114,7 @@ impl DeviceScene {
         let subpixels = ("SUBPIXELS", view.subpixels);
         let mut constants = vec![subpixels, ("MODELS_USED", materials.models_used)];
         constants.extend(light.blurred.iter().flat_map(|blurred| blurred.needs.constants()));
-        let light = round.ask(&UploadLight { device, method, environment, light: &light })?;
+        let light = round.ask(&UploadLight { device, method, environment, light: &light, way_around })?;
         let pipeline = compile(shader, &constants)?;
         let background = match prepared.show_environment {
             true => Some(Background {
@@ -128,6 +133,7 @@ impl DeviceScene {
             shade: Shade { pipeline, materials, light, sampling },
             background,
             tone_map: ToneMap { pipeline: compile(&compiled::TONE_MAP, &[])? },
+            way_around,
             device: device.clone(),
             _held: round.held(),
         })
@@ -182,6 +188,7 @@ impl DeviceScene {
             frame_ms: median(frame_ms),
             device_memory_bytes: self.device.allocated_bytes(),
             plan: executable.plan.to_string(),
+            way_around: self.way_around,
         })
     }
 }
@@ -195,7 +202,7 @@ impl Rendering {
             threads: prepared.sampling.count,
             material: materials.join(", "),
             environment: prepared.environment.name.clone(),
-            device: device.to_owned(),
+            device: self.way_around.map_or(device.to_owned(), |way| format!("{device}, by {}", way.name())),
             seconds: self.frame_ms * 1e-3,
             ..ExrHeader::default()
         }

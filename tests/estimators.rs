@@ -105,7 +105,9 @@ fn every_estimator_agrees_with_its_cpu_twin() {
         differences.sort_by(f32::total_cmp);
         let (median, most) = (differences[differences.len() / 2], differences[differences.len() * 19 / 20]);
         println!("{}: {} pixels, median {median:.1e}, 95 % below {most:.1e}", method.name(), differences.len());
-        assert!(median < 1e-4 && most < 1e-3, "{}: {median} {most}", method.name());
+        // SwiftShader: 2e-4 and 1.6e-3 at most.
+        let bounds = if gpu.has_exact_functions() { (1e-4, 1e-3) } else { (4e-4, 3e-3) };
+        assert!(median < bounds.0 && most < bounds.1, "{}: {median} {most}", method.name());
     }
     gpu.finish();
 }

@@ -36,7 +36,7 @@ fn bare_lookups_see_the_environment_as_often_as_asked_for() {
     let pyramid = Pyramid::box_filtered(&environment);
     let cache = PipelineCache::new(&gpu.device, None).unwrap();
     for (pixels, lookups) in [(1, 1), (1000, 16), (70_000, 3)] {
-        let bare = BareLookups::new(&gpu.device, &cache, &pyramid, pixels, lookups).unwrap();
+        let bare = BareLookups::new(&gpu.device, &cache, &pyramid, pixels, lookups, None).unwrap();
         let (gpu_ms, sums) = time_bare_lookups(&gpu.device, &bare).unwrap();
         assert!(gpu_ms > 0.0);
         assert_eq!(sums.len(), pixels as usize);

@@ -4,6 +4,7 @@ use threadlight::Result;
 use threadlight::low_level::evaluate::reference::ReferenceImage;
 use threadlight::low_level::memo::{Asked, Origin};
 use threadlight::low_level::output::{self, Format};
+use threadlight::low_level::passes::WayAround;
 use threadlight::low_level::pipeline::Rendering;
 use threadlight::low_level::prepare::Prepared;
 use threadlight::low_level::scene::Background;
@@ -44,6 +45,9 @@ impl Rendered {
 pub struct Stats<'a> {
     version: &'a str,
     device: &'a str,
+    /// How a fault of the device was got around.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    way_around: Option<&'static str>,
     method: &'a str,
     threads: u32,
     subpixels: u32,
@@ -95,6 +99,7 @@ impl<'a> Stats<'a> {
         Self {
             version: env!("CARGO_PKG_VERSION"),
             device,
+            way_around: rendering.way_around.map(WayAround::name),
             method: prepared.method.name(),
             threads: prepared.sampling.count,
             subpixels: prepared.view.subpixels,

@@ -17,6 +17,12 @@ pub(super) const MAX_FACE_SIZE: usize = 1024;
 /// Largest finite half float.
 const F16_MAX: f64 = 65504.0;
 
+/// Light below this is dim: half floats have less than half of their range for it.
+const DIM: f64 = 1.0 / 64.0;
+
+/// Of a scale that single precision holds, and its inverse.
+const LEAST_EXPONENT: f64 = -120.0;
+
 /// A cube map with all its levels, each half the size of the one before, down to one texel a face.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pyramid {
@@ -74,10 +80,16 @@ impl Pyramid {
         level.clamp(0.0, (self.levels.len() - 1) as f64) as f32
     }
 
-    /// The power of two by which radiance is divided so that half floats can hold it; 1 where they can as it is.
+    /// The power of two by which radiance is divided so that half floats can hold it; 1 where they can as it is. Light that is all dim is
+    /// brought up to 1: below 6e-5 half floats lose bits, and below 6e-8 all of it.
     pub fn radiance_scale(&self) -> f32 {
         let max = f64::from(self.levels[0].iter().flatten().copied().fold(0.0, f32::max));
-        (max / F16_MAX).log2().ceil().max(0.0).exp2() as f32
+        let exponent = match max {
+            0.0 => 0.0,
+            max if max < DIM => max.log2().ceil().max(LEAST_EXPONENT),
+            max => (max / F16_MAX).log2().ceil().max(0.0),
+        };
+        exponent.exp2() as f32
     }
 
     /// Whether half floats serve: a scale beyond 64 would push dim light (below 0.004) into their subnormal numbers,
@@ -390,10 +402,17 @@ mod tests {
     }
 
     #[test]
-    fn half_floats_never_overflow() {
-        for (value, scale, fits) in
-            [(0.0, 1.0, true), (65504.0, 1.0, true), (65505.0, 2.0, true), (1e6, 16.0, true), (1e30, 0.0, false)]
-        {
+    fn half_floats_neither_overflow_nor_lose_light_that_is_all_dim() {
+        for (value, scale, fits) in [
+            (0.0, 1.0, true),
+            (1e-30, 0.0, true),
+            (1e-3, 0.0, true),
+            (0.02, 1.0, true),
+            (65504.0, 1.0, true),
+            (65505.0, 2.0, true),
+            (1e6, 16.0, true),
+            (1e30, 0.0, false),
+        ] {
             let pyramid = Pyramid::box_filtered(&environment(4, 2, |_, _| [value; 3]));
             assert_eq!(pyramid.fits_half(), fits);
             if scale > 0.0 {

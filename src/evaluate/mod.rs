@@ -11,6 +11,7 @@
 //! | time of a frame beside its floor, and as things double: table 1 | [`speed`] |
 //! | what threads cost to make, beside what they are worth | [`fit`] |
 //! | what drafts of threads are worth while a parameter is dragged | [`live`] |
+//! | whether hard cases are shaded as on the CPU | [`stress`] |
 //! | pictures side by side: figures 10, 11 and 13 | [`gallery`] |
 //! | how it looks | [`tables`], [`plots`], [`sheet`] |
 //! | all of it on one page | [`report`](mod@report) |
@@ -30,6 +31,7 @@ pub mod report;
 pub mod sheet;
 pub mod speed;
 pub mod ssim;
+pub mod stress;
 pub mod sweep;
 pub mod tables;
 

@@ -9,7 +9,7 @@ use crate::memo::{Key, Keyed, Memo};
 use crate::passes::{BareLookups, PlacedMesh};
 use crate::pipeline::{DeviceScene, Rendering, Wanted, median, time_bare_lookups};
 use crate::progress::Observer;
-use crate::steps::{BoxFilter, pipelines};
+use crate::steps::{BoxFilter, CheckDevice, pipelines};
 use crate::vulkan::{Device, PassTime};
 
 /// What to measure, and how.
@@ -234,7 +234,8 @@ impl Entrant {
         let threads = prepared.sampling.count;
         let pixels = lookups.div_ceil(u64::from(threads)) as u32;
         let pyramid = round.ask(&BoxFilter { environment: &prepared.environment, face_size: None })?;
-        let floor = BareLookups::new(device, &*pipelines(&round, device)?, &pyramid, pixels, threads)?;
+        let way_around = round.ask(&CheckDevice(device))?.way_around(device)?;
+        let floor = BareLookups::new(device, &*pipelines(&round, device)?, &pyramid, pixels, threads, way_around)?;
         time_bare_lookups(device, &floor)?;
         let triangles = |object: &PlacedMesh| prepared.meshes[object.mesh].1.indices.len() as u64 / 3;
         let frame = TimedFrame {

@@ -4,7 +4,7 @@ use super::declare::PassBuilder;
 use super::error::GraphError;
 use super::resource::ImageHandle;
 use super::work::{FrameGraph, Work};
-use crate::vulkan::{ColorTarget, DepthTarget, GraphicsPipeline, Triangles};
+use crate::vulkan::{Bound, ColorTarget, DepthTarget, GraphicsPipeline, Image, Sampler, Triangles};
 use bytemuck::Pod;
 
 /// A raster pass that is being declared: [`RasterPass::draw`] ends it.
@@ -14,12 +14,13 @@ pub struct RasterPass<'g, 'a> {
     pipeline: &'a GraphicsPipeline,
     color: Option<(ImageHandle, [u32; 4])>,
     depth: Option<(ImageHandle, f32)>,
+    bindings: Vec<(&'a str, Bound<'a>)>,
 }
 
 impl<'a> FrameGraph<'a> {
     /// Adds a pass that draws with `pipeline`.
     pub fn raster(&mut self, name: &str, pipeline: &'a GraphicsPipeline) -> RasterPass<'_, 'a> {
-        RasterPass { pass: self.pass(name), pipeline, color: None, depth: None }
+        RasterPass { pass: self.pass(name), pipeline, color: None, depth: None, bindings: Vec::new() }
     }
 }
 
@@ -38,13 +39,21 @@ impl<'a> RasterPass<'_, 'a> {
         self
     }
 
+    /// The shaders look at what is no resource of the graph, an image with its sampler, as their binding `name`.
+    pub fn sampled(mut self, name: &'a str, image: &'a Image, sampler: &'a Sampler) -> Self {
+        let bound = Bound::Sampled(image, sampler);
+        self.pass.depends_on(&bound.identity());
+        self.bindings.push((name, bound));
+        self
+    }
+
     /// Draws each mesh with its push constants.
     pub fn draw<P: Pod>(mut self, meshes: impl IntoIterator<Item = (&'a Triangles, P)>) {
         let Self { color: Some(color), depth: Some(depth), .. } = self else {
             let pass = self.pass.name().to_owned();
             return self.pass.refuse(GraphError::NoTarget { pass });
         };
-        let Self { mut pass, pipeline, .. } = self;
+        let Self { mut pass, pipeline, bindings, .. } = self;
         let meshes: Vec<_> = meshes.into_iter().collect();
         pass.depends_on(&pipeline.identity()).depends_on(&color.1).depends_on(&depth.1.to_bits());
         for (triangles, push) in &meshes {
@@ -54,7 +63,7 @@ impl<'a> RasterPass<'_, 'a> {
             let color = ColorTarget { image: resources.image(color.0)?, clear: color.1 };
             let depth = DepthTarget { image: resources.image(depth.0)?, clear: depth.1 };
             let draws = meshes.iter().map(|(triangles, push)| (*triangles, bytemuck::bytes_of(push)));
-            Ok(commands.render(pipeline, &color, &depth, draws)?)
+            Ok(commands.render(pipeline, &color, &depth, &bindings, draws)?)
         }));
     }
 }

@@ -1,4 +1,5 @@
 //! The floor of shading: as many trilinear lookups as a method makes, and nothing else.
+use super::cube_borders::WayAround;
 use super::light::DevicePyramid;
 use crate::Result;
 use crate::environment::Pyramid;
@@ -27,7 +28,7 @@ struct Push {
 }
 
 impl BareLookups {
-    /// `lookup_count` lookups in `pyramid` for each of `pixel_count` pixels (at least 1).
+    /// `lookup_count` lookups in `pyramid`, uploaded by `way_around`, for each of `pixel_count` pixels (at least 1).
     ///
     /// # Errors
     /// No device memory left, or a driver that cannot compile the shader.
@@ -37,14 +38,16 @@ impl BareLookups {
         pyramid: &Pyramid,
         pixel_count: u32,
         lookup_count: u32,
+        way_around: Option<WayAround>,
     ) -> Result<Self> {
         // About where texels are as large as a lookup's share of the hemisphere, and between two levels, so that both are fetched.
         let texel_sr = 2.0 * TAU / (6.0 * (pyramid.face_size * pyramid.face_size) as f64);
         let level = 0.5 * (TAU / f64::from(lookup_count) / texel_sr).log2();
         let level = level.clamp(0.0, (pyramid.levels.len() - 1) as f64 - 0.5).floor() + 0.5;
+        let scale = pyramid.radiance_scale();
         Ok(Self {
             pipeline: ComputePipeline::new(device, cache, &compiled::BARE_LOOKUPS, &[])?,
-            pyramid: DevicePyramid::new(device, "environment pyramid", pyramid, pyramid.radiance_scale())?,
+            pyramid: DevicePyramid::new(device, "environment pyramid", pyramid, scale, way_around)?,
             push: Push { pixel_count, lookup_count, level: level as f32 },
         })
     }

@@ -1,5 +1,6 @@
 //! What shading looks up of the environment, on the device: only what its method and its materials need.
 use super::background::check_map_size;
+use super::cube_borders::{WayAround, draw_with_cube_map};
 use crate::Result;
 use crate::environment::{Environment, LightMap, Pyramid};
 use crate::light::{BlurredLight, Light, PrefilteredLight};
@@ -25,28 +26,34 @@ pub(super) struct DevicePyramid {
     pub(super) sampler: Sampler,
     face_size: u32,
     /// Radiance of a texel of value 1: what keeps suns within half floats.
-    scale: f32,
+    pub(super) scale: f32,
 }
 
 impl DeviceLight {
-    /// Uploads what `method` looks up of `environment`, whose filtered forms are `light`.
+    /// Uploads what `method` looks up of `environment`, whose filtered forms are `light`; cube maps by `way_around`.
     ///
     /// # Errors
     /// No device memory left, or a map wider or higher than the device's images can be.
-    pub fn new(device: &Arc<Device>, method: Method, environment: &Environment, light: &Light) -> Result<Self> {
+    pub fn new(
+        device: &Arc<Device>,
+        method: Method,
+        environment: &Environment,
+        light: &Light,
+        way_around: Option<WayAround>,
+    ) -> Result<Self> {
         let lookups = method.lookups();
         let mut on_device = Self::default();
         if let Some(blurred) = &light.blurred {
-            on_device.add_blurred(device, environment, blurred)?;
+            on_device.add_blurred(device, environment, blurred, way_around)?;
         }
         if let Some(pyramid) = &light.box_filtered {
             let scale = pyramid.radiance_scale();
-            on_device.pyramid = Some(DevicePyramid::new(device, "environment pyramid", pyramid, scale)?);
+            on_device.pyramid = Some(DevicePyramid::new(device, "environment pyramid", pyramid, scale, way_around)?);
         }
         if let Some(PrefilteredLight { by_ggx, irradiance }) = &light.prefiltered {
             let scale = by_ggx.radiance_scale();
-            on_device.pyramid = Some(DevicePyramid::new(device, "environment pyramid", by_ggx, scale)?);
-            on_device.irradiance = Some(DevicePyramid::new(device, "irradiance map", irradiance, scale)?);
+            on_device.pyramid = Some(DevicePyramid::new(device, "environment pyramid", by_ggx, scale, way_around)?);
+            on_device.irradiance = Some(DevicePyramid::new(device, "irradiance map", irradiance, scale, way_around)?);
         }
         if lookups.map {
             let map = LightMap::new(environment);
@@ -61,20 +68,28 @@ impl DeviceLight {
     }
 
     /// Adds what fitted threads look up. Bindings that no kernel will use have a single texel.
-    fn add_blurred(&mut self, device: &Arc<Device>, environment: &Environment, blurred: &BlurredLight) -> Result<()> {
+    fn add_blurred(
+        &mut self,
+        device: &Arc<Device>,
+        environment: &Environment,
+        blurred: &BlurredLight,
+        way_around: Option<WayAround>,
+    ) -> Result<()> {
         let nothing = Pyramid { face_size: 1, levels: vec![vec![[0.0; 3]; 6]] };
         let pyramid = &blurred.rest.levels;
         let source_pyramid = blurred.sources.as_ref().map_or(&nothing, |pyramid| &pyramid.levels);
         // One scale for all that is added up.
-        let scale = pyramid.radiance_scale().max(source_pyramid.radiance_scale());
+        let of_sources = blurred.sources.as_ref().map(|sources| sources.levels.radiance_scale());
+        let scale = of_sources.unwrap_or(0.0).max(pyramid.radiance_scale());
         let map = match blurred.needs.map {
             true => LightMap::with_sources_marked(environment),
             false => LightMap { width: 1, height: 1, texels: vec![[0.0; 4]] },
         };
         self.map = Some(upload_map(device, environment, &map, scale)?);
-        self.pyramid = Some(DevicePyramid::new(device, "environment pyramid", pyramid, scale)?);
-        self.source_pyramid = Some(DevicePyramid::new(device, "source pyramid", source_pyramid, scale)?);
-        self.irradiance = Some(DevicePyramid::new(device, "irradiance map", &blurred.irradiance, scale)?);
+        let upload = |name, pyramid: &Pyramid| DevicePyramid::new(device, name, pyramid, scale, way_around).map(Some);
+        self.pyramid = upload("environment pyramid", pyramid)?;
+        self.source_pyramid = upload("source pyramid", source_pyramid)?;
+        self.irradiance = upload("irradiance map", &blurred.irradiance)?;
         let (sources, storage) = (environment.small_sources(), vk::BufferUsageFlags::STORAGE_BUFFER);
         let words = sources.device_words(scale);
         self.sources = Some(Buffer::with_contents(device, "light sources", storage, bytemuck::cast_slice(&words))?);
@@ -118,8 +133,14 @@ fn upload_map(device: &Arc<Device>, environment: &Environment, map: &LightMap, s
 }
 
 impl DevicePyramid {
-    /// Uploads `pyramid`, as half floats of radiance over `scale` where they hold it.
-    pub(super) fn new(device: &Arc<Device>, name: &str, pyramid: &Pyramid, scale: f32) -> Result<Self> {
+    /// Uploads `pyramid` by `way_around`, as half floats of radiance over `scale` where they hold it.
+    pub(super) fn new(
+        device: &Arc<Device>,
+        name: &str,
+        pyramid: &Pyramid,
+        scale: f32,
+        way_around: Option<WayAround>,
+    ) -> Result<Self> {
         let single = vk::Format::R32G32B32A32_SFLOAT;
         let use_single = !pyramid.fits_half() && device.filters_linearly(single);
         let level = |level| -> Vec<u8> {
@@ -137,11 +158,12 @@ impl DevicePyramid {
             levels: levels.len() as u32,
             kind: ImageKind::Cube,
         };
-        Ok(Self {
-            image: vulkan::Image::with_texels(device, name, shape, &levels)?,
-            sampler: Sampler::new(device, name, SamplerKind::Trilinear)?,
-            face_size,
-            scale,
-        })
+        let image = vulkan::Image::with_texels(device, name, shape, &levels)?;
+        let sampler = Sampler::new(device, name, SamplerKind::Trilinear)?;
+        match way_around {
+            Some(WayAround::DrawWithCubeMaps) => draw_with_cube_map(device, &image, &sampler)?,
+            None => {}
+        }
+        Ok(Self { image, sampler, face_size, scale })
     }
 }

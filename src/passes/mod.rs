@@ -6,6 +6,8 @@ mod background;
 mod bare_lookups;
 mod brdf_atlas;
 mod classify;
+mod cube_borders;
+mod device_check;
 mod geometry_cache;
 mod light;
 #[cfg(feature = "viewer")]
@@ -21,6 +23,8 @@ mod vmf_pyramid;
 pub use background::{Background, BackgroundMap, background};
 pub use bare_lookups::{BareLookups, bare_lookups};
 pub use classify::{Classify, Counters, SMOOTH_DEG, Tiles, classify, smooth_variance};
+pub use cube_borders::WayAround;
+pub use device_check::{Answers, Questions, Volume, ask};
 pub use geometry_cache::{DeviceMesh, GeometryCache, PlacedMesh, geometry_cache, geometry_pipeline};
 pub use light::DeviceLight;
 #[cfg(feature = "viewer")]

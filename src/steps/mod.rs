@@ -1,10 +1,12 @@
 //! Steps of the memo: load, fit, filter, compile, upload. Each says what its output is a function of and how it is made.
+mod check;
 mod compile;
 mod filter;
 mod fit;
 mod load;
 mod upload;
 
+pub use check::CheckDevice;
 pub use compile::{CompileCompute, CompileGeometryCache, pipelines};
 pub use filter::{Blur, BoxFilter, blurred_light, light};
 pub use fit::{DraftThreads, FitThreads};

@@ -7,7 +7,7 @@ use crate::environment::Environment;
 use crate::light::Light;
 use crate::memo::{Key, Keyed, Memo, Round, Step};
 use crate::method::Method;
-use crate::passes::{BackgroundMap, DeviceLight, DeviceMaterials, DeviceMesh, ShadedMaterial};
+use crate::passes::{BackgroundMap, DeviceLight, DeviceMaterials, DeviceMesh, ShadedMaterial, WayAround};
 use crate::scene::Mesh;
 use crate::threads::{ThreadSets, Threads};
 use crate::vulkan::Device;
@@ -96,6 +96,8 @@ pub struct UploadLight<'a> {
     pub environment: &'a Keyed<Environment>,
     /// Its filtered forms.
     pub light: &'a Light,
+    /// How cube maps are uploaded. Part of no key: a device has one.
+    pub way_around: Option<WayAround>,
 }
 
 impl Step for UploadLight<'_> {
@@ -115,7 +117,7 @@ impl Step for UploadLight<'_> {
     }
 
     fn make(&self, _: &Round) -> Result<DeviceLight> {
-        DeviceLight::new(self.device, self.method, self.environment, self.light)
+        DeviceLight::new(self.device, self.method, self.environment, self.light, self.way_around)
     }
 }
 

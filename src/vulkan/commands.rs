@@ -4,7 +4,7 @@
 //! accesses and set layouts, and that what is recorded stays alive until it is submitted. Both are what the frame graph
 //! is for, so only this crate records commands.
 use super::device::Device;
-use super::error::{During, Result};
+use super::error::{Result, call};
 use super::identity::Identity;
 use super::image::{Image, Sampler};
 use super::memory::Buffer;
@@ -224,8 +224,9 @@ impl Commands {
         let layouts = [pipeline.set_layout];
         let info = vk::DescriptorSetAllocateInfo::default().descriptor_pool(self.descriptor_pool).set_layouts(&layouts);
         // SAFETY: the pool belongs to the frame being recorded.
-        let set = unsafe { self.device.raw.allocate_descriptor_sets(&info) }
-            .during("vkAllocateDescriptorSets", pipeline.name)?[0];
+        let set = call("vkAllocateDescriptorSets", pipeline.name, || unsafe {
+            self.device.raw.allocate_descriptor_sets(&info)
+        })?[0];
         for (name, declared) in &pipeline.bindings {
             let given = bindings.iter().find(|(given, _)| given == name);
             let (_, bound) = given.ok_or_else(|| pipeline.refuse(format!("binding {name} is not given")))?;

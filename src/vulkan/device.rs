@@ -1,6 +1,6 @@
 //! The device: which one, its queue, its submissions, and the deletion of what they no longer use.
 use super::deletion::{Deletions, Garbage};
-use super::error::{During, Result, VulkanError};
+use super::error::{Result, VulkanError, call};
 use super::instance::Instance;
 use super::physical_device::{Candidate, DeviceDescription, candidates};
 #[cfg(feature = "viewer")]
@@ -71,7 +71,7 @@ fn allocator_and_timeline(
     let mut kind = vk::SemaphoreTypeCreateInfo::default().semaphore_type(vk::SemaphoreType::TIMELINE).initial_value(0);
     let info = vk::SemaphoreCreateInfo::default().push_next(&mut kind);
     // SAFETY: the timeline feature was enabled with the device.
-    let timeline = unsafe { raw.create_semaphore(&info, None) }.during("vkCreateSemaphore", "timeline")?;
+    let timeline = call("vkCreateSemaphore", "timeline", || unsafe { raw.create_semaphore(&info, None) })?;
     Ok((allocator, timeline))
 }
 
@@ -139,7 +139,7 @@ impl Device {
             .push_next(&mut synchronization2)
             .push_next(&mut dynamic_rendering);
         // SAFETY: the physical device is this instance's; `info` and all it points to outlive the call.
-        let raw = unsafe { instance.raw.create_device(chosen.physical, &info, None) }.during("vkCreateDevice", name)?;
+        let raw = call("vkCreateDevice", name, || unsafe { instance.raw.create_device(chosen.physical, &info, None) })?;
         let (allocator, timeline) = match allocator_and_timeline(instance, &chosen, &raw) {
             Ok(made) => made,
             Err(error) => {
@@ -194,6 +194,15 @@ impl Device {
         if std::ptr::eq(self, other) { Ok(()) } else { Err(VulkanError::unfit(name, "it is of another device")) }
     }
 
+    /// Tells devices and versions of their drivers apart, as far as drivers do.
+    pub fn driver_id(&self) -> Vec<u8> {
+        let &vk::PhysicalDeviceProperties { vendor_id, device_id, driver_version, api_version, .. } = &self.properties;
+        let numbers = [vendor_id, device_id, driver_version, api_version].map(u32::to_le_bytes);
+        let DeviceDescription { name, driver, .. } = &self.description;
+        [name.as_bytes(), b"\0", driver.as_bytes(), b"\0", numbers.as_flattened(), &self.properties.pipeline_cache_uuid]
+            .concat()
+    }
+
     /// Limits, as the driver states them.
     pub fn limits(&self) -> &vk::PhysicalDeviceLimits {
         &self.properties.limits
@@ -230,8 +239,9 @@ impl Device {
             .command_buffer_infos(&buffers)
             .signal_semaphore_infos(&signals);
         // SAFETY: the queue is held exclusively; the command buffer is complete and kept until `value` is reached.
-        unsafe { self.synchronization2.queue_submit2(*queue, &[info], vk::Fence::null()) }
-            .during("vkQueueSubmit2", name)?;
+        call("vkQueueSubmit2", name, || unsafe {
+            self.synchronization2.queue_submit2(*queue, &[info], vk::Fence::null())
+        })?;
         self.submitted.store(value, Ordering::Release);
         Ok(value)
     }
@@ -241,7 +251,7 @@ impl Device {
         let (semaphores, values) = ([self.timeline], [value]);
         let info = vk::SemaphoreWaitInfo::default().semaphores(&semaphores).values(&values);
         // SAFETY: the timeline lives as long as the device; `value` has been submitted or is 0.
-        unsafe { self.raw.wait_semaphores(&info, u64::MAX) }.during("vkWaitSemaphores", "timeline")?;
+        call("vkWaitSemaphores", "timeline", || unsafe { self.raw.wait_semaphores(&info, u64::MAX) })?;
         self.collect_garbage(value);
         Ok(())
     }
@@ -257,7 +267,7 @@ impl Device {
     pub(super) fn wait_idle(&self) -> Result<()> {
         let finished = self.with_queue(|queue| {
             // SAFETY: the queue is held exclusively.
-            unsafe { self.raw.queue_wait_idle(queue) }.during("vkQueueWaitIdle", &self.description.name)?;
+            call("vkQueueWaitIdle", &self.description.name, || unsafe { self.raw.queue_wait_idle(queue) })?;
             Ok(self.submitted.load(Ordering::Acquire))
         })?;
         self.collect_garbage(finished);

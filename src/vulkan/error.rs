@@ -95,6 +95,13 @@ impl VulkanError {
     }
 }
 
+/// Makes the Vulkan call of this `name`, and attaches that and the object's name to what it returns. Tests make it fail instead.
+pub(super) fn call<T>(name: &'static str, object: &str, make: impl FnOnce() -> ash::prelude::VkResult<T>) -> Result<T> {
+    #[cfg(test)]
+    super::faults::before(name).during(name, object)?;
+    make().during(name, object)
+}
+
 /// Attaches the call and the object's name to a bare `vk::Result`.
 pub(super) trait During<T> {
     fn during(self, call: &'static str, object: &str) -> Result<T>;

@@ -2,7 +2,7 @@
 use super::commands::{Commands, MAX_TIMED_PASSES};
 use super::deletion::Garbage;
 use super::device::{Device, Semaphores};
-use super::error::{During, Result, VulkanError};
+use super::error::{Result, VulkanError, call};
 use ash::vk;
 use std::sync::Arc;
 
@@ -25,6 +25,7 @@ struct Slot {
     timed: Vec<String>,
     /// Value of the device's timeline at which that frame has finished; 0: never submitted.
     finished_at: u64,
+    device: Arc<Device>,
 }
 
 /// A ring of frames: while the GPU works on one, the next is recorded.
@@ -69,7 +70,7 @@ impl Frames {
         let result = record(&mut commands)?;
         let timed = commands.into_timed_passes();
         // SAFETY: the command buffer is in the recording state.
-        unsafe { self.device.raw.end_command_buffer(slot.commands) }.during("vkEndCommandBuffer", &self.name)?;
+        call("vkEndCommandBuffer", &self.name, || unsafe { self.device.raw.end_command_buffer(slot.commands) })?;
         slot.finished_at = self.device.submit(slot.commands, &self.name, semaphores)?;
         slot.timed = timed;
         self.next = (self.next + 1) % self.slots.len();
@@ -117,8 +118,9 @@ impl Frames {
         let mut ticks = vec![0_u64; 2 * slot.timed.len()];
         let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;
         // SAFETY: the frame that was submitted last writes both timestamps of every timed pass; this waits for them.
-        unsafe { self.device.raw.get_query_pool_results(queries, 0, &mut ticks, flags) }
-            .during("vkGetQueryPoolResults", &self.name)?;
+        call("vkGetQueryPoolResults", &self.name, || unsafe {
+            self.device.raw.get_query_pool_results(queries, 0, &mut ticks, flags)
+        })?;
         // Timestamps count modulo the valid bits of the queue.
         let mask = u64::MAX >> (64 - self.device.timestamp_valid_bits.clamp(1, 64));
         let ms_per_tick = f64::from(self.device.limits().timestamp_period) * 1e-6;
@@ -137,12 +139,22 @@ impl Slot {
             .queue_family_index(device.queue_family);
         // SAFETY: plain creation; destroyed through the deletion queue, as all below.
         let command_pool =
-            unsafe { device.raw.create_command_pool(&info, None) }.during("vkCreateCommandPool", name)?;
+            call("vkCreateCommandPool", name, || unsafe { device.raw.create_command_pool(&info, None) })?;
+        // Destroyed with this from here on, whatever fails.
+        let mut slot = Self {
+            command_pool,
+            commands: vk::CommandBuffer::null(),
+            descriptor_pool: vk::DescriptorPool::null(),
+            queries: None,
+            timed: Vec::new(),
+            finished_at: 0,
+            device: device.clone(),
+        };
         let info = vk::CommandBufferAllocateInfo::default().command_pool(command_pool).command_buffer_count(1);
         // SAFETY: the pool is alive; the buffer goes with it.
-        let commands =
-            unsafe { device.raw.allocate_command_buffers(&info) }.during("vkAllocateCommandBuffers", name)?[0];
-        device.set_name(commands, name);
+        slot.commands =
+            call("vkAllocateCommandBuffers", name, || unsafe { device.raw.allocate_command_buffers(&info) })?[0];
+        device.set_name(slot.commands, name);
 
         // Room for far more passes than a frame has; running out is an error that says so.
         let (sets, each) = (64, 128);
@@ -156,38 +168,34 @@ impl Slot {
         .map(|kind| vk::DescriptorPoolSize::default().ty(kind).descriptor_count(each));
         let info = vk::DescriptorPoolCreateInfo::default().max_sets(sets).pool_sizes(&sizes);
         // SAFETY: plain creation.
-        let descriptor_pool =
-            unsafe { device.raw.create_descriptor_pool(&info, None) }.during("vkCreateDescriptorPool", name)?;
+        slot.descriptor_pool =
+            call("vkCreateDescriptorPool", name, || unsafe { device.raw.create_descriptor_pool(&info, None) })?;
 
-        let queries = if device.timestamp_valid_bits > 0 {
+        if device.timestamp_valid_bits > 0 {
             let info = vk::QueryPoolCreateInfo::default()
                 .query_type(vk::QueryType::TIMESTAMP)
                 .query_count(2 * MAX_TIMED_PASSES);
             // SAFETY: plain creation.
-            Some(unsafe { device.raw.create_query_pool(&info, None) }.during("vkCreateQueryPool", name)?)
-        } else {
-            None
-        };
-        Ok(Self { command_pool, commands, descriptor_pool, queries, timed: Vec::new(), finished_at: 0 })
+            let queries = call("vkCreateQueryPool", name, || unsafe { device.raw.create_query_pool(&info, None) })?;
+            slot.queries = Some(queries);
+        }
+        Ok(slot)
     }
 
     /// Empties the pools, whose earlier contents the GPU has finished with, and starts recording.
     fn begin(&mut self, device: &Device, name: &str) -> Result<()> {
         self.timed.clear();
-        // SAFETY: the caller waited for `finished_at`: nothing of these pools is in use.
-        unsafe {
-            device
-                .raw
-                .reset_command_pool(self.command_pool, vk::CommandPoolResetFlags::empty())
-                .during("vkResetCommandPool", name)?;
-            device
-                .raw
-                .reset_descriptor_pool(self.descriptor_pool, vk::DescriptorPoolResetFlags::empty())
-                .during("vkResetDescriptorPool", name)?;
-        }
+        // SAFETY: the caller waited for `finished_at`: nothing of this pool is in use.
+        call("vkResetCommandPool", name, || unsafe {
+            device.raw.reset_command_pool(self.command_pool, vk::CommandPoolResetFlags::empty())
+        })?;
+        // SAFETY: nor of this one.
+        call("vkResetDescriptorPool", name, || unsafe {
+            device.raw.reset_descriptor_pool(self.descriptor_pool, vk::DescriptorPoolResetFlags::empty())
+        })?;
         let info = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
         // SAFETY: the command buffer was just reset.
-        unsafe { device.raw.begin_command_buffer(self.commands, &info) }.during("vkBeginCommandBuffer", name)?;
+        call("vkBeginCommandBuffer", name, || unsafe { device.raw.begin_command_buffer(self.commands, &info) })?;
         if let Some(queries) = self.queries {
             // SAFETY: recorded outside of rendering, before any timestamp.
             unsafe { device.raw.cmd_reset_query_pool(self.commands, queries, 0, 2 * MAX_TIMED_PASSES) };
@@ -196,14 +204,13 @@ impl Slot {
     }
 }
 
-impl Drop for Frames {
+impl Drop for Slot {
     fn drop(&mut self) {
-        for slot in &self.slots {
-            self.device.delete_later(Garbage::CommandPool(slot.command_pool));
-            self.device.delete_later(Garbage::DescriptorPool(slot.descriptor_pool));
-            if let Some(queries) = slot.queries {
-                self.device.delete_later(Garbage::QueryPool(queries));
-            }
+        // Handles that were never made are null, of which nothing is destroyed.
+        self.device.delete_later(Garbage::CommandPool(self.command_pool));
+        self.device.delete_later(Garbage::DescriptorPool(self.descriptor_pool));
+        if let Some(queries) = self.queries {
+            self.device.delete_later(Garbage::QueryPool(queries));
         }
     }
 }

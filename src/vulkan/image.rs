@@ -1,7 +1,7 @@
 //! Images and samplers.
 use super::deletion::Garbage;
 use super::device::Device;
-use super::error::{During, Result, VulkanError};
+use super::error::{Result, VulkanError, call};
 use super::identity::Identity;
 use super::memory::Memory;
 use ash::vk;
@@ -132,7 +132,7 @@ impl Image {
             .samples(vk::SampleCountFlags::TYPE_1)
             .usage(usage);
         // SAFETY: the device was found to have such images; destroyed through the deletion queue.
-        let raw = unsafe { device.raw.create_image(&info, None) }.during("vkCreateImage", name)?;
+        let raw = call("vkCreateImage", name, || unsafe { device.raw.create_image(&info, None) })?;
         device.set_name(raw, name);
         let view = vk::ImageView::null();
         let (name, device) = (name.to_owned(), device.clone());
@@ -194,8 +194,9 @@ impl Image {
         }
         let (raw_memory, offset) = memory.place(offset, self.requirements(), &self.name)?;
         // SAFETY: the image has no memory yet, and the range, which `memory` keeps alive, is as it requires.
-        unsafe { self.device.raw.bind_image_memory(self.raw, raw_memory, offset) }
-            .during("vkBindImageMemory", &self.name)?;
+        call("vkBindImageMemory", &self.name, || unsafe {
+            self.device.raw.bind_image_memory(self.raw, raw_memory, offset)
+        })?;
         self.memory = Some(memory.clone());
         self.make_view()
     }
@@ -208,7 +209,7 @@ impl Image {
             .subresource_range(self.shape.whole());
         // SAFETY: the image is alive and has memory; the view is destroyed with it.
         self.view =
-            unsafe { self.device.raw.create_image_view(&info, None) }.during("vkCreateImageView", &self.name)?;
+            call("vkCreateImageView", &self.name, || unsafe { self.device.raw.create_image_view(&info, None) })?;
         self.device.set_name(self.view, &self.name);
         Ok(())
     }
@@ -229,10 +230,9 @@ fn check_shape(
     }
     let (instance, physical, tiling) = (&device.instance.raw, device.physical, vk::ImageTiling::OPTIMAL);
     // SAFETY: plain query about this instance's physical device.
-    let limits = unsafe {
+    let limits = call("vkGetPhysicalDeviceImageFormatProperties", name, || unsafe {
         instance.get_physical_device_image_format_properties(physical, shape.format, kind, tiling, usage, flags)
-    }
-    .during("vkGetPhysicalDeviceImageFormatProperties", name)?;
+    })?;
     let [width, height, depth] = shape.extent;
     let most = [limits.max_extent.width, limits.max_extent.height, limits.max_extent.depth];
     let has_extent = shape.extent.iter().zip(most).all(|(size, most)| (1..=most).contains(size));
@@ -287,7 +287,7 @@ impl Sampler {
             .address_mode_w(clamp)
             .max_lod(vk::LOD_CLAMP_NONE);
         // SAFETY: plain creation; destroyed through the deletion queue.
-        let raw = unsafe { device.raw.create_sampler(&info, None) }.during("vkCreateSampler", name)?;
+        let raw = call("vkCreateSampler", name, || unsafe { device.raw.create_sampler(&info, None) })?;
         device.set_name(raw, name);
         Ok(Self { raw, identity: Identity::new(), device: device.clone() })
     }

@@ -1,5 +1,7 @@
 //! The Vulkan instance: loader, validation layer, and the messages it sends.
-use super::error::{During, Result, VulkanError};
+#[cfg(feature = "viewer")]
+use super::error::During;
+use super::error::{Result, VulkanError, call};
 use ash::{ext, khr, vk};
 use std::ffi::{CStr, c_void};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -30,12 +32,11 @@ pub struct Instance {
     messenger: Option<(ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,
     messages: Messages,
     // The callback's user data: at one address for as long as the messenger lives.
-    _user_data: Box<Messages>,
+    user_data: Box<Messages>,
     /// Whether it was made for a window system.
     #[cfg(feature = "viewer")]
     pub(super) presents: bool,
-    // Unloads the loader when dropped: last. Without windows it is only kept alive.
-    #[cfg_attr(not(feature = "viewer"), expect(dead_code))]
+    // Unloads the loader when dropped: last.
     pub(super) entry: ash::Entry,
 }
 
@@ -74,26 +75,27 @@ impl Instance {
         // Names and labels cost nothing without a tool that listens, and are what a frame debugger shows.
         let debug_names = validate || offer.has(ext::debug_utils::NAME);
         let raw = create(&entry, &offer, validate.then_some(&*user_data), wanted, debug_names)?;
-        let messenger = if validate {
-            let functions = ext::debug_utils::Instance::new(&entry, &raw);
-            let info = messenger_info(&user_data);
-            // SAFETY: the instance was made with VK_EXT_debug_utils; the user data outlives the messenger.
-            let messenger = unsafe { functions.create_debug_utils_messenger(&info, None) }
-                .during("vkCreateDebugUtilsMessengerEXT", NAME)?;
-            Some((functions, messenger))
-        } else {
-            None
-        };
-        Ok(Arc::new(Self {
+        // Destroyed with this from here on, whatever fails.
+        let mut instance = Self {
             raw,
             debug_names,
-            messenger,
+            messenger: None,
             messages,
-            _user_data: user_data,
+            user_data,
             #[cfg(feature = "viewer")]
             presents: !wanted.is_empty(),
             entry,
-        }))
+        };
+        if validate {
+            let functions = ext::debug_utils::Instance::new(&instance.entry, &instance.raw);
+            let info = messenger_info(&instance.user_data);
+            // SAFETY: the instance was made with VK_EXT_debug_utils; the user data outlives the messenger.
+            let messenger = call("vkCreateDebugUtilsMessengerEXT", NAME, || unsafe {
+                functions.create_debug_utils_messenger(&info, None)
+            })?;
+            instance.messenger = Some((functions, messenger));
+        }
+        Ok(Arc::new(instance))
     }
 
     /// What the validation layer has said so far; stays readable after the instance is gone.
@@ -123,16 +125,18 @@ impl Offer {
     /// An error if the validation layer is `needed` and not there.
     fn of(entry: &ash::Entry, needs_validation: bool) -> Result<Self> {
         // SAFETY: plain query of the loader.
-        let version = unsafe { entry.try_enumerate_instance_version() }.during("vkEnumerateInstanceVersion", NAME)?;
+        let version = call("vkEnumerateInstanceVersion", NAME, || unsafe { entry.try_enumerate_instance_version() })?;
         // SAFETY: plain query of the loader.
-        let layers = unsafe { entry.enumerate_instance_layer_properties() }
-            .during("vkEnumerateInstanceLayerProperties", NAME)?;
+        let layers = call("vkEnumerateInstanceLayerProperties", NAME, || unsafe {
+            entry.enumerate_instance_layer_properties()
+        })?;
         if needs_validation && !layers.iter().any(|layer| layer.layer_name_as_c_str() == Ok(VALIDATION_LAYER)) {
             return Err(VulkanError::NoValidationLayer);
         }
         // SAFETY: plain query of the loader.
-        let extensions = unsafe { entry.enumerate_instance_extension_properties(None) }
-            .during("vkEnumerateInstanceExtensionProperties", NAME)?;
+        let extensions = call("vkEnumerateInstanceExtensionProperties", NAME, || unsafe {
+            entry.enumerate_instance_extension_properties(None)
+        })?;
         Ok(Self { version: version.unwrap_or(vk::API_VERSION_1_0), extensions })
     }
 
@@ -177,10 +181,10 @@ fn create(
         info = info.push_next(&mut features).push_next(messenger_info);
     }
     // SAFETY: `info` and all it points to outlive the call; whoever listens does so for as long as there is the instance.
-    match unsafe { entry.create_instance(&info, None) } {
-        Err(vk::Result::ERROR_INCOMPATIBLE_DRIVER) => Err(VulkanError::NoDriver),
-        other => other.during("vkCreateInstance", NAME),
-    }
+    call("vkCreateInstance", NAME, || unsafe { entry.create_instance(&info, None) }).map_err(|error| match error {
+        VulkanError::Call { result: vk::Result::ERROR_INCOMPATIBLE_DRIVER, .. } => VulkanError::NoDriver,
+        other => other,
+    })
 }
 
 /// Validation and performance warnings and errors, sent to `messages`.

@@ -1,7 +1,7 @@
 //! Device memory, and the buffers in it.
 use super::deletion::Garbage;
 use super::device::Device;
-use super::error::{During, Result, VulkanError};
+use super::error::{Result, VulkanError, call};
 use super::identity::Identity;
 use ash::vk;
 use gpu_allocator::MemoryLocation;
@@ -42,6 +42,8 @@ impl Memory {
         let allocation_scheme = AllocationScheme::GpuAllocatorManaged;
         let description = AllocationCreateDesc { name, requirements, location, linear, allocation_scheme };
         let failed = |cause: String| VulkanError::Memory { object: name.to_owned(), cause };
+        #[cfg(test)]
+        super::faults::before("vkAllocateMemory").map_err(|result| failed(format!("vkAllocateMemory: {result}")))?;
         let allocation = device
             .with_allocator(|allocator| allocator.allocate(&description))
             .ok_or_else(|| failed("the device is closing".to_owned()))?
@@ -158,7 +160,7 @@ impl Buffer {
         }
         let info = vk::BufferCreateInfo::default().size(size_bytes).usage(usage);
         // SAFETY: size and usage are valid on every device; destroyed through the deletion queue.
-        let raw = unsafe { device.raw.create_buffer(&info, None) }.during("vkCreateBuffer", name)?;
+        let raw = call("vkCreateBuffer", name, || unsafe { device.raw.create_buffer(&info, None) })?;
         device.set_name(raw, name);
         let (name, identity, device) = (name.to_owned(), Identity::new(), device.clone());
         Ok(Self { raw, size_bytes, usage, name, identity, memory: None, device })
@@ -198,8 +200,9 @@ impl Buffer {
         }
         let (raw_memory, offset) = memory.place(offset, self.requirements(), &self.name)?;
         // SAFETY: the buffer has no memory yet, and the range, which `memory` keeps alive, is as it requires.
-        unsafe { self.device.raw.bind_buffer_memory(self.raw, raw_memory, offset) }
-            .during("vkBindBufferMemory", &self.name)?;
+        call("vkBindBufferMemory", &self.name, || unsafe {
+            self.device.raw.bind_buffer_memory(self.raw, raw_memory, offset)
+        })?;
         self.memory = Some(memory.clone());
         Ok(())
     }

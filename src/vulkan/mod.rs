@@ -16,6 +16,7 @@
 //! commands, copies, frames     one recorded pass after another; frames in flight, timestamps
 //! upload, triangles, render    contents of buffers and images; meshes; drawing them
 //! swapchain, ui                images of a window; what egui has laid out
+//! faults                       (tests) calls that fail on purpose
 //! ```
 
 mod commands;
@@ -23,6 +24,8 @@ mod copies;
 mod deletion;
 mod device;
 mod error;
+#[cfg(test)]
+mod faults;
 mod frames;
 #[cfg(feature = "hot-reload")]
 mod glslc;

@@ -1,5 +1,5 @@
 //! The devices that the loader offers, and what each lacks.
-use super::error::{During, Result, VulkanError};
+use super::error::{During, Result, VulkanError, call};
 use super::instance::Instance;
 use ash::{khr, vk};
 use std::ffi::CStr;
@@ -131,8 +131,9 @@ fn extensions(
     lacks: &mut Vec<&'static str>,
 ) -> Result<Vec<&'static CStr>> {
     // SAFETY: `physical` comes from this instance.
-    let available = unsafe { instance.raw.enumerate_device_extension_properties(physical) }
-        .during("vkEnumerateDeviceExtensionProperties", name)?;
+    let available = call("vkEnumerateDeviceExtensionProperties", name, || unsafe {
+        instance.raw.enumerate_device_extension_properties(physical)
+    })?;
     let has = |wanted: &CStr| available.iter().any(|extension| extension.extension_name_as_c_str() == Ok(wanted));
     // These are asked for even where Vulkan 1.3 has them in its core: their entry points are the same ones.
     let needed = [

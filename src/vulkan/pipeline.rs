@@ -1,7 +1,7 @@
 //! Pipelines, with every layout taken from the shaders themselves.
 use super::deletion::Garbage;
 use super::device::Device;
-use super::error::{During, Result, VulkanError};
+use super::error::{Result, VulkanError, call};
 use super::identity::Identity;
 use super::pipeline_cache::PipelineCache;
 use super::shader::{Binding, Interface, Shader, ShaderStage};
@@ -39,18 +39,21 @@ impl Pipeline {
             }
             shader.check_bindings(&bindings)?;
         }
-        let set_layout = set_layout(device, name, &bindings, stages)?;
-        let set_layouts = [set_layout];
+        let set_layouts = [set_layout(device, name, &bindings, stages)?];
+        let (raw, layout, identity) = (vk::Pipeline::null(), vk::PipelineLayout::null(), Identity::new());
+        let (set_layout, owner) = (set_layouts[0], device.clone());
+        // Destroyed with this from here on, whatever fails.
+        let mut pipeline =
+            Self { raw, layout, set_layout, bindings, push_constant_bytes, stages, name, identity, device: owner };
         let ranges: Vec<_> = (push_constant_bytes > 0)
             .then(|| vk::PushConstantRange::default().stage_flags(stages).size(push_constant_bytes))
             .into_iter()
             .collect();
         let info = vk::PipelineLayoutCreateInfo::default().set_layouts(&set_layouts).push_constant_ranges(&ranges);
         // SAFETY: plain creation; destroyed through the deletion queue.
-        let layout =
-            unsafe { device.raw.create_pipeline_layout(&info, None) }.during("vkCreatePipelineLayout", name)?;
-        let (raw, identity, device) = (vk::Pipeline::null(), Identity::new(), device.clone());
-        Ok(Self { raw, layout, set_layout, bindings, push_constant_bytes, stages, name, identity, device })
+        pipeline.layout =
+            call("vkCreatePipelineLayout", name, || unsafe { device.raw.create_pipeline_layout(&info, None) })?;
+        Ok(pipeline)
     }
 
     /// An error for what does not fit its shaders.
@@ -72,7 +75,7 @@ fn set_layout(
     let bindings: Vec<_> = bindings.values().map(of_binding).collect();
     let info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&bindings);
     // SAFETY: plain creation; destroyed through the deletion queue.
-    unsafe { device.raw.create_descriptor_set_layout(&info, None) }.during("vkCreateDescriptorSetLayout", name)
+    call("vkCreateDescriptorSetLayout", name, || unsafe { device.raw.create_descriptor_set_layout(&info, None) })
 }
 
 impl Drop for Pipeline {
@@ -95,7 +98,7 @@ impl Module {
         let info = vk::ShaderModuleCreateInfo::default().code(&words);
         // SAFETY: the words come from the GLSL compiler, as those of every shader.
         let raw =
-            unsafe { device.raw.create_shader_module(&info, None) }.during("vkCreateShaderModule", shader.name)?;
+            call("vkCreateShaderModule", shader.name, || unsafe { device.raw.create_shader_module(&info, None) })?;
         device.set_name(raw, shader.name);
         Ok(Self { raw, device: device.clone() })
     }
@@ -149,8 +152,9 @@ impl ComputePipeline {
         let stage = module.stage(shader).specialization_info(&specialization);
         let info = [vk::ComputePipelineCreateInfo::default().stage(stage).layout(pipeline.layout)];
         // SAFETY: `info` and all it points to outlive the call.
-        let made = unsafe { device.raw.create_compute_pipelines(cache.raw, &info, None) };
-        pipeline.raw = made.map_err(|(_, result)| result).during("vkCreateComputePipelines", shader.name)?[0];
+        pipeline.raw = call("vkCreateComputePipelines", shader.name, || unsafe {
+            device.raw.create_compute_pipelines(cache.raw, &info, None).map_err(|(_, result)| result)
+        })?[0];
         device.set_name(pipeline.raw, shader.name);
         Ok(Self(pipeline, interface.group_size))
     }
@@ -281,6 +285,8 @@ fn make_graphics(
         .layout(layouts.layout)
         .push_next(&mut rendering)];
     // SAFETY: `info` and all it points to outlive the call.
-    let made = unsafe { device.raw.create_graphics_pipelines(cache.raw, &info, None) };
-    Ok(made.map_err(|(_, result)| result).during("vkCreateGraphicsPipelines", layouts.name)?[0])
+    let made = call("vkCreateGraphicsPipelines", layouts.name, || unsafe {
+        device.raw.create_graphics_pipelines(cache.raw, &info, None).map_err(|(_, result)| result)
+    })?;
+    Ok(made[0])
 }

@@ -1,6 +1,6 @@
 //! The driver's cache of compiled pipelines, on disk.
 use super::device::Device;
-use super::error::{During, Result};
+use super::error::{Result, call};
 use crate::output::{make_way, write_whole};
 use ash::vk;
 use std::path::{Path, PathBuf};
@@ -28,8 +28,9 @@ impl PipelineCache {
             file.as_deref().and_then(|file| unwrapped(crate::file_format::read(file).ok()?)).unwrap_or_default();
         let info = vk::PipelineCacheCreateInfo::default().initial_data(&contents);
         // SAFETY: `contents` outlives the call; it is what a driver has made, whose header tells this one whether it is its own.
-        let raw = unsafe { device.raw.create_pipeline_cache(&info, None) }
-            .during("vkCreatePipelineCache", "pipeline cache")?;
+        let raw = call("vkCreatePipelineCache", "pipeline cache", || unsafe {
+            device.raw.create_pipeline_cache(&info, None)
+        })?;
         Ok(Self { raw, file, device: device.clone() })
     }
 

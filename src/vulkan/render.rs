@@ -1,5 +1,5 @@
 //! Rendering: triangles into a colour and a depth target, both cleared first.
-use super::commands::Commands;
+use super::commands::{Bound, Commands};
 use super::error::{Result, VulkanError};
 use super::image::Image;
 use super::pipeline::GraphicsPipeline;
@@ -23,15 +23,17 @@ pub(crate) struct DepthTarget<'a> {
 }
 
 impl Commands {
-    /// Clears the targets and draws into them, each mesh with its push constants.
+    /// Clears the targets and draws into them, each mesh with its push constants and all with these `bindings`.
     ///
     /// # Errors
-    /// Targets that `pipeline` was not made for, or that differ in size; meshes or push constants that are not what its shaders declare.
+    /// Targets that `pipeline` was not made for, or that differ in size; meshes, bindings or push constants that are not what its
+    /// shaders declare.
     pub(crate) fn render<'d>(
         &mut self,
         pipeline: &GraphicsPipeline,
         color: &ColorTarget,
         depth: &DepthTarget,
+        bindings: &[(&str, Bound)],
         draws: impl Iterator<Item = (&'d Triangles, &'d [u8])>,
     ) -> Result<()> {
         self.check_targets(pipeline, color.image, depth.image)?;
@@ -63,7 +65,7 @@ impl Commands {
             self.device.raw.cmd_set_viewport(self.raw, 0, &[viewport]);
             self.device.raw.cmd_set_scissor(self.raw, 0, &[area]);
         }
-        let result = self.draw(pipeline, draws);
+        let result = self.draw(pipeline, bindings, draws);
         // SAFETY: begun above.
         unsafe { self.device.dynamic_rendering.cmd_end_rendering(self.raw) };
         result
@@ -72,9 +74,10 @@ impl Commands {
     fn draw<'d>(
         &mut self,
         pipeline: &GraphicsPipeline,
+        bindings: &[(&str, Bound)],
         draws: impl Iterator<Item = (&'d Triangles, &'d [u8])>,
     ) -> Result<()> {
-        self.bind(&pipeline.layouts, vk::PipelineBindPoint::GRAPHICS, &[])?;
+        self.bind(&pipeline.layouts, vk::PipelineBindPoint::GRAPHICS, bindings)?;
         for (triangles, push_constants) in draws {
             self.device.check_same(triangles.device(), "mesh")?;
             if triangles.strides != pipeline.strides {

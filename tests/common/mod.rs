@@ -20,11 +20,22 @@ pub struct Validated {
 }
 
 impl Validated {
+    /// The device that THREADLIGHT_TEST_DEVICE names, or the best.
     pub fn new() -> Self {
+        Self::on(std::env::var("THREADLIGHT_TEST_DEVICE").ok().as_deref())
+    }
+
+    /// The device of this name or index.
+    pub fn on(wanted: Option<&str>) -> Self {
         let instance = Instance::new(true).expect("an instance with validation");
-        let wanted = std::env::var("THREADLIGHT_TEST_DEVICE").ok();
-        let device = Device::new(&instance, wanted.as_deref()).expect("a device");
+        let device = Device::new(&instance, wanted).expect("a device");
         Self { device, memo: Memo::default(), last: Mutex::default(), messages: instance.messages() }
+    }
+
+    /// Whether exp, log, sin and the like are good to the last bits, as on the CPU. Vulkan promises less ("Precision and Operation of
+    /// SPIR-V Instructions"), and what evaluates BRDFs of narrow lobes multiplies that.
+    pub fn has_exact_functions(&self) -> bool {
+        self.device.description().driver.starts_with("llvmpipe")
     }
 
     pub fn render(&self, prepared: &Prepared, wanted: Wanted) -> Rendering {

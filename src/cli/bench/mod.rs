@@ -6,6 +6,7 @@ mod gallery;
 mod live;
 mod report;
 mod speed;
+mod stress;
 
 use clap::Subcommand;
 
@@ -22,6 +23,7 @@ enum What {
     Speed(Box<speed::BenchSpeed>),
     Fit(fit::BenchFit),
     Live(Box<live::BenchLive>),
+    Stress(stress::BenchStress),
     Gallery(Box<gallery::BenchGallery>),
     Report(Box<report::BenchReport>),
 }
@@ -33,6 +35,7 @@ impl Bench {
             What::Speed(bench) => bench.run(),
             What::Fit(bench) => bench.run(),
             What::Live(bench) => bench.run(),
+            What::Stress(bench) => bench.run(),
             What::Gallery(bench) => bench.run(),
             What::Report(bench) => bench.run(),
         }

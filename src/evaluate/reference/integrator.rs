@@ -25,7 +25,7 @@ const ABOVE_WHITE: f64 = 0.05;
 #[derive(Clone, Copy, Debug)]
 pub struct Point {
     /// Columns: x, the part of w_o orthogonal to n; y = z cross x; z = n.
-    frame: DMat3,
+    pub(super) frame: DMat3,
     /// Towards the eye, in that frame; at most [`MAX_THETA_O_DEG`] from z.
     w_o: DVec3,
     /// Index of the material.
@@ -140,8 +140,11 @@ impl<'a> Integrator<'a> {
         let mut cubature = Cubature::new(&self.light, f_cos, must_split);
         let scale = self.intensity / self.subpixels as f64;
         for split in 1.. {
-            let radiance = scale * cubature.integral;
-            let radiance_error = scale * ERROR_LEFT * cubature.squares.map(f64::sqrt);
+            // Polynomials may swing below zero, which radiance never is: by so much the estimate is wrong, whatever its cells say. A display
+            // shows no difference between that and black.
+            let estimate = scale * cubature.integral;
+            let radiance = estimate.max(DVec3::ZERO);
+            let radiance_error = (scale * ERROR_LEFT * cubature.squares.map(f64::sqrt)).max(-estimate);
             let channel = |i: usize| display.error(radiance[i], radiance_error[i]);
             let display_error = DVec3::from_array([0, 1, 2].map(channel));
             // A channel matters as much as its error is seen.

@@ -9,7 +9,7 @@ use crate::passes::View;
 use crate::prepare::Prepared;
 
 /// Changes whenever the same question gets another answer.
-const VERSION: u32 = 4;
+const VERSION: u32 = 5;
 
 /// Integrates equation (1) for every pixel of a picture.
 pub struct Integrate<'a> {

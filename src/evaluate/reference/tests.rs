@@ -1,7 +1,7 @@
 //! The reference against closed forms, the albedo, and itself at more points.
 use std::f64::consts::{FRAC_1_PI, PI, TAU};
 
-use glam::{DVec3, dvec3};
+use glam::{DQuat, DVec2, DVec3, dvec3};
 
 use super::*;
 use crate::brdf::Brdf;
@@ -68,6 +68,35 @@ fn a_white_furnace_gives_the_albedo_of_every_model_at_every_angle() {
                 brdf.model()
             );
         }
+    }
+}
+
+#[test]
+fn a_lamp_of_1e5_is_found_in_the_flank_of_a_lobe() {
+    // Polynomials through the flank swing below zero, which beside such a lamp outweighs all else; displays show that as black.
+    let map = environment(256, 128, |column, row| if (column, row) == (80, 50) { [1e5; 3] } else { [0.0; 3] });
+    let brdf = brdf("conductor", "distribution = 'beckmann'\nalpha = 0.1\neta = 0.2\nk = 3.9");
+    let integrator = Integrator::new(&map, 1.0, [&brdf], 1);
+    for i in 0..500 {
+        // Normals and views all around.
+        let u = |step: f64| (f64::from(i) * step).fract();
+        let z = 1.0 - 2.0 * u(0.618_033_988);
+        let normal = (DVec2::from_angle(TAU * u(0.754_877_666)) * (1.0 - z * z).sqrt()).extend(z);
+        let tilt = DQuat::from_axis_angle(normal.any_orthonormal_vector(), 1.5 * u(0.569_840_291));
+        let w_o = DQuat::from_axis_angle(normal, TAU * u(0.331)) * (tilt * normal);
+        let found = integrator.pixel(&[Point::new(normal, w_o, 0)], TOLERANCE, DISPLAY).radiance.y;
+        // The lamp is a tent of two pixels; midpoints over it.
+        let to_local = Point::new(normal, w_o, 0).frame.transpose();
+        let (mut exact, steps) = (0.0, 24);
+        for (i, j) in (0..steps).flat_map(|i| (0..steps).map(move |j| (i, j))) {
+            let [x, y] = [i, j].map(|step| 2.0 * (f64::from(step) + 0.5) / f64::from(steps) - 1.0);
+            let solid_angle = (2.0 * PI / 128.0 / f64::from(steps)).powi(2) * (PI * (50.5 + y) / 128.0).sin();
+            let w_i = to_local * map.direction(80.0 + x, 50.0 + y);
+            let tent = (1.0 - x.abs()) * (1.0 - y.abs()) * 1e5;
+            exact += tent * brdf.evaluate(w_i, to_local * w_o).y * w_i.z.max(0.0) * solid_angle;
+        }
+        let [shown, expected] = [found, exact].map(|radiance| DISPLAY.value(radiance));
+        assert!((shown - expected).abs() < 0.01, "{i}: {found}, not {exact}");
     }
 }
 

@@ -1,0 +1,64 @@
+//! `threadlight bench stress`: hard cases, and whether the device shades them as the CPU does.
+use super::arguments::write_json;
+use crate::cli::progress::TerminalProgress;
+use crate::cli::scene_flags::MachineFlags;
+use std::io::Write;
+use std::path::PathBuf;
+use threadlight::Error;
+use threadlight::low_level::evaluate::stress::{self, Stressed};
+use threadlight::low_level::evaluate::tables;
+use threadlight::low_level::memo::Memo;
+use threadlight::low_level::output;
+use threadlight::low_level::vulkan::{Device, Instance};
+
+const EXAMPLES: &str = "\
+Examples:
+  threadlight bench stress
+  threadlight bench stress --device swiftshader --json stress.json
+
+Materials, light and views at the ends of what they may be, by fitted threads and by the paper's: 8 of them, 64 x 48 pixels.
+Each pixel is compared with the CPU's form of the method, given the same surface. The exit code is 1 where a pixel is NaN or
+infinite, or the RMS is above its bound.
+
+The JSON is a list of rows with these fields, in this order:
+  case, method            what was shaded
+  covered                 pixels that see a surface
+  not_finite              pixels that are NaN or infinite
+  rms, most               of the other ones, relative to the largest of their radiance, the picture's
+                          mean, and a millionth of the light's maximum";
+
+/// Shades hard cases and compares with the CPU; fails where a bound is broken.
+#[derive(clap::Args)]
+#[command(after_help = EXAMPLES)]
+pub struct BenchStress {
+    #[command(flatten)]
+    machine: MachineFlags,
+    /// Write all measurements as JSON.
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
+
+impl BenchStress {
+    pub fn run(self) -> anyhow::Result<()> {
+        self.json.as_deref().map_or(Ok(()), output::check_writable)?;
+        let instance = Instance::new(self.machine.validate).map_err(Error::from)?;
+        let messages = instance.messages();
+        let device = Device::new(&instance, self.machine.device.as_deref()).map_err(Error::from)?;
+        drop(instance);
+        let progress = TerminalProgress::of("bench stress", "cases")?;
+        let mut found = Vec::new();
+        let result = stress::run(&device, &Memo::new(self.machine.cache().as_deref()), &progress, &mut found);
+        drop(device);
+        progress.finish();
+        if !found.is_empty() {
+            write!(std::io::stdout().lock(), "{}", tables::text(&[stress::tables(&found)]))?;
+            write_json(self.json.as_deref(), &found)?;
+        }
+        result?;
+        let broken = found.iter().filter(|case: &&Stressed| case.is_broken()).count();
+        anyhow::ensure!(broken == 0, "bench stress: {broken} of {} cases break a bound", found.len());
+        let messages = messages.all();
+        anyhow::ensure!(messages.is_empty(), "validation: {} messages, the first: {}", messages.len(), messages[0]);
+        Ok(())
+    }
+}

@@ -1,0 +1,101 @@
+//! Calls that fail on purpose, for tests: whatever Vulkan refuses, nothing is left behind. And a hazard that has to be seen.
+use ash::vk;
+use std::cell::{Cell, RefCell};
+
+thread_local! {
+    /// Names of the calls that this thread has made.
+    static MADE: RefCell<Vec<&'static str>> = const { RefCell::new(Vec::new()) };
+    /// Which of them fails.
+    static FAILING: Cell<Option<usize>> = const { Cell::new(None) };
+}
+
+/// Called before each call: an error for the one that is to fail.
+pub(super) fn before(name: &'static str) -> ash::prelude::VkResult<()> {
+    let index = MADE.with_borrow_mut(|made| {
+        made.push(name);
+        made.len() - 1
+    });
+    if FAILING.get() == Some(index) { Err(vk::Result::ERROR_OUT_OF_DEVICE_MEMORY) } else { Ok(()) }
+}
+
+/// The calls that `act` makes on this thread, of which the one at index `failing` fails.
+fn with_fault<T>(failing: Option<usize>, act: impl FnOnce() -> T) -> (T, Vec<&'static str>) {
+    MADE.take();
+    FAILING.set(failing);
+    let result = act();
+    FAILING.set(None);
+    (result, MADE.take())
+}
+
+mod tests {
+    use super::super::*;
+    use super::with_fault;
+    use std::sync::Arc;
+
+    fn open(messages: &mut Messages) -> Result<Arc<Device>, VulkanError> {
+        let instance = Instance::new(true)?;
+        *messages = instance.messages();
+        Device::new(&instance, std::env::var("THREADLIGHT_TEST_DEVICE").ok().as_deref())
+    }
+
+    /// Makes one of each kind of object, and records and submits.
+    fn use_everything(messages: &mut Messages) -> Result<(), VulkanError> {
+        let device = open(messages)?;
+        let cache = PipelineCache::new(&device, None)?;
+        let compute = ComputePipeline::new(&device, &cache, &compiled::TONE_MAP, &[])?;
+        let state = GraphicsState {
+            attributes: &[(ash::vk::Format::R32G32B32_SFLOAT, 12)],
+            colors: &[ash::vk::Format::R16G16B16A16_SFLOAT],
+            depth: ash::vk::Format::D32_SFLOAT,
+        };
+        let (vertex, fragment) = (&compiled::CUBE_BORDERS_VERT, &compiled::CUBE_BORDERS_FRAG);
+        let graphics = GraphicsPipeline::new(&device, &cache, vertex, fragment, &state)?;
+        let shape = ImageShape::plane(ash::vk::Format::R8G8B8A8_UNORM, 2, 2);
+        let image = Image::with_texels(&device, "image", shape, &[vec![1; 16]])?;
+        let sampler = Sampler::new(&device, "sampler", SamplerKind::Trilinear)?;
+        let buffer = Buffer::with_contents(&device, "buffer", ash::vk::BufferUsageFlags::STORAGE_BUFFER, &[1; 16])?;
+        let mut frames = Frames::new(&device, "frames", 2)?;
+        frames.record(|commands| commands.timed_pass("nothing", |_| Ok::<_, VulkanError>(())))?;
+        frames.pass_times()?;
+        drop((compute, graphics, image, sampler, buffer));
+        Ok(())
+    }
+
+    #[test]
+    fn whichever_call_fails_it_is_named_and_nothing_is_left() {
+        let mut messages = Messages::default();
+        let (result, calls) = with_fault(None, || use_everything(&mut messages));
+        result.expect("no call fails");
+        for name in ["vkCreateInstance", "vkCreateDevice", "vkCreateSemaphore", "vkAllocateMemory", "vkQueueSubmit2"] {
+            assert!(calls.contains(&name), "{name} is not among {calls:?}");
+        }
+        for (failing, name) in calls.iter().enumerate() {
+            let mut messages = Messages::default();
+            let (result, _) = with_fault(Some(failing), || use_everything(&mut messages));
+            let error = result.expect_err("a call fails").to_string();
+            assert!(error.contains(name), "{failing}, {name}: {error}");
+            assert_eq!(messages.all(), Vec::<String>::new(), "call {failing}, {name}");
+        }
+        println!("{} calls: {calls:?}", calls.len());
+    }
+
+    #[test]
+    fn a_planted_hazard_is_seen() {
+        let mut messages = Messages::default();
+        let device = open(&mut messages).expect("a device");
+        let make = |name| {
+            let usage = ash::vk::BufferUsageFlags::TRANSFER_SRC | ash::vk::BufferUsageFlags::TRANSFER_DST;
+            Buffer::new(&device, name, 64, usage, BufferUse::Device).expect("a buffer")
+        };
+        let (source, target) = (make("source"), make("target"));
+        let mut frames = Frames::new(&device, "frames", 1).expect("frames");
+        // One copy is no hazard; two without a barrier between them are.
+        for (copies, is_hazard) in [(1, false), (2, true)] {
+            let copy = |commands: &mut Commands| (0..copies).try_for_each(|_| commands.copy_buffer(&source, &target));
+            frames.record(copy).expect("a submission");
+            frames.wait().expect("the end");
+            let seen = messages.all();
+            assert_eq!(seen.iter().any(|message| message.contains("HAZARD")), is_hazard, "{copies} copies: {seen:?}");
+        }
+    }
+}
