@@ -5,8 +5,8 @@ use crate::memo::{Key, Keyed, Memo, Round, Step};
 use crate::method::Method;
 use crate::passes::{PlacedMesh, Sampling, View};
 use crate::scene::{Camera, MaterialSource, Mesh, Scene};
-use crate::steps::{DraftThreads, FitThreads, LoadEnvironment, LoadMaterial, LoadMesh};
-use crate::threads::{ThreadSets, ThreadSettings, Threads, WithThreads};
+use crate::steps::{DraftThreads, FitTargets, FitThreads, LoadEnvironment, LoadMaterial, LoadMesh};
+use crate::threads::{ThreadKind, ThreadSets, ThreadSettings, Threads, WithThreads};
 use crate::{Error, Result};
 use glam::{DAffine3, DVec3};
 use std::cell::Cell;
@@ -67,8 +67,26 @@ pub fn ask_threads(
     sampling: Sampling,
     subpixels: u32,
 ) -> Result<Option<ThreadSets<Keyed<Threads>>>> {
-    let sets = thread_settings(method, sampling, subpixels);
-    sets.map(|sets| sets.try_map(|settings| round.ask(&FitThreads { brdf, settings }))).transpose()
+    let Some(settings) = thread_settings(method, sampling, subpixels) else { return Ok(None) };
+    if let Some(known) = known_threads(round, brdf, settings)? {
+        return Ok(Some(known));
+    }
+    // What both sets are fitted to is made once, and let go.
+    let on_the_way = round.memo().round(round.observer());
+    if method.threads() == Some(ThreadKind::Fitted) {
+        on_the_way.ask(&FitTargets::new(brdf, &settings.pixel))?;
+    }
+    settings.try_map(|settings| round.ask(&FitThreads { brdf, settings })).map(Some)
+}
+
+/// These threads, if they were made before.
+fn known_threads(
+    round: &Round,
+    brdf: &Keyed<Brdf>,
+    settings: ThreadSets<ThreadSettings>,
+) -> Result<Option<ThreadSets<Keyed<Threads>>>> {
+    let ThreadSets { pixel, subpixel } = settings.try_map(|settings| round.known(&FitThreads { brdf, settings }))?;
+    Ok(pixel.zip(subpixel).map(|(pixel, subpixel)| ThreadSets { pixel, subpixel }))
 }
 
 /// Which threads `method` shades by, if it does.
@@ -120,9 +138,8 @@ pub fn prepare_draft(scene: &Scene, before: &Prepared, round: &Round) -> Result<
     let subpixels = scene.image.subpixels;
     let ask = |method, name: &str, brdf: &Keyed<Brdf>, sampling| {
         let Some(settings) = thread_settings(method, sampling, subpixels) else { return Ok(None) };
-        let finished = settings.try_map(|settings| round.known(&FitThreads { brdf, settings }))?;
-        if let ThreadSets { pixel: Some(pixel), subpixel: Some(subpixel) } = finished {
-            return Ok(Some(ThreadSets { pixel, subpixel }));
+        if let Some(finished) = known_threads(round, brdf, settings)? {
+            return Ok(Some(finished));
         }
         let mut shown =
             before.materials.iter().filter(|shown| shown.name == name && shown.brdf.model() == brdf.model());

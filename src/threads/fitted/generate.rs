@@ -2,6 +2,7 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use glam::{DVec3, dvec3};
+use rayon::prelude::*;
 
 use super::cells::cells;
 use super::kernel::{Kernel, scale_rad};
@@ -9,7 +10,7 @@ use super::lights::{Quadrature, TestLights};
 use super::solve::{Effort, Fit};
 use super::table::FittedTable;
 use crate::brdf::Brdf;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::progress::Observer;
 use crate::threads::slice::{Resolution, Slice};
 use crate::threads::{ThreadSettings, theta_o};
@@ -26,9 +27,10 @@ const LIGHTS_SEED: usize = 0;
 const TIED: f64 = 1e-6;
 
 /// Test lights of a row: so many, and so many more for each thread. Of too few, many threads answer each alone and err between them: with
-/// 64 threads 1536 lights leave a tenth less error than 1200.
+/// 64 threads 1536 lights leave a tenth less error than 1200. Up to 16 threads have the same lights, which are made once for all of them.
 const FEWEST_LIGHTS: usize = 1000;
 const LIGHTS_A_THREAD: usize = 8;
+const FEWEST_THREADS: usize = 16;
 
 /// Kernels narrower than this, in radians, stay where a facet mirrors the view to; wider ones stay where they are.
 const FOLLOWS_BELOW_RAD: f64 = 0.15;
@@ -39,38 +41,75 @@ pub(super) type Row = (Vec<Kernel>, DVec3, f64);
 /// A row that has been fitted, and its number; none for the first one.
 pub(super) type Neighbour<'a> = Option<(usize, &'a Row)>;
 
+/// What threads of a BRDF are fitted to: lights, and what it makes of them, in each row.
+pub struct Targets {
+    /// The lights and the albedo.
+    rows: Vec<(TestLights, DVec3)>,
+}
+
+/// How many lights there are in a row for so many threads.
+pub fn light_count(threads: usize) -> usize {
+    FEWEST_LIGHTS + LIGHTS_A_THREAD * threads.max(FEWEST_THREADS)
+}
+
+impl Targets {
+    /// Of `rows` rows with about `lights` lights each. 3 MB for 90 rows and 1128 lights.
+    ///
+    /// # Errors
+    /// Cancelled by `observer` (noticed within a row).
+    pub fn new(brdf: &Brdf, rows: usize, lights: usize, observer: &dyn Observer) -> Result<Self> {
+        let target = |row: usize| -> Result<(TestLights, DVec3)> {
+            observer.check()?;
+            let slices = Slice::with_lobes(brdf, theta_o(row, rows), Resolution::FULL);
+            Ok((TestLights::new(&slices, lights, LIGHTS_SEED, Quadrature::FIT), slices[0].albedo()))
+        };
+        let targets = (0..rows).into_par_iter().map(target).collect::<Result<_>>()?;
+        Ok(Self { rows: targets })
+    }
+}
+
 /// Fits `settings.count` threads to `brdf`, the same to the last bit on any number of cores.
 ///
 /// # Errors
 /// No or too many threads, no rows, or cancelled by `observer` (noticed within a step of a row).
 pub fn generate(brdf: &Brdf, settings: &ThreadSettings, observer: &dyn Observer) -> Result<FittedTable> {
     settings.check()?;
+    let targets = Targets::new(brdf, settings.rows, light_count(settings.count), observer)?;
+    generate_for(brdf, &targets, settings, observer)
+}
+
+/// [`generate`] for `targets` of `brdf` that are at hand: [`light_count`] lights in each of the rows of `settings`.
+///
+/// # Errors
+/// Those of [`generate`].
+pub fn generate_for(
+    brdf: &Brdf,
+    targets: &Targets,
+    settings: &ThreadSettings,
+    observer: &dyn Observer,
+) -> Result<FittedTable> {
+    settings.check()?;
     let rows = settings.rows;
     let done = AtomicUsize::new(0);
     let fit = |row: usize, from: Neighbour| -> Result<Row> {
-        if observer.cancelled() {
-            return Err(Error::Cancelled);
-        }
-        let slices = Slice::with_lobes(brdf, theta_o(row, rows), Resolution::FULL);
-        let [slice, lobes] = &slices;
-        let lights =
-            TestLights::new(&slices, FEWEST_LIGHTS + LIGHTS_A_THREAD * settings.count, LIGHTS_SEED, Quadrature::FIT);
-        if observer.cancelled() {
-            return Err(Error::Cancelled);
-        }
+        observer.check()?;
+        let (lights, albedo) = &targets.rows[row];
         let (start, effort) = match from {
             Some((before, (kernels, ..))) => (carried(kernels, theta_o(before, rows), theta_o(row, rows)), NEXT),
-            None => (cells(lobes, settings.count), FIRST),
+            None => {
+                let [_, lobes] = Slice::with_lobes(brdf, theta_o(row, rows), Resolution::FULL);
+                (cells(&lobes, settings.count), FIRST)
+            }
         };
         let start = scaled(&start, 1.0 / lights.unit);
         let mut kernels = start.clone();
-        let fit = Fit::new(&lights, slice.albedo() / lights.unit);
+        let fit = Fit::new(lights, *albedo / lights.unit);
         let fit = if from.is_some() { fit.tied(&start, TIED) } else { fit };
         fit.solve(&mut kernels, effort, observer)?;
         let error = fit.relative_error(&kernels);
         let kernels = scaled(&kernels, lights.unit);
         observer.progress(done.fetch_add(1, Ordering::Relaxed) + 1, rows);
-        Ok((kernels, slice.albedo(), error))
+        Ok((kernels, *albedo, error))
     };
     Ok(FittedTable::pack(&from_the_middle(rows, &fit)?))
 }

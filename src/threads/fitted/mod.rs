@@ -24,7 +24,7 @@ mod tests;
 mod validate;
 
 pub use draft::draft;
-pub use generate::generate;
+pub use generate::{Targets, generate, generate_for, light_count};
 pub use table::{FittedTable, PackedKernel, UnpackedKernel};
 pub use validate::validation_error;
 
