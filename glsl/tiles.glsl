@@ -8,8 +8,8 @@
 const uint TILE_SIDE = 8u;
 const uint TILE_PIXELS = TILE_SIDE * TILE_SIDE;
 
-// Interior pixels see one smooth surface in all their sub-pixels and share one sum over the threads;
-// edge pixels do not, and sum over all threads in each covered sub-pixel.
+// Interior pixels see one smooth surface in all their sub-pixels, which share one sum or share its samples out;
+// in edge pixels each covered sub-pixel is a sum of its own.
 const uint INTERIOR = 0u;
 const uint EDGE = 1u;
 

@@ -8,6 +8,7 @@ use threadlight::low_level::brdf::{Brdf, Custom, CustomBrdf};
 use threadlight::low_level::evaluate::{Comparable, Display, compare};
 use threadlight::low_level::geometry_texel::GeometryTexel;
 use threadlight::low_level::memo::{Key, Keyed, Memo};
+use threadlight::low_level::passes::Counters;
 use threadlight::low_level::prepare::Prepared;
 use threadlight::low_level::scene::{Camera, MaterialSource, Scene, Source};
 use threadlight::low_level::shading;
@@ -253,6 +254,20 @@ fn the_split_sum_of_a_metal_is_its_albedos_times_light_weighted_by_ggx_and_by_th
         compared += 1;
     }
     assert!(compared > 10, "{compared}");
+    gpu.finish();
+}
+
+#[test]
+fn a_diffuse_material_has_one_lookup_a_surface_whatever_the_number_of_threads() {
+    let gpu = Validated::new();
+    for threads in [1, 16, 64] {
+        let mut scene = sphere(model("model = 'lambert'\nreflectance = [0.8, 0.4, 0.1]"), "sky", threads, (80, 60));
+        scene.shading.method = "fitted".to_owned();
+        let rendering = gpu.render(&ready(&scene), EVERYTHING);
+        let Counters { interior_pixels, covered_edge_subpixels, .. } = rendering.counters;
+        assert!(interior_pixels > 0 && covered_edge_subpixels > 0);
+        assert_eq!(rendering.lookups, u64::from(interior_pixels + covered_edge_subpixels), "{threads} threads");
+    }
     gpu.finish();
 }
 

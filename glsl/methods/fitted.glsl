@@ -165,7 +165,7 @@ vec3 estimate(Surface surface, Material material, ThreadSet set) {
         } while (++k < set.sharp_count);
     }
     k = 0;
-    if (HAS_MIRRORED_SOURCES != 0 && of_kernels > 0.0) {
+    if (HAS_MIRRORED_SOURCES != 0 && of_kernels > 0.0 && set.count > 0) {
         do {
             Kernel kernel = kernel_at(rows, k, surface);
             float blurred = HAS_SHARP_KERNELS != 0 ? 1.0 - sharp_part(kernel.level) : 1.0;

@@ -57,7 +57,7 @@ pub struct Stats<'a> {
     covered_subpixels: u32,
     /// Pixels that share one sum over the threads among their sub-pixels.
     interior_pixels: u32,
-    /// Pixels that sum over all threads in each covered sub-pixel.
+    /// Pixels in which each covered sub-pixel is a sum of its own.
     edge_pixels: u32,
     /// Lookups in the environment that shading made.
     lookups: u64,

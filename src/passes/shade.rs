@@ -125,7 +125,7 @@ struct ThreadWords {
 
 impl ThreadWords {
     fn add(&mut self, threads: &Threads) -> ThreadSetRecord {
-        let [row_count, count] = threads.size().map(|size| size as u32);
+        let (row_count, count) = (threads.size()[0] as u32, threads.device_count() as u32);
         let first = (self.words.len() / threads.device_element_words()) as u32;
         self.words.extend(threads.device_words());
         let sharp_count = threads.fitted().zip(self.finest_level).map(|(table, level)| table.sharp_count(level));

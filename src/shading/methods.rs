@@ -13,7 +13,7 @@ methods! {
     },
     split_sum => SplitSum: Properties {
         shares_surface: true,
-        ..Properties::biased("The split sum of engines (Karis 2013): the light filtered by the GGX nearest to the BRDF, times the BRDF's albedo.", PREFILTERED)
+        ..Properties::biased("The split sum of engines (Karis 2013): the light filtered by the GGX that suits the BRDF best, times the BRDF's albedo.", PREFILTERED)
     },
     uniform => Uniform: Properties::unbiased("Monte Carlo, uniform over the hemisphere.", MAP),
     cosine => Cosine: Properties::unbiased("Monte Carlo, by the cosine to the normal.", MAP),

@@ -154,6 +154,14 @@ impl Threads {
         }
     }
 
+    /// How many threads of a row that buffer holds: all but those that have no weight.
+    pub fn device_count(&self) -> usize {
+        match self {
+            Self::Fitted(table) => table.used_count(),
+            Self::Paper(table) => table.count,
+        }
+    }
+
     /// Words of an element of that buffer, as the shader declares it.
     pub fn device_element_words(&self) -> usize {
         match self {

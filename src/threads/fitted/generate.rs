@@ -32,6 +32,10 @@ const FEWEST_LIGHTS: usize = 1000;
 const LIGHTS_A_THREAD: usize = 8;
 const FEWEST_THREADS: usize = 16;
 
+/// What a BRDF differs from a diffuse one by at least, relative to the radiance: less is that of the lights' few points, and kernels would be
+/// fitted to it.
+const LEAST_ERROR: f64 = 3e-3;
+
 /// Kernels narrower than this, in radians, stay where a facet mirrors the view to; wider ones stay where they are.
 const FOLLOWS_BELOW_RAD: f64 = 0.15;
 
@@ -63,8 +67,14 @@ impl Targets {
             let slices = Slice::with_lobes(brdf, theta_o(row, rows), Resolution::FULL);
             Ok((TestLights::new(&slices, lights, LIGHTS_SEED, Quadrature::FIT), slices[0].albedo()))
         };
-        let targets = (0..rows).into_par_iter().map(target).collect::<Result<_>>()?;
-        Ok(Self { rows: targets })
+        Ok(Self { rows: (0..rows).into_par_iter().map(target).collect::<Result<_>>()? })
+    }
+
+    /// Whether the cosine kernel alone does in all rows.
+    fn are_diffuse(&self) -> bool {
+        let error =
+            |(lights, albedo): &(TestLights, DVec3)| Fit::new(lights, *albedo / lights.unit).relative_error(&[]);
+        self.rows.par_iter().all(|row| error(row) < LEAST_ERROR)
     }
 }
 
@@ -111,7 +121,12 @@ pub fn generate_for(
         observer.progress(done.fetch_add(1, Ordering::Relaxed) + 1, rows);
         Ok((kernels, *albedo, error))
     };
-    Ok(FittedTable::pack(&from_the_middle(rows, &fit)?))
+    let mut fitted = from_the_middle(rows, &fit)?;
+    if targets.are_diffuse() {
+        // Where kernels are is kept, for drafts to start from.
+        fitted.iter_mut().for_each(|(kernels, ..)| *kernels = scaled(kernels, 0.0));
+    }
+    Ok(FittedTable::pack(&fitted))
 }
 
 /// `fit` of each of `count` rows: of the middle one, then of the others one after the other outwards, each with the number of its neighbour

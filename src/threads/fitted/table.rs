@@ -101,28 +101,35 @@ impl FittedTable {
         if weights > 0.0 { (squares / weights).sqrt() } else { self.relative_error.first().copied().unwrap_or(0.0) }
     }
 
-    /// The sharpest level that each thread has in any row.
-    fn sharpest_levels(&self) -> Vec<f32> {
-        let levels = |thread| self.kernels.iter().skip(thread).step_by(self.count).map(|kernel| kernel.unpack().level);
-        (0..self.count).map(|thread| levels(thread).fold(f32::INFINITY, f32::min)).collect()
+    /// The threads that have weight in some row, with the sharpest level that they have in any; the sharpest first. A diffuse material has
+    /// none.
+    fn used(&self) -> Vec<(usize, f32)> {
+        let kernels = |thread| self.kernels.iter().skip(thread).step_by(self.count).map(|kernel| kernel.unpack());
+        let has_weight = |&thread: &usize| kernels(thread).any(|kernel| kernel.weight.max_element() > 0.0);
+        let sharpest = |thread| kernels(thread).map(|kernel| kernel.level).fold(f32::INFINITY, f32::min);
+        let mut used: Vec<_> = (0..self.count).filter(has_weight).map(|thread| (thread, sharpest(thread))).collect();
+        used.sort_by(|(_, a), (_, b)| a.total_cmp(b));
+        used
     }
 
-    /// How many threads are sharper than `level` in some row: the first ones on the device.
+    /// How many threads there are on the device: those that have weight in some row.
+    pub fn used_count(&self) -> usize {
+        self.used().len()
+    }
+
+    /// How many of them are sharper than `level` in some row: the first ones.
     pub fn sharp_count(&self, level: f32) -> usize {
-        self.sharpest_levels().into_iter().filter(|&sharpest| sharpest < level).count()
+        self.used().into_iter().filter(|&(_, sharpest)| sharpest < level).count()
     }
 
     /// Words of an element of the shader's buffer: its array is of words.
     pub(in super::super) const DEVICE_ELEMENT_WORDS: usize = 1;
 
-    /// The buffer of the shader. Row by row: the cosine part, then the kernels, those of threads that are sharp anywhere first.
+    /// The buffer of the shader. Row by row: the cosine part, then the kernels that are used, those of threads that are sharp anywhere first.
     pub fn device_words(&self) -> Vec<u32> {
-        let levels = self.sharpest_levels();
-        let mut order: Vec<usize> = (0..self.count).collect();
-        order.sort_by(|&a, &b| levels[a].total_cmp(&levels[b]));
-        let order = &order;
+        let used = &self.used();
         let row = |(row, cosine_part): (usize, &[f32; 3])| {
-            let kernels = order.iter().map(move |&thread| self.row(row)[thread].0);
+            let kernels = used.iter().map(move |&(thread, _)| self.row(row)[thread].0);
             std::iter::once(cosine_part.map(f32::to_bits)).chain(kernels)
         };
         self.cosine_part.iter().enumerate().flat_map(row).flatten().collect()
