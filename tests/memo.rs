@@ -24,7 +24,9 @@ fn ask(gpu: &Validated, scene: &Scene) -> (DeviceScene, Vec<&'static str>) {
 #[test]
 fn each_change_makes_what_it_needs_and_nothing_else() {
     let gpu = Validated::new();
-    let before = small();
+    let mut before = small();
+    // Of a material with a lobe, which has kernels.
+    before.materials[0].source = MaterialSource::Builtin("red-plastic".into());
     let (renderer, made) = ask(&gpu, &before);
     assert!(
         ["mesh", "material", "threads", "environment", "shaders"].iter().all(|step| made.contains(step)),
