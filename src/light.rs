@@ -65,9 +65,8 @@ impl KernelNeeds {
             sources.iter().any(|source| clearance(0.0, source.width_rad() as f32, lobe_width) < CLEAR[1])
         };
         let is_sharp = |threads: Option<ThreadSets<&Threads>>| {
-            let tables = threads.into_iter().flat_map(ThreadSets::both).filter_map(Threads::fitted);
-            let mut tables = tables;
-            tables.any(|table| table.sharp_count(finest_level) > 0)
+            let threads = threads.into_iter().flat_map(ThreadSets::both);
+            threads.filter_map(Threads::fitted).any(|table| table.sharp_count(finest_level) > 0)
         };
         Self {
             map: materials.iter().any(|(_, threads)| is_sharp(*threads)),

@@ -6,6 +6,7 @@ use crate::method::Method;
 use crate::passes::{PlacedMesh, Sampling, View};
 use crate::scene::{Camera, MaterialSource, Mesh, Scene};
 use crate::steps::{DraftThreads, FitTargets, FitThreads, LoadEnvironment, LoadMaterial, LoadMesh};
+use crate::threads::fitted::light_count;
 use crate::threads::{ThreadKind, ThreadSets, ThreadSettings, Threads, WithThreads};
 use crate::{Error, Result};
 use glam::{DAffine3, DVec3};
@@ -71,9 +72,10 @@ pub fn ask_threads(
     if let Some(known) = known_threads(round, brdf, settings)? {
         return Ok(Some(known));
     }
-    // What both sets are fitted to is made once, and let go.
+    // What both sets are fitted to is made once, and let go. Of other numbers of lights each makes its own, if it has to be made.
     let on_the_way = round.memo().round(round.observer());
-    if method.threads() == Some(ThreadKind::Fitted) {
+    let [lights, of_subpixel] = settings.map(|settings| light_count(settings.count)).both();
+    if method.threads() == Some(ThreadKind::Fitted) && lights == of_subpixel {
         on_the_way.ask(&FitTargets::new(brdf, &settings.pixel))?;
     }
     settings.try_map(|settings| round.ask(&FitThreads { brdf, settings })).map(Some)
