@@ -4,38 +4,44 @@
 
 const float DISTRIBUTION_BECKMANN = 1.0; // else GGX
 
+// w by the axes of a roughness: alpha_x, alpha_y, cosine and sine of their rotation. Below, directions are by these and alpha is along both.
+vec3 to_axes(vec4 roughness, vec3 w) {
+    return vec3(roughness.z * w.x + roughness.w * w.y, roughness.z * w.y - roughness.w * w.x, w.z);
+}
+
 // D(h) in 1/sr.
-float microfacet_density(float distribution, vec3 h, float alpha) {
-    float alpha2 = alpha * alpha;
+float microfacet_density(float distribution, vec3 h, vec2 alpha) {
     // sin^2 from x and y, not 1 - cos^2, which loses all digits in a narrow lobe.
-    float sin2 = dot(h.xy, h.xy);
+    vec2 scaled = h.xy / alpha;
+    float sin2_alpha2 = dot(scaled, scaled);
     float cos2 = h.z * h.z;
     if (distribution == DISTRIBUTION_BECKMANN) {
-        float exponent = sin2 / (cos2 * alpha2);
+        float exponent = sin2_alpha2 / cos2;
         // e^-80 is about the smallest float; beyond, 0 / 0 threatens at grazing h.
-        return exponent < 80.0 ? exp(-exponent) * 0.318309886 / (alpha2 * cos2 * cos2) : 0.0;
+        return exponent < 80.0 ? exp(-exponent) * 0.318309886 / (alpha.x * alpha.y * cos2 * cos2) : 0.0;
     }
-    float denominator = alpha2 * cos2 + sin2;
-    // Two divisions: the square alone would underflow for the narrowest lobes.
-    return 0.318309886 * (alpha2 / denominator) / denominator;
+    // At most a million: its square times alpha_x alpha_y, no less than a millionth, is in range.
+    float denominator = cos2 + sin2_alpha2;
+    return 0.318309886 / (alpha.x * alpha.y * denominator * denominator);
 }
 
 // Smith's G1 / cos(theta), finite at grazing angles.
-float g1_over_cos(float distribution, float cos_theta, float alpha) {
-    float sin2 = max(1.0 - cos_theta * cos_theta, 0.0);
+float g1_over_cos(float distribution, vec3 w, vec2 alpha) {
+    vec2 projected = alpha * w.xy;
+    float alpha2_sin2 = dot(projected, projected);
     if (distribution == DISTRIBUTION_BECKMANN) {
-        float alpha_sin = alpha * sqrt(sin2);
-        if (cos_theta >= 1.6 * alpha_sin) return 1.0 / cos_theta;
-        float a = cos_theta / alpha_sin;
+        float alpha_sin = sqrt(alpha2_sin2);
+        if (w.z >= 1.6 * alpha_sin) return 1.0 / w.z;
+        float a = w.z / alpha_sin;
         return (3.535 + 2.181 * a) / (1.0 + a * (2.276 + 2.577 * a)) / alpha_sin;
     }
-    return 2.0 / (cos_theta + sqrt(alpha * alpha * sin2 + cos_theta * cos_theta));
+    return 2.0 / (w.z + sqrt(alpha2_sin2 + w.z * w.z));
 }
 
 // D G / (4 cos_theta_i cos_theta_o) in 1/sr.
-float torrance_sparrow(float distribution, vec3 w_i, vec3 w_o, vec3 h, float alpha) {
-    return 0.25 * microfacet_density(distribution, h, alpha) * g1_over_cos(distribution, w_i.z, alpha)
-        * g1_over_cos(distribution, w_o.z, alpha);
+float torrance_sparrow(float distribution, vec3 w_i, vec3 w_o, vec3 h, vec2 alpha) {
+    return 0.25 * microfacet_density(distribution, h, alpha) * g1_over_cos(distribution, w_i, alpha)
+        * g1_over_cos(distribution, w_o, alpha);
 }
 
 // Exact unpolarised Fresnel reflectance of a conductor, per channel.

@@ -3,7 +3,7 @@ use glam::DVec3;
 
 use super::metals::index_of_refraction;
 use super::microfacet::{Distribution, fresnel_conductor};
-use super::{Model, Parameters, hash_numbers};
+use super::{Model, Parameters, Roughness, hash_numbers};
 use crate::error::Result;
 
 /// A rough metal surface.
@@ -11,8 +11,8 @@ use crate::error::Result;
 pub struct Conductor {
     /// Distribution of microfacet normals.
     pub distribution: Distribution,
-    /// Its roughness_alpha, 0.001 to 1, not squared.
-    pub alpha: f64,
+    /// Its roughness_alpha along both axes, 0.001 to 1, not squared.
+    pub roughness: Roughness,
     /// Real part of the refractive index at the red, green and blue wavelengths.
     pub eta: DVec3,
     /// Imaginary part (extinction), not negative.
@@ -22,24 +22,27 @@ pub struct Conductor {
 impl Model for Conductor {
     fn evaluate(&self, w_i: DVec3, w_o: DVec3) -> DVec3 {
         let h = (w_i + w_o).normalize();
-        fresnel_conductor(w_o.dot(h), self.eta, self.k) * self.distribution.torrance_sparrow(w_i, w_o, h, self.alpha)
+        fresnel_conductor(w_o.dot(h), self.eta, self.k)
+            * self.distribution.torrance_sparrow(w_i, w_o, h, self.roughness)
     }
 
     fn from_parameters(parameters: &mut Parameters) -> Result<Self> {
-        let (distribution, alpha) = Distribution::from_parameters(parameters)?;
+        let (distribution, roughness) = Distribution::from_parameters(parameters)?;
         let (eta, k) = index_of_refraction(parameters)?;
-        Ok(Self { distribution, alpha, eta, k })
+        Ok(Self { distribution, roughness, eta, k })
     }
 
     fn gpu_parameters(&self) -> [f32; 12] {
         let mut packed = [0.0; 12];
-        packed[0..4].copy_from_slice(&self.eta.as_vec3().extend(self.alpha as f32).to_array());
+        packed[0..4].copy_from_slice(&self.eta.as_vec3().extend(0.0).to_array());
         packed[4..8].copy_from_slice(&self.k.as_vec3().extend(self.distribution.gpu_id()).to_array());
+        packed[8..12].copy_from_slice(&self.roughness.gpu_parameters());
         packed
     }
 
     fn hash_content(&self, hasher: &mut blake3::Hasher) {
-        hash_numbers(hasher, [f64::from(self.distribution.gpu_id()), self.alpha]);
+        hash_numbers(hasher, [f64::from(self.distribution.gpu_id())]);
+        self.roughness.hash_content(hasher);
         hash_numbers(hasher, self.eta.to_array());
         hash_numbers(hasher, self.k.to_array());
     }

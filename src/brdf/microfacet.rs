@@ -1,12 +1,13 @@
 //! Microfacet distributions, shadowing and Fresnel reflectance, shared by the models that are made of them.
 //!
 //! Walter et al., "Microfacet Models for Refraction through Rough Surfaces" (2007). roughness_alpha is used as it is, not
-//! squared, and masking-shadowing is separable, G = G1(w_i) G1(w_o). Twin: glsl/brdf/microfacet.glsl.
+//! squared, and masking-shadowing is separable, G = G1(w_i) G1(w_o). Anisotropic forms are those of Heitz, "Understanding the
+//! Masking-Shadowing Function in Microfacet-Based BRDFs" (2014). Twin: glsl/brdf/microfacet.glsl.
 use std::f64::consts::FRAC_1_PI;
 
 use glam::DVec3;
 
-use super::{Parameters, Spacing};
+use super::{Parameters, Roughness};
 use crate::error::Result;
 
 /// Shape of the distribution of microfacet normals.
@@ -19,14 +20,12 @@ pub enum Distribution {
 }
 
 impl Distribution {
-    /// Reads the keys `distribution` and `alpha`.
-    pub(super) fn from_parameters(parameters: &mut Parameters) -> Result<(Self, f64)> {
+    /// Reads the key `distribution` and those of a [`Roughness`].
+    pub(super) fn from_parameters(parameters: &mut Parameters) -> Result<(Self, Roughness)> {
         let choices = [("ggx", Distribution::Ggx), ("beckmann", Distribution::Beckmann)];
         let distribution = parameters.choice("distribution", &choices, "Distribution of the microfacets' normals.")?;
-        // Narrower than 0.001 (a lobe of 0.06 degrees) no quadrature of this project resolves it: that is a mirror.
         let help = "Roughness of the microfacets, used as it is, not squared: 0.01 is nearly a mirror.";
-        let alpha = parameters.number("alpha", 1e-3..=1.0, Spacing::Logarithmic, help)?;
-        Ok((distribution, alpha))
+        Ok((distribution, Roughness::from_parameters(parameters, help)?))
     }
 
     /// D(h) in 1/sr: density of microfacets with normal `h`; the integral of D (n . h) dh is 1. Walter eqs 25, 33.
@@ -46,6 +45,14 @@ impl Distribution {
                 if exponent < 700.0 { (-exponent).exp() * FRAC_1_PI / (alpha2 * cos2 * cos2) } else { 0.0 }
             }
         }
+    }
+
+    /// D(h) of facets that differ by azimuth: with the roughness of their slope towards h, D above times alpha^2 / (alpha_x alpha_y), which
+    /// is Heitz' 1 / (pi alpha_x alpha_y cos^4 (1 + tan^2 / alpha^2)^2) for GGX and e^(-tan^2 / alpha^2) / (pi alpha_x alpha_y cos^4) for Beckmann.
+    #[inline]
+    pub fn density_along_axes(self, h: DVec3, roughness: Roughness) -> f64 {
+        let alpha = roughness.of_slope_towards(h);
+        self.density(h, alpha) * (alpha * alpha / roughness.area())
     }
 
     /// Smith's G1(w) / cos(theta), finite at grazing angles. Walter eqs 34 (GGX) and 27 (Beckmann, his rational form).
@@ -68,8 +75,9 @@ impl Distribution {
 
     /// D G / (4 cos_theta_i cos_theta_o) in 1/sr: the BRDF of a rough mirror of reflectance 1. `h` is the half vector.
     #[inline]
-    pub fn torrance_sparrow(self, w_i: DVec3, w_o: DVec3, h: DVec3, alpha: f64) -> f64 {
-        0.25 * self.density(h, alpha) * self.g1_over_cos(w_i.z, alpha) * self.g1_over_cos(w_o.z, alpha)
+    pub fn torrance_sparrow(self, w_i: DVec3, w_o: DVec3, h: DVec3, roughness: Roughness) -> f64 {
+        let g1_over_cos = |w: DVec3| self.g1_over_cos(w.z, roughness.seen_along(w));
+        0.25 * self.density_along_axes(h, roughness) * g1_over_cos(w_i) * g1_over_cos(w_o)
     }
 
     /// The number by which the shaders know the distribution.

@@ -1,7 +1,8 @@
 //! BRDFs: one file per model (the CPU form, in double precision, is the truth; its GLSL twin is glsl/brdf/).
 //!
 //! Shading frame (conventions of the whole project): z is the normal, `w_i` points to the light, `w_o` to the eye, both
-//! unit. `f` is in 1/sr, without the cosine, and 0 where either cosine is not positive.
+//! unit. `f` is in 1/sr, without the cosine, and 0 where either cosine is not positive. x is the tangent: an anisotropic BRDF depends on
+//! the azimuths of `w_i` and `w_o` about z against x, counter-clockwise seen from outside; of an isotropic one any frame about z will do.
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::path::Path;
 
@@ -18,6 +19,7 @@ mod metals;
 mod microfacet;
 mod parameters;
 mod record;
+mod roughness;
 mod tabulate;
 
 pub use custom::CustomBrdf;
@@ -27,6 +29,7 @@ pub use merl_export::merl_bytes;
 pub use microfacet::{Distribution, fresnel_conductor, fresnel_dielectric};
 pub use parameters::{Domain, Parameter, Parameters, Spacing, as_number, channels};
 pub use record::{MaterialRecord, ThreadSetRecord};
+pub use roughness::Roughness;
 pub use tabulate::tabulate;
 
 file_formats!(Brdf: merl_file, toml_file);
@@ -265,6 +268,8 @@ fn hash_numbers(hasher: &mut blake3::Hasher, numbers: impl IntoIterator<Item = f
     }
 }
 
+#[cfg(test)]
+mod anisotropy_tests;
 #[cfg(test)]
 mod closed_form_tests;
 #[cfg(test)]

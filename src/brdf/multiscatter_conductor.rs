@@ -18,7 +18,7 @@ use glam::{DVec2, DVec3};
 
 use super::metals::index_of_refraction;
 use super::microfacet::{Distribution, fresnel_conductor};
-use super::{Model, Parameters, Spacing, hash_numbers};
+use super::{Model, Parameters, Roughness, Spacing, hash_numbers};
 use crate::error::Result;
 
 /// A rough metal with multiple scattering.
@@ -112,7 +112,7 @@ impl Model for MultiscatterConductor {
     fn evaluate(&self, w_i: DVec3, w_o: DVec3) -> DVec3 {
         let h = (w_i + w_o).normalize();
         let once = fresnel_conductor(w_o.dot(h), self.eta, self.k)
-            * Distribution::Ggx.torrance_sparrow(w_i, w_o, h, self.alpha);
+            * Distribution::Ggx.torrance_sparrow(w_i, w_o, h, Roughness::isotropic(self.alpha));
         let Loss { table, factor } = self.loss();
         once + *factor * (interpolate(table, w_i.z) * interpolate(table, w_o.z))
     }

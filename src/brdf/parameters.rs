@@ -21,6 +21,8 @@ pub struct Parameter {
     pub help: &'static str,
     /// What it may be.
     pub domain: Domain,
+    /// The number that it is where it is left out.
+    pub default: Option<f64>,
 }
 
 /// What a parameter may be.
@@ -71,6 +73,20 @@ impl Parameters {
         in_range(key, as_number(&value), &range)
     }
 
+    /// The number `key` as [`Self::number`] has it, by equal steps, or `default` where it is left out.
+    pub fn number_or(
+        &mut self,
+        key: &str,
+        range: RangeInclusive<f64>,
+        default: f64,
+        help: &'static str,
+    ) -> Result<f64> {
+        let domain = Domain::Number(range.clone(), Spacing::Linear);
+        self.read.push(Parameter { key: key.into(), help, domain, default: Some(default) });
+        let value = self.table.remove(key).map_or(default, |value| as_number(&value));
+        in_range(key, value, &range)
+    }
+
     /// The RGB colour `key`, each channel within `range`; a single number stands for a grey.
     pub fn colour(&mut self, key: &str, range: RangeInclusive<f64>, help: &'static str) -> Result<DVec3> {
         let value = self.take(key, "three numbers [r, g, b]", Domain::Colour(range.clone()), help)?;
@@ -101,7 +117,7 @@ impl Parameters {
     }
 
     fn take(&mut self, key: &str, what: &str, domain: Domain, help: &'static str) -> Result<Value> {
-        self.read.push(Parameter { key: key.into(), help, domain });
+        self.read.push(Parameter { key: key.into(), help, domain, default: None });
         self.table.remove(key).ok_or_else(|| Error::input(key, "is missing", format!("give {what}")))
     }
 }

@@ -4,7 +4,7 @@ use std::f64::consts::FRAC_1_PI;
 use glam::DVec3;
 
 use super::microfacet::{Distribution, fresnel_dielectric};
-use super::{Model, Parameters, Spacing, hash_numbers};
+use super::{Model, Parameters, Roughness, Spacing, hash_numbers};
 use crate::error::Result;
 
 /// f = F D G / (4 cos_theta_i cos_theta_o) + diffuse / pi (1 - F(theta_i)) (1 - F(theta_o)) / (1 - mean F).
@@ -17,8 +17,8 @@ use crate::error::Result;
 pub struct Plastic {
     /// Distribution of the coat's microfacet normals.
     pub distribution: Distribution,
-    /// Its roughness_alpha, 0.001 to 1, not squared.
-    pub alpha: f64,
+    /// Its roughness_alpha along both axes, 0.001 to 1, not squared.
+    pub roughness: Roughness,
     /// Refractive index of the coat, 1 to 5.
     pub ior: f64,
     /// Colour of the base per channel, 0 to 1.
@@ -29,8 +29,8 @@ pub struct Plastic {
 
 impl Plastic {
     /// A plastic of the given coat and base.
-    pub fn new(distribution: Distribution, alpha: f64, ior: f64, diffuse: DVec3) -> Self {
-        Self { distribution, alpha, ior, diffuse, base: diffuse / (1.0 - mean_fresnel(ior)) }
+    pub fn new(distribution: Distribution, roughness: Roughness, ior: f64, diffuse: DVec3) -> Self {
+        Self { distribution, roughness, ior, diffuse, base: diffuse / (1.0 - mean_fresnel(ior)) }
     }
 }
 
@@ -49,29 +49,32 @@ impl Model for Plastic {
     fn evaluate(&self, w_i: DVec3, w_o: DVec3) -> DVec3 {
         let h = (w_i + w_o).normalize();
         let coat =
-            fresnel_dielectric(w_o.dot(h), self.ior) * self.distribution.torrance_sparrow(w_i, w_o, h, self.alpha);
+            fresnel_dielectric(w_o.dot(h), self.ior) * self.distribution.torrance_sparrow(w_i, w_o, h, self.roughness);
         let transmitted = (1.0 - fresnel_dielectric(w_i.z, self.ior)) * (1.0 - fresnel_dielectric(w_o.z, self.ior));
         DVec3::splat(coat) + self.base * (transmitted * FRAC_1_PI)
     }
 
     fn from_parameters(parameters: &mut Parameters) -> Result<Self> {
-        let (distribution, alpha) = Distribution::from_parameters(parameters)?;
+        let (distribution, roughness) = Distribution::from_parameters(parameters)?;
         let help = "Index of refraction of the coat, against air.";
         let ior = parameters.number("ior", 1.0..=5.0, Spacing::Linear, help)?;
         let diffuse = parameters.colour("diffuse", 0.0..=1.0, "Colour of the base under the coat, linear Rec. 709.")?;
-        Ok(Self::new(distribution, alpha, ior, diffuse))
+        Ok(Self::new(distribution, roughness, ior, diffuse))
     }
 
     fn gpu_parameters(&self) -> [f32; 12] {
         let mut packed = [0.0; 12];
-        packed[0..4].copy_from_slice(&self.base.as_vec3().extend(self.alpha as f32).to_array());
+        packed[0..4].copy_from_slice(&self.base.as_vec3().extend(0.0).to_array());
         packed[4] = self.ior as f32;
         packed[5] = self.distribution.gpu_id();
+        packed[8..12].copy_from_slice(&self.roughness.gpu_parameters());
         packed
     }
 
     fn hash_content(&self, hasher: &mut blake3::Hasher) {
-        hash_numbers(hasher, [f64::from(self.distribution.gpu_id()), self.alpha, self.ior]);
+        hash_numbers(hasher, [f64::from(self.distribution.gpu_id())]);
+        self.roughness.hash_content(hasher);
+        hash_numbers(hasher, [self.ior]);
         hash_numbers(hasher, self.diffuse.to_array());
     }
 }

@@ -25,7 +25,7 @@ use std::sync::{Arc, OnceLock};
 use glam::{DVec2, DVec3, dvec3};
 
 use super::microfacet::{Distribution, fresnel_schlick};
-use super::{Model, Parameters, Spacing, hash_numbers};
+use super::{Model, Parameters, Roughness, Spacing, hash_numbers};
 use crate::error::Result;
 
 /// Metallic-roughness with sheen and coat.
@@ -144,7 +144,8 @@ impl Principled {
     fn base(&self, w_i: DVec3, w_o: DVec3) -> DVec3 {
         let h = (w_i + w_o).normalize();
         let cos_theta_d = w_o.dot(h);
-        let lobe = Distribution::Ggx.torrance_sparrow(w_i, w_o, h, self.roughness * self.roughness);
+        let lobe =
+            Distribution::Ggx.torrance_sparrow(w_i, w_o, h, Roughness::isotropic(self.roughness * self.roughness));
         let dielectric = fresnel_schlick(cos_theta_d, DVec3::splat(f0(self.ior)));
         let metal = fresnel_schlick(cos_theta_d, self.base_colour);
         ((1.0 - dielectric) * self.base_colour * FRAC_1_PI + dielectric * lobe) * (1.0 - self.metallic)
@@ -162,7 +163,7 @@ impl Model for Principled {
         if let Some(Coat { weight, roughness, ior }) = self.coat {
             let h = (w_i + w_o).normalize();
             let fresnel = |cos: f64| weight * fresnel_schlick(cos, DVec3::splat(f0(ior))).x;
-            let lobe = Distribution::Ggx.torrance_sparrow(w_i, w_o, h, roughness * roughness);
+            let lobe = Distribution::Ggx.torrance_sparrow(w_i, w_o, h, Roughness::isotropic(roughness * roughness));
             f = f * ((1.0 - fresnel(w_i.z)) * (1.0 - fresnel(w_o.z))) + fresnel(w_o.dot(h)) * lobe;
         }
         f

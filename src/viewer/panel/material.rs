@@ -58,17 +58,16 @@ impl State {
 fn parameters_of(settings: &MaterialSettings) -> Option<Vec<(Parameter, toml::Value)>> {
     let (model, table) = settings.model().ok()?;
     let parameters = Brdf::parameters(&model, &table).ok()?;
-    Some(
-        parameters
-            .into_iter()
-            .filter_map(|parameter| Some((parameter.clone(), table.get(&parameter.key)?.clone())))
-            .collect(),
-    )
+    let with_value = |parameter: Parameter| {
+        let value = table.get(&parameter.key).cloned().or(parameter.default.map(Into::into))?;
+        Some((parameter, value))
+    };
+    Some(parameters.into_iter().filter_map(with_value).collect())
 }
 
 /// A row of the grid: the parameter's name, and what it is edited by.
 fn row(ui: &mut Ui, material: &str, parameter: &Parameter, value: &toml::Value, inputs: &mut Vec<Input>) {
-    let Parameter { key, help, domain } = parameter;
+    let Parameter { key, help, domain, .. } = parameter;
     let set = |value: toml::Value| Change::Parameter { material: material.to_owned(), key: key.to_owned(), value };
     ui.label(key).on_hover_text(*help);
     match domain {
