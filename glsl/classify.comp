@@ -8,6 +8,7 @@
 layout(local_size_x = TILE_SIDE, local_size_y = TILE_SIDE) in;
 
 layout(constant_id = 0) const uint SUBPIXELS = 2; // per axis
+layout(constant_id = 1) const uint HAS_TANGENTS = 0; // 0: no material of the scene needs them
 
 layout(set = 0, binding = 0) uniform utexture2D geometry;
 layout(set = 0, binding = 1, std430) buffer Counters {
@@ -29,7 +30,7 @@ layout(push_constant) uniform Push {
     uvec2 size_px;
     // Sub-pixels whose normals lie within this angle of the first one's count as one smooth surface,
     float cos_smooth;
-    // if their variance along each of two axes, in rad^2, is below this.
+    // if their variance along each of two axes, in rad^2, is below this; and that of their tangents around the normal.
     float smooth_variance;
 } push;
 
@@ -54,6 +55,7 @@ void main() {
         uvec2 reference = uvec2(0);
         vec3 reference_normal = vec3(0.0);
         vec3 normals = vec3(0.0);
+        vec3 tangents = vec3(0.0);
         for (uint j = 0; j < SUBPIXELS * SUBPIXELS; ++j) {
             uvec2 texel = texelFetch(geometry, ivec2(pixel * SUBPIXELS + uvec2(j % SUBPIXELS, j / SUBPIXELS)), 0).xy;
             if (!is_covered(texel)) {
@@ -61,14 +63,21 @@ void main() {
             }
             vec3 normal = geometry_normal(texel);
             normals += normal;
+            if (HAS_TANGENTS != 0 && has_tangent(texel)) {
+                tangents += geometry_tangent(texel, normal);
+            }
             if (covered++ == 0) {
                 reference = texel;
                 reference_normal = normal;
             }
-            smooth_surface = smooth_surface && texel.y == reference.y && dot(normal, reference_normal) >= push.cos_smooth;
+            smooth_surface = smooth_surface && geometry_material(texel) == geometry_material(reference)
+                && dot(normal, reference_normal) >= push.cos_smooth;
         }
         // With R the length of the mean normal, 1 - R is the variance.
         smooth_surface = smooth_surface && 1.0 - length(normals) / float(covered) < push.smooth_variance;
+        if (HAS_TANGENTS != 0 && has_tangent(reference)) {
+            smooth_surface = smooth_surface && 1.0 - length(tangents) / float(covered) < push.smooth_variance;
+        }
     }
     uint kind = smooth_surface && covered == SUBPIXELS * SUBPIXELS ? INTERIOR : EDGE;
     uint tile = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;

@@ -1,11 +1,12 @@
 #version 450
-// Pass 1 of the paper (section 4.1): the normal and material of every sub-pixel.
+// Pass 1 of the paper (section 4.1): the normal and material of every sub-pixel, and the tangent where the material needs one.
 #extension GL_GOOGLE_include_directive : require
 #include "geometry_cache.glsl"
 #include "geometry_texel.glsl"
 
 layout(location = 0) in vec3 eye_position;
 layout(location = 1) in vec3 world_normal;
+layout(location = 2) in vec3 world_tangent;
 
 layout(location = 0) out uvec2 geometry;
 
@@ -25,5 +26,9 @@ void main() {
     if (dot(normal, facet_normal) < 0.0) {
         normal = -normal;
     }
-    geometry = pack_geometry(normalize(normal), object.material);
+    normal = normalize(normal);
+    geometry = pack_geometry(normal, object.material);
+    if (object.tangent_axis.w != NO_TANGENT) {
+        geometry = with_tangent(geometry, tangent_along(world_tangent, normal));
+    }
 }

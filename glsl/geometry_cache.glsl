@@ -1,15 +1,22 @@
 // What both stages of the geometry cache know of the object being drawn.
 
 layout(push_constant) uniform Object {
-    // Object space to world axes with the eye at the origin (the eye's own coordinates keep the precision), in units of
-    // the scene's extent.
-    mat4x3 to_eye;
+    // Rows of what takes object space to world axes with the eye at the origin (the eye's own coordinates keep the precision), in units
+    // of the scene's extent.
+    vec4 to_eye[3];
     // Unit vectors of the camera and what its image plane spans (right and up divided by the half-extents).
     vec4 right_over_extent; // w: unused
     vec4 up_over_extent;    // w: unused
     vec4 forward;           // w: near plane
+    // The axis that tangents go by, in object space; w: how, as below.
+    vec4 tangent_axis;
     uint material;
 } object;
+
+// How tangents go by the axis of an object: not at all, since its material needs none; around it; along it.
+const float NO_TANGENT = 0.0;
+const float TANGENT_AROUND = 1.0;
+const float TANGENT_ALONG = 2.0;
 
 // Reversed, infinite projection: depth 1 at the near plane, 0 at infinity, so float precision is where it is needed.
 vec4 project(vec3 from_eye) {

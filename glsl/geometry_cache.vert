@@ -8,15 +8,21 @@ layout(location = 1) in vec3 normal;
 
 layout(location = 0) out vec3 eye_position;
 layout(location = 1) out vec3 world_normal;
+layout(location = 2) out vec3 world_tangent; // of any length
 
 void main() {
-    vec3 from_eye = (object.to_eye * vec4(position, 1.0)).xyz;
+    vec4 at = vec4(position, 1.0);
+    vec3 from_eye = vec3(dot(object.to_eye[0], at), dot(object.to_eye[1], at), dot(object.to_eye[2], at));
     eye_position = from_eye;
     // Cofactors of the linear part: the normal matrix up to scale, right for mirrored and sheared objects too.
     // Taken relative to the object's scale, whose square could leave the range of floats.
-    mat3 linear_part = mat3(object.to_eye) / length(object.to_eye[0]);
+    mat3 linear_part = transpose(mat3(object.to_eye[0].xyz, object.to_eye[1].xyz, object.to_eye[2].xyz));
+    linear_part /= length(linear_part[0]);
     mat3 cofactors = mat3(cross(linear_part[1], linear_part[2]), cross(linear_part[2], linear_part[0]),
                           cross(linear_part[0], linear_part[1]));
     world_normal = cofactors * normal;
+    // Both are linear in the position, so what is interpolated is right within a triangle too.
+    vec3 axis = object.tangent_axis.xyz;
+    world_tangent = linear_part * (object.tangent_axis.w == TANGENT_AROUND ? cross(axis, position) : axis);
     gl_Position = project(from_eye);
 }

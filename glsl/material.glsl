@@ -15,6 +15,7 @@ struct Material {
     float lobe_width;  // half_vector_width in src/brdf/lobe.rs, in radians
     ThreadSet threads;          // of a pixel whose sub-pixels share one sum
     ThreadSet subpixel_threads; // of each sub-pixel of another pixel
+    uint azimuth_count;         // of the view, that there are rows of threads for; 1 of an isotropic BRDF
 };
 
 layout(set = 0, binding = 5, std430) readonly buffer Materials {

@@ -23,7 +23,7 @@ vec4 shade_pixel(uvec2 pixel, bool interior) {
         uvec2 texel = texelFetch(geometry, ivec2(subpixel), 0).xy;
         if (is_covered(texel)) {
             ++covered;
-            Surface surface = surface_at((vec2(subpixel) + 0.5) / vec2(push.size_px * SUBPIXELS), geometry_normal(texel));
+            Surface surface = surface_of_subpixel(subpixel, texel);
             surface.normal_variance = stride > 1 ? normal_variance : 0.0;
             sum += estimate(surface, materials[geometry_material(texel)], stride > 1 ? j : 0, stride);
         }

@@ -11,6 +11,7 @@
 layout(local_size_x = TILE_PIXELS) in;
 
 layout(constant_id = 0) const uint SUBPIXELS = 2; // per axis
+layout(constant_id = 5) const uint HAS_TANGENTS = 0; // 0: no material of the scene needs them
 
 // Between these view angles the threads start to follow the view; why, says methods/paper.glsl.
 const float FACING_DEG = 3.0;
@@ -59,10 +60,26 @@ uint lookups = 0;
 // The sub-pixel that is being shaded: methods draw random numbers by its place.
 uvec2 subpixel = uvec2(0);
 
-// The surface that is seen at a place in the picture, from 0 to 1.
-Surface surface_at(vec2 position, vec3 normal) {
+// The surface that is seen at a place in the picture, from 0 to 1. Only materials that need it ask for the tangent.
+Surface surface_at(vec2 position, vec3 normal, vec3 tangent) {
     vec3 w_o = -normalize(camera_ray(push.camera, position));
-    return make_surface(to_environment(normal), to_environment(w_o));
+    Surface surface = make_surface(to_environment(normal), to_environment(w_o));
+    if (HAS_TANGENTS != 0) {
+        set_tangent(surface, to_environment(tangent));
+    }
+    return surface;
+}
+
+// The surface that a sub-pixel sees.
+Surface surface_of_subpixel(uvec2 place, uvec2 texel) {
+    vec3 normal = geometry_normal(texel);
+    vec3 tangent = HAS_TANGENTS != 0 && has_tangent(texel) ? geometry_tangent(texel, normal) : vec3(0.0);
+    return surface_at((vec2(place) + 0.5) / vec2(push.size_px * SUBPIXELS), normal, tangent);
+}
+
+// The BRDF of a surface for directions of its shading frame: an anisotropic one knows its own from the tangent.
+vec3 brdf_at(Surface surface, Material material, vec3 w_i, vec3 w_o) {
+    return HAS_TANGENTS != 0 ? brdf(material, turned(w_i, surface.phi_o), turned(w_o, surface.phi_o)) : brdf(material, w_i, w_o);
 }
 
 // A method defines what a surface's `estimate` is, and includes partition.glsl or shared_sum.glsl, which say what that is to a pixel:

@@ -10,11 +10,17 @@ bool needs_subpixels(Surface surface, Material material);
 // The mean of the surfaces that a pixel's sub-pixels see, all of them covered.
 Surface mean_surface(uvec2 pixel) {
     vec3 normals = vec3(0.0);
+    vec3 tangents = vec3(0.0);
     for (uint j = 0; j < SUBPIXELS * SUBPIXELS; ++j) {
         uvec2 place = pixel * SUBPIXELS + uvec2(j % SUBPIXELS, j / SUBPIXELS);
-        normals += geometry_normal(texelFetch(geometry, ivec2(place), 0).xy);
+        uvec2 texel = texelFetch(geometry, ivec2(place), 0).xy;
+        vec3 normal = geometry_normal(texel);
+        normals += normal;
+        if (HAS_TANGENTS != 0 && has_tangent(texel)) {
+            tangents += geometry_tangent(texel, normal);
+        }
     }
-    Surface mean = surface_at((vec2(pixel) + 0.5) / vec2(push.size_px), normalize(normals));
+    Surface mean = surface_at((vec2(pixel) + 0.5) / vec2(push.size_px), normalize(normals), tangents);
     // With R the length of the mean normal, 1 - R is the variance along each of two axes.
     mean.normal_variance = max(1.0 - length(normals) / float(SUBPIXELS * SUBPIXELS), 0.0);
     return mean;
@@ -36,7 +42,7 @@ vec4 shade_pixel(uvec2 pixel, bool interior) {
         uvec2 texel = texelFetch(geometry, ivec2(place), 0).xy;
         if (is_covered(texel)) {
             if (!shares) {
-                surface = surface_at((vec2(place) + 0.5) / vec2(push.size_px * SUBPIXELS), geometry_normal(texel));
+                surface = surface_of_subpixel(place, texel);
             }
             Material material = materials[geometry_material(texel)];
             ThreadSet set = material.subpixel_threads;

@@ -1,4 +1,5 @@
 // A point to shade: its shading frame and view angle. Twin: Surface in src/shading/mod.rs.
+#include "tangent.glsl"
 
 struct Surface {
     // Columns: x, the part of w_o orthogonal to n; y = z cross x; z = n. In the environment's coordinates.
@@ -9,29 +10,39 @@ struct Surface {
     float theta_o;
     // Variance of the normal within the pixel along each axis, in rad^2, where sub-pixels share one sum; else 0.
     float normal_variance;
+    // Cosine and sine of phi_o, the azimuth of w_o from the tangent; (1, 0) where no material of the scene needs it.
+    vec2 phi_o;
 };
-
-// An axis orthogonal to n, for where w_o gives none (Duff et al. 2017).
-vec3 any_tangent(vec3 n) {
-    float s = n.z >= 0.0 ? 1.0 : -1.0;
-    float a = -1.0 / (s + n.z);
-    return vec3(1.0 + s * n.x * n.x * a, s * n.x * n.y * a, -s * n.x);
-}
 
 // n and w_o are unit vectors.
 Surface make_surface(vec3 n, vec3 w_o) {
     float cos_theta_o = dot(n, w_o);
     vec3 across = w_o - cos_theta_o * n;
     float sin_theta_o = length(across);
-    // Below 1e-6, the rounding error of `across`, its direction means nothing; the frame may then turn freely about n,
-    // since an isotropic BRDF seen along n looks the same all around.
+    // Below 1e-6, the rounding error of `across`, its direction means nothing; the frame may then turn freely about n:
+    // what is seen along n has no azimuth, and phi_o follows the frame.
     vec3 x = sin_theta_o > 1e-6 ? across / sin_theta_o : any_tangent(n);
     Surface surface;
     surface.frame = mat3(x, cross(n, x), n);
     surface.w_o = w_o;
     surface.theta_o = atan(sin_theta_o, cos_theta_o);
     surface.normal_variance = 0.0;
+    surface.phi_o = vec2(1.0, 0.0);
     return surface;
+}
+
+// Turns the tangent of a surface to what of `tangent`, of any length, is in the tangent plane.
+void set_tangent(inout Surface surface, vec3 tangent) {
+    // The tangent's azimuth in the shading frame is -phi_o.
+    vec2 along = vec2(dot(surface.frame[0], tangent), -dot(surface.frame[1], tangent));
+    // Tangents of unit length whose sum is shorter than 1e-3 cancel each other: any will do.
+    float size = length(along);
+    surface.phi_o = size > 1e-3 ? along / size : vec2(1.0, 0.0);
+}
+
+// `w` of the shading frame, turned about z by an angle of this cosine and sine.
+vec3 turned(vec3 w, vec2 angle) {
+    return vec3(angle.x * w.x - angle.y * w.y, angle.y * w.x + angle.x * w.y, w.z);
 }
 
 // A frame at n that does not turn with w_o: its x is what is left of `axis` in the tangent plane.

@@ -39,6 +39,8 @@ pub mod scene;
 pub mod shading;
 #[path = "steps/mod.rs"]
 pub mod steps;
+#[path = "tangent.rs"]
+pub mod tangent;
 #[path = "threads/mod.rs"]
 pub mod threads;
 #[path = "vector_math.rs"]

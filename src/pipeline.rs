@@ -112,7 +112,8 @@ impl DeviceScene {
         let upload = UploadMaterials { device, method, materials: &materials, evaluates_brdf, finest_level };
         let materials = round.ask(&upload)?;
         let subpixels = ("SUBPIXELS", view.subpixels);
-        let mut constants = vec![subpixels, ("MODELS_USED", materials.models_used)];
+        let has_tangents = ("HAS_TANGENTS", prepared.has_tangents().into());
+        let mut constants = vec![subpixels, has_tangents, ("MODELS_USED", materials.models_used)];
         constants.extend(light.blurred.iter().flat_map(|blurred| blurred.needs.constants()));
         let light = round.ask(&UploadLight { device, method, environment, light: &light, way_around })?;
         let pipeline = compile(shader, &constants)?;
@@ -127,7 +128,7 @@ impl DeviceScene {
             view: view.clone(),
             geometry_cache,
             classify: Classify {
-                pipeline: compile(&compiled::CLASSIFY, &[subpixels])?,
+                pipeline: compile(&compiled::CLASSIFY, &[subpixels, has_tangents])?,
                 smooth_variance: smooth_variance(method),
             },
             shade: Shade { pipeline, materials, light, sampling },

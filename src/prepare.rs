@@ -1,10 +1,11 @@
 //! Loads everything that a scene names, and makes the threads of its materials: all that the GPU will need.
 use crate::brdf::Brdf;
 use crate::environment::Environment;
+use crate::geometry_texel::MAX_MATERIALS;
 use crate::memo::{Key, Keyed, Memo, Round, Step};
 use crate::method::Method;
 use crate::passes::{PlacedMesh, Sampling, View};
-use crate::scene::{Camera, MaterialSource, Mesh, Scene};
+use crate::scene::{Camera, MaterialSource, Mesh, Scene, TangentRule};
 use crate::steps::{DraftThreads, FitTargets, FitThreads, LoadEnvironment, LoadMaterial, LoadMesh};
 use crate::threads::fitted::light_count;
 use crate::threads::{ThreadKind, ThreadSets, ThreadSettings, Threads, WithThreads};
@@ -143,8 +144,11 @@ pub fn prepare_draft(scene: &Scene, before: &Prepared, round: &Round) -> Result<
         if let Some(finished) = known_threads(round, brdf, settings)? {
             return Ok(Some(finished));
         }
-        let mut shown =
-            before.materials.iter().filter(|shown| shown.name == name && shown.brdf.model() == brdf.model());
+        // Drafts are made for view angles only.
+        let is_drafted = |shown: &&PreparedMaterial| {
+            shown.name == name && shown.brdf.model() == brdf.model() && shown.brdf.is_isotropic() && brdf.is_isotropic()
+        };
+        let mut shown = before.materials.iter().filter(is_drafted);
         let Some((shown, threads)) = shown.find_map(|shown| Some((shown, shown.threads.as_ref()?))) else {
             return ask_threads(round, method, brdf, sampling, subpixels);
         };
@@ -166,12 +170,13 @@ fn prepare_by(scene: &Scene, round: &Round, ask_threads: &AskThreads) -> Result<
     let count = scene.shading.threads.unwrap_or(method.default_count());
     check_count(method, count, scene.image.subpixels)?;
     let sampling = Sampling { count, seed: scene.shading.seed };
-    let (meshes, objects) = place_meshes(scene, round)?;
+    let (meshes, mut objects) = place_meshes(scene, round)?;
     let environment = round.ask(&LoadEnvironment(&scene.environment.source))?;
     for object in &objects {
         check_size(&meshes[object.mesh].0, world_sphere(&meshes, object))?;
     }
     let view = view_of(scene, bounding_sphere(&meshes, &objects))?;
+    check_materials(scene)?;
     let mut materials = Vec::new();
     for name in scene.used_materials() {
         // The scene has checked that every material an object names is there.
@@ -183,6 +188,7 @@ fn prepare_by(scene: &Scene, round: &Round, ask_threads: &AskThreads) -> Result<
         let threads = ask_threads(method, name, &brdf, sampling)?;
         materials.push(PreparedMaterial { name: name.to_owned(), brdf, threads });
     }
+    place_tangents(scene, &materials, &mut objects);
     Ok(Prepared {
         scene: scene.clone(),
         method,
@@ -212,7 +218,7 @@ pub fn key_of(scene: &Scene, memo: &Memo) -> Result<Key> {
     for object in &scene.objects {
         let material = used_materials.iter().position(|known| *known == object.material).unwrap_or_default();
         key = key.key(LoadMesh(&object.mesh).key(memo)?).number(material as u64);
-        key = key.bytes(bytemuck::bytes_of(&object.transform()));
+        key = key.bytes(bytemuck::bytes_of(&object.transform())).text(&format!("{:?}", object.tangent));
     }
     for name in used_materials {
         let Some(material) = scene.materials.iter().find(|material| material.name == name) else { continue };
@@ -237,9 +243,37 @@ fn place_meshes(scene: &Scene, round: &Round) -> Result<(Vec<NamedMesh>, Vec<Pla
             mesh: index,
             material: material.expect("used materials are those of objects") as u32,
             to_world: DAffine3::from_mat4(object.transform().as_dmat4()),
+            tangent: None,
         });
     }
     Ok((meshes, objects))
+}
+
+/// Gives `objects` the tangents that their materials need.
+fn place_tangents(scene: &Scene, materials: &[PreparedMaterial], objects: &mut [PlacedMesh]) {
+    for (object, settings) in objects.iter_mut().zip(&scene.objects) {
+        let material = &materials[object.material as usize];
+        if material.brdf.is_isotropic() {
+            continue;
+        }
+        if settings.tangent.is_none() {
+            let name = &material.name;
+            tracing::info!(
+                "an object of \"{name}\", which is anisotropic, has no `tangent`: it is brushed around its y axis"
+            );
+        }
+        object.tangent = Some(settings.tangent.unwrap_or(TangentRule::DEFAULT));
+    }
+}
+
+/// An error for more materials than a texel of the geometry cache can tell apart.
+fn check_materials(scene: &Scene) -> Result<()> {
+    let count = scene.used_materials().len();
+    if count <= MAX_MATERIALS {
+        return Ok(());
+    }
+    let problem = format!("of objects are {count}, more than {MAX_MATERIALS}");
+    Err(Error::input("materials", problem, "use fewer"))
 }
 
 /// The view of `scene`, whose objects are within a sphere of this centre and radius.
@@ -275,6 +309,11 @@ impl Prepared {
     /// Centre and radius of a sphere that holds all objects.
     pub fn bounding_sphere(&self) -> (DVec3, f64) {
         bounding_sphere(&self.meshes, &self.objects)
+    }
+
+    /// Whether a material of it is anisotropic, so that objects have tangents.
+    pub fn has_tangents(&self) -> bool {
+        self.objects.iter().any(|object| object.tangent.is_some())
     }
 
     /// BRDF and threads of each material.

@@ -16,7 +16,7 @@ vec3 estimate(Surface surface, Material material, uint first, uint stride) {
             float p = light_pdf(texel, direction);
             // Black, it cannot have been drawn but by rounding.
             if (p > 0.0) {
-                sum += brdf(material, w_i, w_o) * texel.rgb * (w_i.z / p);
+                sum += brdf_at(surface, material, w_i, w_o) * texel.rgb * (w_i.z / p);
             }
         }
     }

@@ -16,7 +16,7 @@ vec3 estimate(Surface surface, Material material, uint first, uint stride) {
             ++lookups;
             vec3 direction = surface.frame * drawn.w_i;
             float level = level_of(1.0 / (float(push.sample_count) * drawn.p), push.face_size, direction);
-            vec3 weight = brdf(material, drawn.w_i, w_o) * (drawn.w_i.z / drawn.p);
+            vec3 weight = brdf_at(surface, material, drawn.w_i, w_o) * (drawn.w_i.z / drawn.p);
             sum += weight * textureLod(environment_pyramid, direction, level).rgb;
         }
     }

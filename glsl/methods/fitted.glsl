@@ -93,7 +93,7 @@ AtSources at_sources(Surface surface, Material material, float lobe_width, vec3 
             if (above.x > 0.0) {
                 vec3 power = weights.x * weights.y * above.x * source.power.rgb;
                 w_i = normalize(vec3(w_i.xy, above.y));
-                sum.f_cos += power * brdf(material, w_i, w_o);
+                sum.f_cos += power * brdf_at(surface, material, w_i, w_o);
                 sum.cosine += power;
             }
         } while (++i < side * side);
@@ -101,35 +101,68 @@ AtSources at_sources(Surface surface, Material material, float lobe_width, vec3 
     return sum;
 }
 
-// Between which rows a view angle is: where these start, and how far it is from the first to the second.
+// Between which rows a view is: where these start, and how far it is from the first to the second.
 struct Rows {
     uint below;
     uint above;
     float t;
+    // Of an anisotropic BRDF, how far it is from those rows to the ones of the next azimuth, this many words on; 0 of an isotropic one.
+    uint next_azimuth;
+    float towards_next;
+    float side; // 1, or -1 where the view is the mirror image of one that there are rows for
 };
 
 // Rows stand at multiples of 90 degrees / row_count; beyond the last one it holds.
-Rows rows_at(float theta_o, ThreadSet set) {
-    float row = min(theta_o * (float(set.row_count) / radians(90.0)), float(set.row_count - 1));
+Rows rows_at(Surface surface, Material material, ThreadSet set) {
+    float row = min(surface.theta_o * (float(set.row_count) / radians(90.0)), float(set.row_count - 1));
     uint below = set.first + uint(row) * words_a_row(set);
     uint above = below + (uint(row) + 1 < set.row_count ? words_a_row(set) : 0);
-    return Rows(below, above, fract(row));
+    Rows rows = Rows(below, above, fract(row), 0, 0.0, 1.0);
+    if (HAS_TANGENTS != 0 && material.azimuth_count > 1) {
+        vec2 folded = fold_azimuth(surface.phi_o, material.azimuth_count);
+        uint before = min(uint(folded.x), material.azimuth_count - 2);
+        rows.next_azimuth = set.row_count * words_a_row(set);
+        rows.below += before * rows.next_azimuth;
+        rows.above += before * rows.next_azimuth;
+        rows.towards_next = folded.x - float(before);
+        rows.side = folded.y;
+    }
+    return rows;
+}
+
+Kernel between(Kernel a, Kernel b, float t) {
+    return Kernel(mix(a.direction, b.direction, t), mix(a.level, b.level, t), mix(a.weight, b.weight, t));
 }
 
 // Thread k, in the environment's coordinates; its direction is no unit vector.
 Kernel kernel_at(Rows rows, uint k, Surface surface) {
-    Kernel a = unpack_kernel(rows.below, k);
-    Kernel b = unpack_kernel(rows.above, k);
-    vec3 direction = surface.frame * mix(a.direction, b.direction, rows.t);
-    float level = level_within_pixel(mix(a.level, b.level, rows.t), surface.normal_variance);
-    return Kernel(direction, level, mix(a.weight, b.weight, rows.t));
+    Kernel kernel = between(unpack_kernel(rows.below, k), unpack_kernel(rows.above, k), rows.t);
+    if (HAS_TANGENTS != 0 && rows.next_azimuth != 0) {
+        uint next = rows.next_azimuth;
+        Kernel of_next = between(unpack_kernel(rows.below + next, k), unpack_kernel(rows.above + next, k), rows.t);
+        kernel = between(kernel, of_next, rows.towards_next);
+        kernel.direction.y *= rows.side;
+    }
+    kernel.direction = surface.frame * kernel.direction;
+    kernel.level = level_within_pixel(kernel.level, surface.normal_variance);
+    return kernel;
+}
+
+vec3 cosine_part_at(Rows rows) {
+    vec3 weight = mix(unpack_cosine_part(rows.below), unpack_cosine_part(rows.above), rows.t);
+    if (HAS_TANGENTS != 0 && rows.next_azimuth != 0) {
+        uint next = rows.next_azimuth;
+        vec3 of_next = mix(unpack_cosine_part(rows.below + next), unpack_cosine_part(rows.above + next), rows.t);
+        weight = mix(weight, of_next, rows.towards_next);
+    }
+    return weight;
 }
 
 // Three loops, not one with three branches: where a driver masks lanes out, each pays for what none of its lanes does. For the same reason
 // tests are at the ends of loops.
 vec3 estimate(Surface surface, Material material, ThreadSet set) {
-    Rows rows = rows_at(surface.theta_o, set);
-    vec3 cosine_part = mix(unpack_cosine_part(rows.below), unpack_cosine_part(rows.above), rows.t);
+    Rows rows = rows_at(surface, material, set);
+    vec3 cosine_part = cosine_part_at(rows);
     ++lookups;
     vec3 sum = cosine_part * textureLod(irradiance_map, surface.frame[2], 0.0).rgb;
     uint k = set.sharp_count;

@@ -12,7 +12,7 @@ vec3 estimate(Surface surface, Material material, uint first, uint stride) {
     for (uint k = first; k < push.sample_count; k += stride) {
         DirectionSample drawn = sample_brdf(rows, w_o, random_bits(k));
         if (drawn.p > 0.0) {
-            vec3 weight = brdf(material, drawn.w_i, w_o) * (drawn.w_i.z / drawn.p);
+            vec3 weight = brdf_at(surface, material, drawn.w_i, w_o) * (drawn.w_i.z / drawn.p);
             sum += weight * environment_radiance(surface.frame * drawn.w_i);
         }
     }

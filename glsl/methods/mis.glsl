@@ -23,7 +23,7 @@ vec3 estimate(Surface surface, Material material, uint first, uint stride) {
                 vec4 texel = environment_texel(direction);
                 // Never 0: brdf_pdf has a diffuse share.
                 float p = brdf_pdf(rows, w_i, w_o, normalize(w_i + w_o)) + light_pdf(texel, direction);
-                sum += brdf(material, w_i, w_o) * texel.rgb * (w_i.z / p);
+                sum += brdf_at(surface, material, w_i, w_o) * texel.rgb * (w_i.z / p);
             }
         }
     }

@@ -31,13 +31,19 @@ float lookup_solid_angle(Surface surface, Material material, Partition share, fl
     return min(share_sr + footprint_sr, share_sr * float(share.stride));
 }
 
-// Adds one term of equation (2), but for 1/m; all directions in `frame`.
-void add_term(inout WeightedSum sum, Material material, mat3 frame, vec3 w_i, vec3 w_o, float log2_p, float solid_angle_sr) {
+// Adds one term of equation (2), but for 1/m; all directions in `frame`, a shading frame of the surface but for a turn about its normal.
+void add_term(inout WeightedSum sum, Surface surface, Material material, mat3 frame, vec3 w_i, vec3 w_o, float log2_p,
+              float solid_angle_sr) {
     ++lookups;
     vec3 direction = frame * w_i;
     float level = level_of(solid_angle_sr, push.face_size, direction);
     vec3 radiance = textureLod(environment_pyramid, direction, level).rgb;
-    vec3 weight = brdf(material, w_i, w_o) * (w_i.z * exp2(-log2_p));
+    if (HAS_TANGENTS != 0) {
+        vec2 turn = vec2(dot(surface.frame[0], frame[0]), dot(surface.frame[1], frame[0]));
+        w_i = turned(w_i, turn);
+        w_o = turned(w_o, turn);
+    }
+    vec3 weight = brdf_at(surface, material, w_i, w_o) * (w_i.z * exp2(-log2_p));
     sum.weight += weight;
     sum.radiance += weight * radiance;
 }
@@ -72,7 +78,7 @@ vec3 threads_following_view(Surface surface, Material material, Rows rows, Parti
     for (uint k = share.first; k < material.threads.count; k += share.stride) {
         vec4 between = mix(unpack_thread(below, k), unpack_thread(above, k), rows.t);
         float solid_angle_sr = lookup_solid_angle(surface, material, share, between.w);
-        add_term(sum, material, surface.frame, normalize(between.xyz), w_o, between.w, solid_angle_sr);
+        add_term(sum, surface, material, surface.frame, normalize(between.xyz), w_o, between.w, solid_angle_sr);
     }
     return weighted_mean(sum);
 }
@@ -92,7 +98,7 @@ vec3 threads_of_facing_view(Surface surface, Material material, Partition share)
         if (w_i.z > 0.0) {
             float log2_p = thread.w + log2(h.z / cos_theta_d);
             float solid_angle_sr = lookup_solid_angle(surface, material, share, log2_p);
-            add_term(sum, material, frame, w_i, w_o, log2_p, solid_angle_sr);
+            add_term(sum, surface, material, frame, w_i, w_o, log2_p, solid_angle_sr);
         }
     }
     return weighted_mean(sum);

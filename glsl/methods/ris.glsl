@@ -25,7 +25,7 @@ vec3 estimate(Surface surface, Material material, uint first, uint stride) {
                 vec3 direction = surface.frame * w_i;
                 ++lookups;
                 vec4 texel = environment_texel(direction);
-                vec3 value = brdf(material, w_i, w_o) * texel.rgb * w_i.z;
+                vec3 value = brdf_at(surface, material, w_i, w_o) * texel.rgb * w_i.z;
                 float q = dot(value, vec3(0.2126, 0.7152, 0.0722));
                 float p = 0.5 * (brdf_pdf(rows, w_i, w_o, normalize(w_i + w_o)) + light_pdf(texel, direction));
                 float weight = q / p; // p > 0: brdf_pdf has a diffuse share

@@ -11,7 +11,7 @@ vec3 estimate(Surface surface, Material material, uint first, uint stride) {
         vec4 u = to_unit(random_bits(k));
         float phi = radians(360.0) * u.y;
         vec3 w_i = vec3(sqrt(1.0 - u.x * u.x) * vec2(cos(phi), sin(phi)), u.x);
-        sum += brdf(material, w_i, w_o) * environment_radiance(surface.frame * w_i) * (radians(360.0) * w_i.z);
+        sum += brdf_at(surface, material, w_i, w_o) * environment_radiance(surface.frame * w_i) * (radians(360.0) * w_i.z);
     }
     return sum / float(push.sample_count);
 }

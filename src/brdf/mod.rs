@@ -20,6 +20,8 @@ mod microfacet;
 mod parameters;
 mod record;
 mod roughness;
+mod seen;
+mod symmetry;
 mod tabulate;
 
 pub use custom::CustomBrdf;
@@ -30,6 +32,8 @@ pub use microfacet::{Distribution, fresnel_conductor, fresnel_dielectric};
 pub use parameters::{Domain, Parameter, Parameters, Spacing, as_number, channels};
 pub use record::{MaterialRecord, ThreadSetRecord};
 pub use roughness::Roughness;
+pub use seen::SeenBrdf;
+pub use symmetry::Symmetry;
 pub use tabulate::tabulate;
 
 file_formats!(Brdf: merl_file, toml_file);

@@ -31,8 +31,8 @@ pub struct MaterialRecord {
     pub threads: ThreadSetRecord,
     /// Those of a sub-pixel that does not share a sum with the others.
     pub subpixel_threads: ThreadSetRecord,
-    /// The size of a structure in the buffer is a multiple of 16 bytes.
-    pub padding: u32,
+    /// Azimuths of the view for which there are rows of threads: 1 of an isotropic BRDF.
+    pub azimuth_count: u32,
 }
 
 impl MaterialRecord {
@@ -45,7 +45,7 @@ impl MaterialRecord {
             lobe_width: half_vector_width(brdf) as f32,
             threads: ThreadSetRecord::default(),
             subpixel_threads: ThreadSetRecord::default(),
-            padding: 0,
+            azimuth_count: 1,
         }
     }
 

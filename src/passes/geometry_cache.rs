@@ -3,7 +3,7 @@ use super::View;
 use crate::Result;
 use crate::graph::{FrameGraph, ImageDesc, ImageHandle};
 use crate::memo::Keyed;
-use crate::scene::Mesh;
+use crate::scene::{Mesh, TangentRule};
 use crate::vulkan::{Device, GraphicsPipeline, GraphicsState, PipelineCache, Triangles, VertexAttribute, compiled};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
@@ -55,6 +55,8 @@ pub struct PlacedMesh {
     pub material: u32,
     /// Object to world space.
     pub to_world: DAffine3,
+    /// Which way its tangents go; none where its material is isotropic.
+    pub tangent: Option<TangentRule>,
 }
 
 /// What the pass is made of.
@@ -72,10 +74,11 @@ pub struct GeometryCache {
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct Push {
-    to_eye: [[f32; 4]; 4],
+    to_eye: [[f32; 4]; 3],
     right_over_extent: [f32; 4],
     up_over_extent: [f32; 4],
     forward: [f32; 4],
+    tangent_axis: [f32; 4],
     material: u32,
 }
 
@@ -104,18 +107,20 @@ impl GeometryCache {
         let unit = self.extent(view);
         let draw = |object: &PlacedMesh| {
             let DAffine3 { matrix3, translation } = object.to_world;
-            let column = |column: DVec3| pack(column / unit, 0.0);
+            // Subtracted in double precision: far from the origin the difference is what counts.
+            let from_eye = translation - eye;
+            let row = |i: usize| pack(matrix3.row(i) / unit, from_eye[i] / unit);
+            let tangent_axis = match object.tangent {
+                None => [0.0; 4],
+                Some(rule @ TangentRule::Around(_)) => rule.axis().extend(1.0).to_array(),
+                Some(rule @ TangentRule::Along(_)) => rule.axis().extend(2.0).to_array(),
+            };
             let push = Push {
-                to_eye: [
-                    column(matrix3.x_axis),
-                    column(matrix3.y_axis),
-                    column(matrix3.z_axis),
-                    // Subtracted in double precision: far from the origin the difference is what counts.
-                    column(translation - eye),
-                ],
+                to_eye: [0, 1, 2].map(row),
                 right_over_extent: pack(right / half_width, 0.0),
                 up_over_extent: pack(up / half_height, 0.0),
                 forward: pack(forward, NEAR_PLANE),
+                tangent_axis,
                 material: object.material,
             };
             (&self.meshes[object.mesh].triangles, push)

@@ -77,6 +77,7 @@ impl DeviceMaterials {
             }
             if let Some(ThreadSets { pixel, subpixel }) = thread_sets {
                 record.threads = threads.add(pixel);
+                record.azimuth_count = pixel.fitted().map_or(1, |table| table.azimuths as u32);
                 // Where sub-pixels need no others, they are the same ones.
                 record.subpixel_threads =
                     if std::ptr::eq(pixel, subpixel) { record.threads } else { threads.add(subpixel) };

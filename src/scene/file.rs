@@ -8,7 +8,7 @@ use toml::Spanned;
 
 use super::{
     Camera, DEFAULT_MATERIAL, EXPOSURE, EnvironmentSettings, GAMMA, INTENSITY, ImageSettings, MAX_SAMPLES, MAX_SIZE_PX,
-    MAX_SUBPIXELS, MaterialSettings, MaterialSource, ObjectSettings, Scene, ShadingSettings, Source,
+    MAX_SUBPIXELS, MaterialSettings, MaterialSource, ObjectSettings, Scene, ShadingSettings, Source, TangentRule,
 };
 use crate::error::{Error, Result};
 use crate::file_format::{self, FileFormat, FileKind, text};
@@ -60,6 +60,7 @@ struct ObjectKeys {
     rotate_deg: [f32; 3],
     #[serde(default = "one_f32", deserialize_with = "scale")]
     scale: f32,
+    tangent: Option<TangentRule>,
 }
 
 impl TryFrom<RawEnvironmentKeys> for EnvironmentKeys {
@@ -227,6 +228,7 @@ fn object(keys: ObjectKeys, first_material: &str) -> Result<ObjectSettings, Stri
         translate: keys.translate.into(),
         rotate_deg: keys.rotate_deg.into(),
         scale: keys.scale,
+        tangent: keys.tangent,
     })
 }
 
@@ -354,13 +356,19 @@ fn object_table(object: &ObjectSettings, folder: Option<&Path>) -> Result<toml::
     // Through the shortest decimal, so that 0.1 does not become 0.10000000149011612.
     let number = |value: f32| toml::Value::Float(value.to_string().parse().unwrap_or(f64::from(value)));
     let vector = |values: [f32; 3]| toml::Value::Array(values.map(number).to_vec());
-    Ok(toml::Table::from_iter([
+    let rule = |rule| {
+        let key = if matches!(rule, TangentRule::Around(_)) { "around" } else { "along" };
+        let table = toml::Table::from_iter([(key.into(), vector(rule.axis().to_array()))]);
+        ("tangent".into(), toml::Value::Table(table))
+    };
+    let entries = [
         source_entry(&object.mesh, "mesh", folder)?,
         ("material".into(), object.material.clone().into()),
         ("translate".into(), vector(object.translate.to_array())),
         ("rotate_deg".into(), vector(object.rotate_deg.to_array())),
         ("scale".into(), number(object.scale)),
-    ]))
+    ];
+    Ok(entries.into_iter().chain(object.tangent.map(rule)).collect())
 }
 
 /// The key and value of a source; `file_key` is the key of files.

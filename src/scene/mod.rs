@@ -12,9 +12,11 @@ pub mod camera;
 mod file;
 pub mod mesh;
 mod parameter;
+mod tangent_rule;
 
 pub use camera::Camera;
 pub use mesh::Mesh;
+pub use tangent_rule::TangentRule;
 
 file_formats!(Mesh: obj_file);
 
@@ -204,6 +206,8 @@ pub struct ObjectSettings {
     pub rotate_deg: Vec3,
     /// Uniform, not zero; negative mirrors through the origin.
     pub scale: f32,
+    /// Which way an anisotropic material goes on it; without it, as [`TangentRule::DEFAULT`].
+    pub tangent: Option<TangentRule>,
 }
 
 impl Default for Scene {
@@ -300,7 +304,14 @@ impl Default for ShadingSettings {
 impl ObjectSettings {
     /// A mesh of a material, where it is.
     pub fn new(mesh: Source, material: &str) -> Self {
-        Self { mesh, material: material.into(), translate: Vec3::ZERO, rotate_deg: Vec3::ZERO, scale: 1.0 }
+        Self {
+            mesh,
+            material: material.into(),
+            translate: Vec3::ZERO,
+            rotate_deg: Vec3::ZERO,
+            scale: 1.0,
+            tangent: None,
+        }
     }
 
     /// Object space to world space: scaled, then rotated, then translated.

@@ -9,7 +9,9 @@ use crate::environment::sources::{CLEAR, clearance};
 use crate::environment::{LightMap, SourceRecord};
 use crate::light::BlurredLight;
 use crate::threads::Threads;
+use crate::threads::fitted::azimuths::fold_azimuth;
 use crate::threads::fitted::kernel::FINEST_WIDTH_RAD;
+use crate::threads::fitted::{FittedTable, UnpackedKernel};
 
 /// Twin of `finest_level` in glsl/vmf_pyramid.glsl.
 fn finest_level(face_size: usize) -> f32 {
@@ -154,6 +156,63 @@ fn at_sources(point: &Point, sources: &[SourceRecord], lobe_width: f32, w_o: Vec
     (f_cos, cosine)
 }
 
+/// Between which rows a view is. Twin of `Rows`.
+struct Rows {
+    below: usize,
+    above: usize,
+    t: f32,
+    /// Rows from one azimuth to the next; 0 of an isotropic BRDF.
+    next_azimuth: usize,
+    towards_next: f32,
+    side: f32,
+}
+
+impl Rows {
+    /// Twin of `rows_at`.
+    fn at(surface: &Surface, threads: &FittedTable) -> Self {
+        let row = (surface.theta_o * (threads.rows as f32 / FRAC_PI_2)).min((threads.rows - 1) as f32);
+        let (below, t) = (row as usize, row.fract());
+        let above = (below + 1).min(threads.rows - 1);
+        if threads.azimuths == 1 {
+            return Self { below, above, t, next_azimuth: 0, towards_next: 0.0, side: 1.0 };
+        }
+        let (at, is_mirrored) = fold_azimuth(surface.phi_o.to_angle().into(), threads.azimuths);
+        let before = (at as usize).min(threads.azimuths - 2);
+        let first = before * threads.rows;
+        let (towards_next, side) = ((at - before as f64) as f32, if is_mirrored { -1.0 } else { 1.0 });
+        Self { below: first + below, above: first + above, t, next_azimuth: threads.rows, towards_next, side }
+    }
+
+    /// Twin of `kernel_at`, in the shading frame.
+    fn kernel(&self, threads: &FittedTable, k: usize) -> UnpackedKernel {
+        let at = |row: usize| threads.row(row)[k].unpack();
+        let kernel = between(at(self.below), at(self.above), self.t);
+        if self.next_azimuth == 0 {
+            return kernel;
+        }
+        let [below, above] = [self.below, self.above].map(|row| at(row + self.next_azimuth));
+        let kernel = between(kernel, between(below, above, self.t), self.towards_next);
+        UnpackedKernel { direction: Vec3::new(1.0, self.side, 1.0) * kernel.direction, ..kernel }
+    }
+
+    /// Twin of `cosine_part_at`.
+    fn cosine_part(&self, threads: &FittedTable) -> Vec3 {
+        let at = |row: usize| Vec3::from(threads.cosine_part[row]);
+        let here = at(self.below).lerp(at(self.above), self.t);
+        let [below, above] = [self.below, self.above].map(|row| at(row + self.next_azimuth));
+        here.lerp(below.lerp(above, self.t), self.towards_next)
+    }
+}
+
+/// Twin of `between`.
+fn between(a: UnpackedKernel, b: UnpackedKernel, t: f32) -> UnpackedKernel {
+    UnpackedKernel {
+        direction: a.direction.lerp(b.direction, t),
+        level: a.level + t * (b.level - a.level),
+        weight: a.weight.lerp(b.weight, t),
+    }
+}
+
 /// Twin of `estimate`.
 ///
 /// # Panics
@@ -163,11 +222,8 @@ pub(super) fn estimate(point: &Point) -> Vec3 {
     let surface = &point.surface;
     let light = blurred_light(point.twin);
     let sources = &point.twin.sources;
-    let row = (surface.theta_o * (threads.rows as f32 / FRAC_PI_2)).min((threads.rows - 1) as f32);
-    let (below, t) = (row as usize, row.fract());
-    let above = (below + 1).min(threads.rows - 1);
-    let [a, b] = [below, above].map(|row| Vec3::from(threads.cosine_part[row]));
-    let cosine_part = a.lerp(b, t);
+    let rows = Rows::at(surface, threads);
+    let cosine_part = rows.cosine_part(threads);
     let mut sum = Vec3::ZERO;
     let mut of_kernels = 0.0;
     if !sources.is_empty() {
@@ -179,10 +235,9 @@ pub(super) fn estimate(point: &Point) -> Vec3 {
         sum = f_cos.lerp(cosine * cosine_part / PI, of_kernels);
     }
     for k in 0..threads.count {
-        let [a, b] = [below, above].map(|row| threads.row(row)[k].unpack());
-        let direction = surface.frame * a.direction.lerp(b.direction, t);
-        let level = level_within_pixel(a.level + t * (b.level - a.level), surface.normal_variance);
-        sum += a.weight.lerp(b.weight, t) * blurred_radiance(point.twin, direction, level, of_kernels);
+        let kernel = rows.kernel(threads, k);
+        let level = level_within_pixel(kernel.level, surface.normal_variance);
+        sum += kernel.weight * blurred_radiance(point.twin, surface.frame * kernel.direction, level, of_kernels);
     }
     sum += cosine_part * light.irradiance.lookup(surface.frame.z_axis, 0.0);
     sum.max(Vec3::ZERO)

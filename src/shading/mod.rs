@@ -12,6 +12,7 @@ use crate::method::{Lookups, Method};
 use crate::passes::{SMOOTH_DEG, View, smooth_variance};
 use crate::prepare::{Prepared, PreparedMaterial};
 use crate::steps::{Tabulate, light};
+use crate::tangent::any_tangent;
 use crate::threads::{SliceTable, SplitSum, Threads};
 use glam::{Mat3, UVec2, Vec2, Vec3, Vec4};
 use random::random_bits;
@@ -48,6 +49,8 @@ pub struct Surface {
     pub theta_o: f32,
     /// Variance of the normal within the pixel along each axis, in rad^2, where sub-pixels share one sum; else 0.
     pub normal_variance: f32,
+    /// Cosine and sine of the azimuth of w_o from the tangent; (1, 0) where the material is isotropic.
+    pub phi_o: Vec2,
 }
 
 impl Surface {
@@ -63,7 +66,15 @@ impl Surface {
             w_o,
             theta_o: sin_theta_o.atan2(cos_theta_o),
             normal_variance: 0.0,
+            phi_o: Vec2::X,
         }
+    }
+
+    /// Turns the tangent to what of `tangent`, of any length, is in the tangent plane. Twin of `set_tangent`.
+    pub fn set_tangent(&mut self, tangent: Vec3) {
+        let along = Vec2::new(self.frame.x_axis.dot(tangent), -self.frame.y_axis.dot(tangent));
+        // The reason for 1e-3 stands in the shader.
+        self.phi_o = if along.length() > 1e-3 { along / along.length() } else { Vec2::X };
     }
 
     /// Towards the eye in the shading frame, cos_theta_o at least 1e-4. Twin of `view_direction`.
@@ -73,22 +84,28 @@ impl Surface {
     }
 }
 
-/// An axis orthogonal to n. Twin of `any_tangent` (Duff et al. 2017).
-fn any_tangent(n: Vec3) -> Vec3 {
-    let s = if n.z >= 0.0 { 1.0 } else { -1.0 };
-    let a = -1.0 / (s + n.z);
-    Vec3::new(1.0 + s * n.x * n.x * a, s * n.x * n.y * a, -s * n.x)
+/// `w` of the shading frame, turned about z by an angle of this cosine and sine. Twin of `turned`.
+fn turned(w: Vec3, angle: Vec2) -> Vec3 {
+    angle.rotate(w.truncate()).extend(w.z)
 }
 
 /// Whether the sub-pixels of a pixel lie on one surface that is smooth to `method`. Twin of glsl/classify.comp.
 pub fn is_interior(method: Method, texels: &[UVec2]) -> bool {
     let Some(first) = texels.first().copied().and_then(GeometryTexel::unpack) else { return false };
     let is_near = |texel: &UVec2| {
-        GeometryTexel::unpack(*texel).is_some_and(|GeometryTexel { normal, material }| {
+        GeometryTexel::unpack(*texel).is_some_and(|GeometryTexel { normal, material, .. }| {
             material == first.material && normal.dot(first.normal) >= SMOOTH_DEG.to_radians().cos()
         })
     };
-    texels.iter().all(is_near) && normal_variance(texels) < smooth_variance(method)
+    let tangents_agree = || {
+        first.tangent.is_none() || 1.0 - tangent_sum(texels).length() / (texels.len() as f32) < smooth_variance(method)
+    };
+    texels.iter().all(is_near) && normal_variance(texels) < smooth_variance(method) && tangents_agree()
+}
+
+/// The sum of the tangents of these sub-pixels, as far as they have any.
+fn tangent_sum(texels: &[UVec2]) -> Vec3 {
+    texels.iter().filter_map(|texel| GeometryTexel::unpack(*texel)?.tangent).sum()
 }
 
 /// The sum of the normals of these sub-pixels.
@@ -187,7 +204,7 @@ impl<'a> CpuShader<'a> {
         if let Some(mut point) = mean {
             let View { width, height, .. } = self.prepared.view;
             let position = (pixel.as_vec2() + 0.5) / UVec2::new(width, height).as_vec2();
-            point.surface = self.surface_at(position, normal_sum(texels).normalize());
+            point.surface = self.surface_at(position, normal_sum(texels).normalize(), tangent_sum(texels));
             point.surface.normal_variance = normal_variance(texels);
             if !fitted::needs_subpixels(&point) {
                 point.is_pixel = true;
@@ -199,9 +216,13 @@ impl<'a> CpuShader<'a> {
     }
 
     /// The surface that is seen at a place in the picture, from 0 to 1. Twin of `surface_at` in glsl/shade.comp.
-    fn surface_at(&self, position: Vec2, normal: Vec3) -> Surface {
+    fn surface_at(&self, position: Vec2, normal: Vec3, tangent: Vec3) -> Surface {
         let w_o = -self.prepared.view.camera_rays().ray(position).normalize();
-        Surface::new(self.to_environment(normal), self.to_environment(w_o))
+        let mut surface = Surface::new(self.to_environment(normal), self.to_environment(w_o));
+        if self.prepared.has_tangents() {
+            surface.set_tangent(self.to_environment(tangent));
+        }
+        surface
     }
 
     /// Twin of `to_environment`.
@@ -212,11 +233,12 @@ impl<'a> CpuShader<'a> {
 
     /// Sub-pixel `j` of `pixel`, which sees `texel`, by all threads or samples; none if it sees no surface.
     fn subpixel(&self, pixel: UVec2, j: usize, texel: UVec2) -> Option<Point<'_>> {
-        let GeometryTexel { normal, material } = GeometryTexel::unpack(texel)?;
+        let GeometryTexel { normal, tangent, material } = GeometryTexel::unpack(texel)?;
         let view = &self.prepared.view;
         let subpixel = pixel * view.subpixels + UVec2::new(j as u32 % view.subpixels, j as u32 / view.subpixels);
         let size = UVec2::new(view.width, view.height) * view.subpixels;
-        let surface = self.surface_at((subpixel.as_vec2() + 0.5) / size.as_vec2(), normal);
+        let position = (subpixel.as_vec2() + 0.5) / size.as_vec2();
+        let surface = self.surface_at(position, normal, tangent.unwrap_or_default());
         let axis = self.to_environment(view.camera_rays().right());
         Some(Point { twin: self, surface, axis, material, subpixel, first: 0, stride: 1, is_pixel: false })
     }
@@ -264,8 +286,10 @@ impl Point<'_> {
         (self.first..self.sample_count()).step_by(self.stride)
     }
 
+    /// Twin of `brdf_at`.
     fn brdf(&self, w_i: Vec3, w_o: Vec3) -> Vec3 {
         let brdf = self.twin.tables[self.material].as_ref().unwrap_or(&self.material().brdf);
+        let [w_i, w_o] = [w_i, w_o].map(|w| turned(w, self.surface.phi_o));
         brdf.evaluate(w_i.as_dvec3(), w_o.as_dvec3()).as_vec3()
     }
 

@@ -1,9 +1,9 @@
 //! The paper's estimate, equation (2). Twin of glsl/methods/paper.glsl, by functions of the same names.
 use std::f32::consts::FRAC_PI_2;
 
-use glam::{Mat3, Vec3, Vec4};
+use glam::{Mat3, Vec2, Vec3, Vec4};
 
-use super::{Point, Surface, any_tangent};
+use super::{Point, Surface, any_tangent, turned};
 use crate::threads::{ThreadTable, Threads};
 
 /// A frame at `n` that does not turn with w_o. Twin of `fixed_frame` in glsl/surface.glsl.
@@ -79,7 +79,9 @@ impl Paper<'_> {
 
     fn add_term(&self, sum: &mut WeightedSum, frame: Mat3, w_i: Vec3, w_o: Vec3, log2_p: f32) {
         let radiance = self.point.filtered_radiance(frame * w_i, self.lookup_solid_angle(log2_p));
-        let weight = self.point.brdf(w_i, w_o) * (w_i.z * (-log2_p).exp2());
+        let of_surface = self.point.surface.frame;
+        let turn = Vec2::new(of_surface.x_axis.dot(frame.x_axis), of_surface.y_axis.dot(frame.x_axis));
+        let weight = self.point.brdf(turned(w_i, turn), turned(w_o, turn)) * (w_i.z * (-log2_p).exp2());
         sum.weight += weight;
         sum.radiance += weight * radiance;
     }

@@ -113,6 +113,11 @@ impl Step for Tabulate<'_> {
     }
 
     fn make(&self, _: &Round) -> Result<Tabulated> {
+        if !self.0.is_isotropic() {
+            let problem = "is anisotropic, and shaders have no form of it";
+            let remedy = "use --method reference, or fitted under light without small lamps";
+            return Err(Error::input(format!("model `{}`", self.0.model()), problem, remedy));
+        }
         Ok(tabulate(self.0).0)
     }
 }

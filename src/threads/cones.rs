@@ -51,13 +51,14 @@ impl Cones {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::brdf::SeenBrdf;
     use crate::threads::test_materials;
 
     #[test]
     fn a_cone_holds_its_share_of_the_mass() {
         const COUNT: usize = 40;
         for (name, brdf) in test_materials::all() {
-            let slice = Slice::new(&brdf, 0.6);
+            let slice = Slice::new(&SeenBrdf::from_all_around(&brdf), 0.6);
             let cones = Cones::new(&slice, COUNT);
             for s in slice.points(5) {
                 let sigma = cones.sigma(s, f64::INFINITY);

@@ -7,12 +7,13 @@
 //! | 8 | magic `THREADS\0` |
 //! | 4 | u32 format version, now 8 |
 //! | 4 | u32 length H of the header |
-//! | H | header, JSON: `method` ("fitted" or "paper"), `material`, `count`, `rows`, `seed` |
+//! | H | header, JSON: `method` ("fitted" or "paper"), `material`, `count`, `rows`, `seed`, and `azimuths` if there is more than one |
 //! | ... | the rows, then the threads, see below |
 //! | 32 | BLAKE3 digest of everything before |
 //!
 //! Row r is for the view angle theta_o = r 90 deg / rows, in the frame whose z is the normal and in which w_o = (sin theta_o, 0,
-//! cos theta_o). Colours are linear Rec. 709. Thread k of row r is the (r count + k)-th.
+//! cos theta_o). Colours are linear Rec. 709. Thread k of row r is the (r count + k)-th. Of an anisotropic BRDF there are as many rows for
+//! each of 7, 13 or 25 azimuths of w_o from the tangent, every 15 degrees; then those of the second azimuth follow those of the first.
 //!
 //! | method | a row | a thread |
 //! |---|---|---|
@@ -46,6 +47,16 @@ struct Header {
     count: usize,
     rows: usize,
     seed: u64,
+    #[serde(default = "one", skip_serializing_if = "is_one")]
+    azimuths: usize,
+}
+
+fn one() -> usize {
+    1
+}
+
+fn is_one(azimuths: &usize) -> bool {
+    *azimuths == 1
 }
 
 /// Writes `threads` to `path`, whole or not at all.
@@ -62,11 +73,11 @@ pub fn read(path: &Path) -> Result<Threads> {
 fn encode(threads: &Threads) -> Vec<u8> {
     let [rows, count] = threads.size();
     let method = threads.kind().name().to_owned();
-    let (material, seed) = match threads {
-        Threads::Fitted(table) => (table.material.clone(), 0),
-        Threads::Paper(table) => (table.material.clone(), table.seed),
+    let (material, seed, azimuths) = match threads {
+        Threads::Fitted(table) => (table.material.clone(), 0, table.azimuths),
+        Threads::Paper(table) => (table.material.clone(), table.seed, 1),
     };
-    let header = serde_json::to_vec(&Header { method, material, count, rows, seed });
+    let header = serde_json::to_vec(&Header { method, material, count, rows, seed, azimuths });
     let header = header.expect("a header of strings and numbers is always JSON");
     let mut bytes = MAGIC.to_vec();
     bytes.extend(FORMAT_VERSION.to_le_bytes());
@@ -97,7 +108,7 @@ fn decode(bytes: &[u8]) -> Result<Threads, String> {
     let (&length, rest) = rest.split_first_chunk().ok_or("is cut short")?;
     let (header, payload) = rest.split_at_checked(u32::from_le_bytes(length) as usize).ok_or("is cut short")?;
     let header: Header = serde_json::from_slice(header).map_err(|error| format!("has a bad header ({error})"))?;
-    let Header { method, material, count, rows, seed } = header;
+    let Header { method, material, count, rows, seed, azimuths } = header;
     let kind = [ThreadKind::Fitted, ThreadKind::Paper].into_iter().find(|kind| kind.name() == method);
     let kind = kind.ok_or_else(|| format!("holds threads of the unknown method {method:?}"))?;
     let words_a_row = match kind {
@@ -105,16 +116,18 @@ fn decode(bytes: &[u8]) -> Result<Threads, String> {
         ThreadKind::Paper => ThreadTable::FILE_ROW_WORDS,
     };
     let per_row = count.checked_mul(3).and_then(|words| words.checked_add(words_a_row));
-    let expected = per_row.and_then(|words| words.checked_mul(rows)?.checked_mul(4));
-    if count == 0 || rows == 0 || expected != Some(payload.len()) {
+    let all_rows = rows.checked_mul(azimuths);
+    let expected = per_row.and_then(|words| words.checked_mul(all_rows?)?.checked_mul(4));
+    let is_possible = azimuths == 1 || kind == ThreadKind::Fitted && [7, 13, 25].contains(&azimuths);
+    if count == 0 || rows == 0 || !is_possible || expected != Some(payload.len()) {
         return Err("has a header that does not fit its content".into());
     }
     let words: Vec<u32> = payload.as_chunks().0.iter().map(|&word| u32::from_le_bytes(word)).collect();
-    let (of_rows, of_threads) = words.split_at(words_a_row * rows);
+    let (of_rows, of_threads) = words.split_at(words_a_row * rows * azimuths);
     Ok(match kind {
         ThreadKind::Fitted => {
             let table = FittedTable::from_file_words(of_rows, of_threads)?;
-            Threads::Fitted(FittedTable { rows, count, material, ..table })
+            Threads::Fitted(FittedTable { rows, azimuths, count, material, ..table })
         }
         ThreadKind::Paper => {
             let table = ThreadTable::from_file_words(of_rows, of_threads)?;
@@ -136,6 +149,7 @@ mod tests {
     fn fitted() -> Threads {
         Threads::Fitted(FittedTable {
             rows: 2,
+            azimuths: 1,
             count: 1,
             material: "b".into(),
             cosine_part: vec![[0.1, 0.2, -0.01]; 2],

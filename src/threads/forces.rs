@@ -125,7 +125,7 @@ pub fn settle(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::brdf::Brdf;
+    use crate::brdf::{Brdf, SeenBrdf};
 
     #[test]
     fn strength_is_equation_9() {
@@ -155,7 +155,7 @@ mod tests {
     #[test]
     fn crowded_samples_spread_and_stay_above_the_horizon() {
         let brdf = Brdf::builtin("clay").unwrap();
-        let slice = Slice::new(&brdf, 0.5);
+        let slice = Slice::new(&SeenBrdf::from_all_around(&brdf), 0.5);
         // All within a degree, two of them equal.
         let mut samples: Vec<DVec3> =
             (0..20).map(|i| DVec3::new(1e-3 * f64::from(i % 19), 1e-3 * f64::from(i % 7), 1.0).normalize()).collect();

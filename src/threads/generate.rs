@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::slice::{Slice, fibonacci_lattice};
 use super::{MIN_COS, Sample, ThreadSettings, ThreadTable, theta_o};
 use super::{forces, peaks, smoothing};
-use crate::brdf::Brdf;
+use crate::brdf::{Brdf, SeenBrdf};
 use crate::error::{Error, Result};
 use crate::progress::Observer;
 
@@ -24,11 +24,12 @@ pub fn generate(brdf: &Brdf, settings: &ThreadSettings, observer: &dyn Observer)
     // Each row is finished twice: its slice is tabulated (on all cores), then its samples settle.
     let done = AtomicUsize::new(0);
     let advance = || observer.progress(done.fetch_add(1, Ordering::Relaxed).div_ceil(2), rows);
+    let seen = SeenBrdf::from_all_around(brdf);
     let tabulate = |row| {
         if observer.cancelled() {
             return Err(Error::Cancelled);
         }
-        let slice = Slice::new(brdf, theta_o(row, rows));
+        let slice = Slice::new(&seen, theta_o(row, rows));
         let peak = peaks::sharp_peak(&slice);
         advance();
         Ok((slice, peak))
@@ -205,7 +206,7 @@ mod tests {
         let brdf = test_materials::narrow();
         let table = generate(brdf, &small(3, 30), &()).unwrap();
         let holder = |row: usize| {
-            let slice = Slice::new(brdf, table.theta_o(row));
+            let slice = Slice::new(&SeenBrdf::from_all_around(brdf), table.theta_o(row));
             let peak = peaks::sharp_peak(&slice).expect("a lobe of 0.3 degrees is sharp");
             (0..3).find(|&thread| table.row(row)[thread].direction().distance(peak) < 1e-6)
         };
@@ -314,7 +315,7 @@ mod tests {
     fn light_error(brdf: &Brdf, table: &ThreadTable) -> f64 {
         let (mut error, mut size) = (0.0, 0.0);
         for row in [5, 30, 55, 70].map(|row| row * table.rows / 90) {
-            let slice = Slice::new(brdf, table.theta_o(row));
+            let slice = Slice::new(&SeenBrdf::from_all_around(brdf), table.theta_o(row));
             let dense: Vec<DVec3> = slice.points(20_000).collect();
             for uv in fibonacci_lattice(40) {
                 let z = uv.x;

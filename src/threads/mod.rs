@@ -128,13 +128,13 @@ impl Threads {
         }
     }
 
-    /// Where each thread looks for the view angle `theta_o` (radians), unit, in the shading frame, and which share of the light that is
-    /// looked up it has: between rows as shading has them.
-    pub fn seen_from(&self, theta_o: f64) -> Vec<(DVec3, f64)> {
+    /// Where each thread looks for the view angle `theta_o` and its azimuth `phi_o` from the tangent (radians), unit, in the shading frame,
+    /// and which share of the light that is looked up it has: between rows as shading has them.
+    pub fn seen_from(&self, theta_o: f64, phi_o: f64) -> Vec<(DVec3, f64)> {
         let count = self.size()[1];
         match self {
             Self::Fitted(table) => {
-                let kernels = table.seen_from(theta_o).into_iter();
+                let kernels = table.seen_from(theta_o, phi_o).into_iter();
                 let kernels: Vec<_> = kernels.map(|kernel| (kernel.direction, luminance(kernel.weight))).collect();
                 let total: f64 = kernels.iter().map(|(_, weight)| weight).sum();
                 let share = |weight: f64| if total > 0.0 { weight / total } else { 1.0 / count as f64 };

@@ -29,13 +29,13 @@ pub fn occupy(peak: DVec3, samples: &mut [DVec3], before: Option<usize>) -> usiz
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::brdf::Brdf;
+    use crate::brdf::{Brdf, SeenBrdf};
     use crate::threads::test_materials;
 
     #[test]
     fn a_narrow_lobe_is_sharp_and_a_diffuse_one_is_not() {
-        assert!(sharp_peak(&Slice::new(test_materials::narrow(), 0.5)).is_some());
-        assert!(sharp_peak(&Slice::new(&Brdf::builtin("clay").unwrap(), 0.5)).is_none());
+        assert!(sharp_peak(&Slice::new(&SeenBrdf::from_all_around(test_materials::narrow()), 0.5)).is_some());
+        assert!(sharp_peak(&Slice::new(&SeenBrdf::from_all_around(&Brdf::builtin("clay").unwrap()), 0.5)).is_none());
     }
 
     #[test]

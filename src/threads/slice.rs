@@ -3,7 +3,7 @@ use std::f64::consts::{FRAC_1_PI, FRAC_PI_2, PI};
 
 use glam::{DVec2, DVec3, dvec3};
 
-use crate::brdf::{Brdf, luminance};
+use crate::brdf::{SeenBrdf, luminance};
 
 /// Numbers of steps over theta_h and phi_h.
 #[derive(Clone, Copy, Debug)]
@@ -27,7 +27,7 @@ impl Resolution {
 /// tables need not be mirror-symmetric about the plane of incidence). With w_i the reflection of w_o about h,
 /// dw_i = 4 (w_o . h) dw_h. A glossy lobe thus lies about x = 0 at every view angle, and the square resolves a narrow one.
 pub struct Slice<'a> {
-    brdf: &'a Brdf,
+    brdf: SeenBrdf<'a>,
     w_o: DVec3,
     /// Luminance of f below which nothing counts: 0, or see [`Slice::lobes`].
     base: f64,
@@ -78,7 +78,7 @@ fn direction_of_turn(turn: f64) -> DVec2 {
 }
 
 /// Those of all steps of x and phi_h, ring by ring.
-fn cells(brdf: &Brdf, w_o: DVec3, Resolution { theta, phi }: Resolution) -> Vec<Cell> {
+fn cells(brdf: &SeenBrdf, w_o: DVec3, Resolution { theta, phi }: Resolution) -> Vec<Cell> {
     let azimuths: Vec<_> = (0..phi).map(|j| direction_of_turn((j as f64 + 0.5) / phi as f64)).collect();
     let mut cells = Vec::with_capacity(theta * phi);
     let (mut seen, mut directions) = (Vec::new(), Vec::new());
@@ -104,14 +104,14 @@ fn cells(brdf: &Brdf, w_o: DVec3, Resolution { theta, phi }: Resolution) -> Vec<
 impl<'a> Slice<'a> {
     /// Tabulates `brdf` seen from `theta_o` (radians, less than pi / 2). Where it reflects nothing the pdf is that of a
     /// diffuse surface, cos / pi: a thread then still has a direction, and its samples add up to the zero they should.
-    pub fn new(brdf: &'a Brdf, theta_o: f64) -> Self {
+    pub fn new(brdf: &SeenBrdf<'a>, theta_o: f64) -> Self {
         let w_o = dvec3(theta_o.sin(), 0.0, theta_o.cos());
         Self::above(brdf, w_o, &cells(brdf, w_o, Resolution::FULL), Resolution::FULL, 0.0)
     }
 
     /// The same, and the slice of what is above the median of f, by luminance: lobes without the base that they stand on. A tenth of
     /// the mass of a glossy plastic is in its lobe; the second slice has all of its mass there.
-    pub fn with_lobes(brdf: &'a Brdf, theta_o: f64, resolution: Resolution) -> [Self; 2] {
+    pub fn with_lobes(brdf: &SeenBrdf<'a>, theta_o: f64, resolution: Resolution) -> [Self; 2] {
         const POINTS: usize = 512;
         let w_o = dvec3(theta_o.sin(), 0.0, theta_o.cos());
         let directions: Vec<_> = fibonacci_lattice(POINTS)
@@ -123,7 +123,7 @@ impl<'a> Slice<'a> {
         [0.0, values[POINTS / 2]].map(|base| Self::above(brdf, w_o, &cells, resolution, base))
     }
 
-    fn above(brdf: &'a Brdf, w_o: DVec3, cells: &[Cell], resolution: Resolution, base: f64) -> Self {
+    fn above(brdf: &SeenBrdf<'a>, w_o: DVec3, cells: &[Cell], resolution: Resolution, base: f64) -> Self {
         let slice = Self::tabulate(brdf, w_o, cells, resolution, base, |f| above_base(f, base));
         if slice.total > 0.0 {
             return slice;
@@ -132,7 +132,7 @@ impl<'a> Slice<'a> {
     }
 
     fn tabulate(
-        brdf: &'a Brdf,
+        brdf: &SeenBrdf<'a>,
         w_o: DVec3,
         cells: &[Cell],
         resolution: Resolution,
@@ -175,7 +175,17 @@ impl<'a> Slice<'a> {
             let w_i = reflect(w_o, h);
             if w_i.z > 0.0 && w_o.dot(h) > 0.0 { luminance(density(w_i)) } else { 0.0 }
         });
-        Self { brdf, w_o, base, albedo, total, resolution, ring_cdf, azimuth_cdf, peak: reflect(w_o, peak) }
+        Self {
+            brdf: brdf.clone(),
+            w_o,
+            base,
+            albedo,
+            total,
+            resolution,
+            ring_cdf,
+            azimuth_cdf,
+            peak: reflect(w_o, peak),
+        }
     }
 
     /// The integral of f cos per channel: the directional albedo.
@@ -314,7 +324,8 @@ mod tests {
         for (name, brdf) in test_materials::all() {
             for theta_o_deg in [0.0f64, 30.0, 60.0, 80.0, 88.0] {
                 let theta_o = theta_o_deg.to_radians();
-                let (slice, exact) = (Slice::new(&brdf, theta_o).albedo(), brdf.albedo(theta_o));
+                let (slice, exact) =
+                    (Slice::new(&SeenBrdf::from_all_around(&brdf), theta_o).albedo(), brdf.albedo(theta_o));
                 let error = ((slice - exact) / exact).abs().max_element();
                 assert!(error < 2e-3, "{name} at {theta_o_deg}: {slice}, {exact}");
             }
@@ -325,7 +336,7 @@ mod tests {
     fn coordinate_inverts_direction() {
         for (name, brdf) in test_materials::all() {
             for theta_o_deg in [0.0f64, 45.0, 85.0] {
-                let slice = Slice::new(&brdf, theta_o_deg.to_radians());
+                let slice = Slice::new(&SeenBrdf::from_all_around(&brdf), theta_o_deg.to_radians());
                 for uv in fibonacci_lattice(101) {
                     let back = slice.coordinate(slice.direction(uv));
                     // v is periodic.
@@ -341,7 +352,7 @@ mod tests {
         // The mean of 1 / p over points drawn with p is the solid angle of where p > 0: all of the hemisphere.
         let brdf = Brdf::from_parameters("lambert", toml::toml! { reflectance = 0.5 }).unwrap();
         for theta_o_deg in [0.0f64, 40.0, 70.0] {
-            let slice = Slice::new(&brdf, theta_o_deg.to_radians());
+            let slice = Slice::new(&SeenBrdf::from_all_around(&brdf), theta_o_deg.to_radians());
             let (count, mut mean, mut square) = (20_000, DVec3::ZERO, 0.0);
             for w_i in slice.points(count) {
                 mean += w_i / count as f64;
@@ -356,7 +367,8 @@ mod tests {
     #[test]
     fn lobes_are_the_slice_without_its_base() {
         let plastic = test_materials::glossy_plastic();
-        let [slice, lobes] = Slice::with_lobes(&plastic, 45f64.to_radians(), Resolution::FULL);
+        let [slice, lobes] =
+            Slice::with_lobes(&SeenBrdf::from_all_around(&plastic), 45f64.to_radians(), Resolution::FULL);
         let mirror = dvec3(-1.0, 0.0, 1.0).normalize();
         let near = |slice: &Slice| {
             let count = 1000;
@@ -366,7 +378,7 @@ mod tests {
         assert!(of_all < 0.3 && of_lobes > 2.0 * of_all, "{of_all} {of_lobes}");
         // Nothing stands out of Lambert: anywhere will do.
         let lambert = Brdf::from_parameters("lambert", toml::toml! { reflectance = 0.5 }).unwrap();
-        let [_, lobes] = Slice::with_lobes(&lambert, 0.5, Resolution::FULL);
+        let [_, lobes] = Slice::with_lobes(&SeenBrdf::from_all_around(&lambert), 0.5, Resolution::FULL);
         assert!(lobes.albedo() == DVec3::ZERO && lobes.direction(DVec2::splat(0.5)).z > 0.0);
     }
 
@@ -375,9 +387,9 @@ mod tests {
         for theta_o_deg in [0.0f64, 20.0, 50.0, 70.0] {
             let theta_o = theta_o_deg.to_radians();
             let mirror = dvec3(-theta_o.sin(), 0.0, theta_o.cos());
-            let narrow = Slice::new(test_materials::narrow(), theta_o).peak();
+            let narrow = Slice::new(&SeenBrdf::from_all_around(test_materials::narrow()), theta_o).peak();
             assert!(narrow.angle_between(mirror) < 2e-4, "{theta_o_deg}: {narrow}");
-            let diffuse = Slice::new(&Brdf::builtin("clay").unwrap(), theta_o).peak();
+            let diffuse = Slice::new(&SeenBrdf::from_all_around(&Brdf::builtin("clay").unwrap()), theta_o).peak();
             assert!(diffuse.angle_between(DVec3::Z) < 1e-3, "{theta_o_deg}: {diffuse}");
         }
     }

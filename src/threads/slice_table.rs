@@ -3,7 +3,7 @@ use rayon::prelude::*;
 
 use super::slice::{Resolution, Slice};
 use super::theta_o;
-use crate::brdf::Brdf;
+use crate::brdf::{Brdf, SeenBrdf};
 
 /// View angles: theta_o = row 90 deg / ROWS. `SLICE_ROWS` in glsl/importance_sampling.glsl.
 pub const ROWS: usize = 90;
@@ -29,10 +29,11 @@ pub struct SliceTable {
 }
 
 impl SliceTable {
-    /// Tabulates `brdf`.
+    /// Tabulates `brdf`; of an anisotropic one the mean over the azimuths of the view.
     pub fn new(brdf: &Brdf) -> Self {
+        let seen = SeenBrdf::from_all_around(brdf);
         let row = |row: usize| {
-            let (rings, azimuths) = Slice::new(brdf, theta_o(row, ROWS)).coarse_cdfs(MERGED);
+            let (rings, azimuths) = Slice::new(&seen, theta_o(row, ROWS)).coarse_cdfs(MERGED);
             let all = rings.into_iter().chain(azimuths.into_iter().flatten());
             all.map(|mass| ((mass * STEPS).round() / STEPS) as f32).collect::<Vec<_>>()
         };

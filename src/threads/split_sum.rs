@@ -11,7 +11,7 @@ use super::fitted::kernel::vmf_peak;
 use super::fitted::lights::{Quadrature, SCALES, TestLights, light_kappa};
 use super::slice::{Resolution, Slice};
 use super::theta_o;
-use crate::brdf::{Brdf, Tap, ggx_lobe};
+use crate::brdf::{Brdf, SeenBrdf, Tap, ggx_lobe};
 
 /// View angles: theta_o = row 90 deg / ROWS. `SPLIT_SUM_ROWS` in glsl/methods/split_sum.glsl.
 pub const ROWS: usize = 90;
@@ -39,9 +39,10 @@ pub struct SplitSum {
 }
 
 impl SplitSum {
-    /// Of `brdf`.
+    /// Of `brdf`; of an anisotropic one the mean over the azimuths of the view.
     pub fn new(brdf: &Brdf) -> Self {
-        let answers: Vec<_> = FITTED_ROWS.into_par_iter().map(|row| Answers::new(brdf, row)).collect();
+        let seen = SeenBrdf::from_all_around(brdf);
+        let answers: Vec<_> = FITTED_ROWS.into_par_iter().map(|row| Answers::new(&seen, row)).collect();
         let cost_at = |log_alpha: f64| fit(&answers, log_alpha.exp()).1;
         let step = -LEAST_ALPHA.ln() / ALPHA_STEPS as f64;
         let places: Vec<_> = (0..=ALPHA_STEPS).map(|i| LEAST_ALPHA.ln() + step * i as f64).collect();
@@ -77,7 +78,7 @@ struct Answers {
 }
 
 impl Answers {
-    fn new(brdf: &Brdf, row: usize) -> Self {
+    fn new(brdf: &SeenBrdf, row: usize) -> Self {
         let theta_o = theta_o(row, ROWS);
         let slices = Slice::with_lobes(brdf, theta_o, Resolution::DRAFT);
         let lights = TestLights::new(&slices, LIGHTS, 0, Quadrature::DRAFT);

@@ -28,6 +28,8 @@ pub struct Surface {
     pub material: usize,
     /// Angle between the normal and the direction to the eye, in radians.
     pub theta_o_rad: f64,
+    /// Azimuth of that direction from the tangent, in radians; 0 of an isotropic material.
+    pub phi_o_rad: f64,
     /// Shading frame to the environment's own picture.
     to_environment: DMat3,
 }
@@ -39,16 +41,25 @@ impl Surface {
         let hits = prepared.objects.iter().filter_map(|object| {
             let to_object = object.to_world.inverse();
             let origin = to_object.transform_point3(view.camera.eye);
-            let (distance, normal) =
-                prepared.meshes[object.mesh].1.hit(origin, to_object.transform_vector3(direction))?;
-            Some((distance, to_object.matrix3.transpose() * normal, object.material as usize))
+            let along = to_object.transform_vector3(direction);
+            let (distance, normal) = prepared.meshes[object.mesh].1.hit(origin, along)?;
+            let tangent = object
+                .tangent
+                .map(|rule| object.to_world.matrix3 * rule.at((origin + distance * along).as_vec3()).as_dvec3());
+            Some((distance, to_object.matrix3.transpose() * normal, tangent, object.material as usize))
         });
-        let (_, normal, material) = hits.min_by(|(a, ..), (b, ..)| a.total_cmp(b))?;
+        let (_, normal, tangent, material) = hits.min_by(|(a, ..), (b, ..)| a.total_cmp(b))?;
         let (n, w_o) = (normal.try_normalize()?, -direction);
         let x = (w_o - n.dot(w_o) * n).try_normalize().unwrap_or_else(|| n.any_orthonormal_vector());
         let to_world = DMat3::from_cols(x, n.cross(x), n);
         let to_environment = DMat3::from_rotation_y(-view.rotation_deg.to_radians()) * to_world;
-        Some(Self { material, theta_o_rad: n.dot(w_o).clamp(0.0, 1.0).acos().min(MAX_THETA_O_RAD), to_environment })
+        let phi_o_rad = tangent.map_or(0.0, |tangent| -tangent.dot(to_world.y_axis).atan2(tangent.dot(x)));
+        Some(Self {
+            material,
+            phi_o_rad,
+            theta_o_rad: n.dot(w_o).clamp(0.0, 1.0).acos().min(MAX_THETA_O_RAD),
+            to_environment,
+        })
     }
 
     /// Where `direction` of the shading frame is in the environment's picture: parts of its width and height.
@@ -114,7 +125,9 @@ pub fn draw_hemisphere(ui: &mut Ui, threads: &Threads, surface: Option<&Surface>
     let eye = visuals.strong_text_color();
     painter.line_segment([centre, place(DVec3::X)], Stroke::new(1.0, eye));
     if let Some(surface) = surface {
-        for (thread, (direction, share)) in threads.seen_from(surface.theta_o_rad).into_iter().enumerate() {
+        for (thread, (direction, share)) in
+            threads.seen_from(surface.theta_o_rad, surface.phi_o_rad).into_iter().enumerate()
+        {
             dot(&painter, place(direction), radius(share, count), colour(thread, count, true));
         }
         let (sin, cos) = surface.theta_o_rad.sin_cos();
@@ -136,7 +149,9 @@ pub fn draw_environment(ui: &mut Ui, picture: TextureId, threads: Option<&Thread
     painter.image(picture, rect, whole, Color32::WHITE);
     if let (Some(threads), Some(surface)) = (threads, surface) {
         let [_, count] = threads.size();
-        for (thread, (direction, share)) in threads.seen_from(surface.theta_o_rad).into_iter().enumerate() {
+        for (thread, (direction, share)) in
+            threads.seen_from(surface.theta_o_rad, surface.phi_o_rad).into_iter().enumerate()
+        {
             let [u, v] = surface.in_environment(direction).map(|part| part as f32);
             let at = rect.min + vec2(u * rect.width(), v * rect.height());
             dot(&painter, at, radius(share, count), colour(thread, count, true));
@@ -208,7 +223,7 @@ mod tests {
             let prepared = sphere(method);
             let threads = &prepared.materials[0].threads.as_ref().unwrap().pixel;
             for row in [0, 30, 89] {
-                let seen = threads.seen_from(row as f64 / 90.0 * FRAC_PI_2 + 1e-12);
+                let seen = threads.seen_from(row as f64 / 90.0 * FRAC_PI_2 + 1e-12, 0.0);
                 assert!((seen.iter().map(|(_, share)| share).sum::<f64>() - 1.0).abs() < 1e-6);
                 for (thread, (direction, share)) in seen.into_iter().enumerate() {
                     assert!(direction.distance(threads.direction(row, thread)) < 1e-6 && share >= 0.0);

@@ -24,7 +24,7 @@ const ABOVE_WHITE: f64 = 0.05;
 /// A point to shade: its frame in the environment's axes, and its view.
 #[derive(Clone, Copy, Debug)]
 pub struct Point {
-    /// Columns: x, the part of w_o orthogonal to n; y = z cross x; z = n.
+    /// Columns: x, the tangent, or without one the part of w_o orthogonal to n; y = z cross x; z = n.
     pub(super) frame: DMat3,
     /// Towards the eye, in that frame; at most [`MAX_THETA_O_DEG`] from z.
     w_o: DVec3,
@@ -42,6 +42,14 @@ impl Point {
         let x = if sin_theta_o > 1e-12 { across / sin_theta_o } else { n.any_orthonormal_vector() };
         let theta_o = sin_theta_o.atan2(cos_theta_o).min(MAX_THETA_O_DEG.to_radians());
         Self { frame: DMat3::from_cols(x, n.cross(x), n), w_o: dvec3(theta_o.sin(), 0.0, theta_o.cos()), material }
+    }
+
+    /// The same of an anisotropic material, with what of `tangent` is orthogonal to the normal as its tangent.
+    pub fn with_tangent(self, tangent: DVec3) -> Self {
+        let n = self.frame.z_axis;
+        let Some(x) = (tangent - tangent.dot(n) * n).try_normalize() else { return self };
+        let frame = DMat3::from_cols(x, n.cross(x), n);
+        Self { frame, w_o: frame.transpose() * (self.frame * self.w_o), ..self }
     }
 
     /// Adds f(w_i, w_o) (n . w_i) per channel, in 1/sr, for unit `directions` in the axes of the environment.
@@ -64,7 +72,7 @@ impl Point {
     /// half an edge apart: the cell holds the mirror direction, or nearly so, and is wider than the lobe.
     fn may_hide_lobe(&self, radius: f64, place: CellPlace) -> bool {
         let w_i = self.frame.transpose() * place.middle();
-        let mirror = dvec3(-self.w_o.x, 0.0, self.w_o.z);
+        let mirror = dvec3(-self.w_o.x, -self.w_o.y, self.w_o.z);
         // Reflection doubles angles, but across the plane of incidence shrinks them by the cosine. Beyond its bound cells are small enough to
         // find part of a lobe, and what is found is split like all else.
         let narrow = 2.0 * radius * self.w_o.z.max(MIN_COS_THETA_D);

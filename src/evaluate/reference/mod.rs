@@ -263,9 +263,10 @@ impl Integrator<'_> {
         subpixels
             .filter_map(|(u, v)| {
                 let texel = geometry[v * width as usize + u];
-                let GeometryTexel { normal, material } = GeometryTexel::unpack(UVec2::from_array(texel))?;
+                let GeometryTexel { normal, tangent, material } = GeometryTexel::unpack(UVec2::from_array(texel))?;
                 let w_o = -view.camera.ray(u as f64, v as f64, width, height);
-                Some(Point::new(to_environment * normal.as_dvec3().normalize(), to_environment * w_o, material))
+                let point = Point::new(to_environment * normal.as_dvec3().normalize(), to_environment * w_o, material);
+                Some(tangent.map_or(point, |tangent| point.with_tangent(to_environment * tangent.as_dvec3())))
             })
             .collect()
     }

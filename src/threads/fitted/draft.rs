@@ -1,12 +1,13 @@
 //! Threads of an edited material at once: a few steps from those that are on screen, in few rows.
 use glam::DVec3;
 
+use super::azimuths::View;
 use super::generate::{Neighbour, Row, carried, from_the_middle, scaled};
 use super::kernel::Kernel;
 use super::lights::{Quadrature, TestLights};
 use super::solve::{Effort, Fit};
 use super::table::FittedTable;
-use crate::brdf::Brdf;
+use crate::brdf::{Brdf, SeenBrdf};
 use crate::error::Result;
 use crate::progress::Observer;
 use crate::threads::slice::{Resolution, Slice};
@@ -29,7 +30,7 @@ const TIED: f64 = 1e-5;
 const FEWEST_LIGHTS: usize = 256;
 const LIGHTS_A_THREAD: usize = 16;
 
-/// Threads of `brdf` that continue those of `before`, of a BRDF not far away: their error is about twice that of [`super::generate()`], in a
+/// Threads of `brdf`, which is isotropic, that continue those of `before`, of a BRDF not far away: their error is about twice that of [`super::generate()`], in a
 /// twentieth of the time; the guide's chapter on results has where it is more. The same to the last bit on any number of cores.
 ///
 /// # Errors
@@ -40,17 +41,18 @@ pub fn draft(brdf: &Brdf, before: &FittedTable, observer: &dyn Observer) -> Resu
     if !places.contains(&(rows - 1)) {
         places.push(rows - 1);
     }
-    let angle = |row: usize| theta_o(row, rows);
+    let view = |row: usize| View::of_angle(theta_o(row, rows));
+    let seen = SeenBrdf::from_azimuth(brdf, 0.0);
     let fit = |at: usize, neighbour: Neighbour| -> Result<Row> {
         observer.check()?;
         let row = places[at];
-        let slices = Slice::with_lobes(brdf, angle(row), Resolution::DRAFT);
+        let slices = Slice::with_lobes(&seen, view(row).theta_o, Resolution::DRAFT);
         let lights = TestLights::new(&slices, FEWEST_LIGHTS + LIGHTS_A_THREAD * count, 0, Quadrature::DRAFT);
         let albedo = slices[0].albedo();
         let start = scaled(&in_proportion(before, row, albedo), 1.0 / lights.unit);
         // Only directions and levels are tied, so weights may be in any unit.
         let (tied_to, strength, effort) = match neighbour {
-            Some((from, (kernels, ..))) => (carried(kernels, angle(places[from]), angle(row)), TIED, NEXT),
+            Some((from, (kernels, ..))) => (carried(kernels, view(places[from]), view(row)), TIED, NEXT),
             None => (start.clone(), FIRST_TIED, FIRST),
         };
         let mut kernels = start;
@@ -67,12 +69,12 @@ pub fn draft(brdf: &Brdf, before: &FittedTable, observer: &dyn Observer) -> Resu
         }
         let low = high - 1;
         let t = (row - places[low]) as f64 / (places[high] - places[low]) as f64;
-        let [a, b] = [low, high].map(|i| carried(&fitted[i].0, angle(places[i]), angle(row)));
+        let [a, b] = [low, high].map(|i| carried(&fitted[i].0, view(places[i]), view(row)));
         let kernels = a.iter().zip(&b).map(|(a, b)| a.between(b, t)).collect();
         let ((_, albedo_a, error_a), (_, albedo_b, error_b)) = (&fitted[low], &fitted[high]);
         (kernels, albedo_a.lerp(*albedo_b, t), error_a + t * (error_b - error_a))
     };
-    Ok(FittedTable::pack(&(0..rows).map(row).collect::<Vec<_>>()))
+    Ok(FittedTable::pack(&(0..rows).map(row).collect::<Vec<_>>(), 1))
 }
 
 /// The kernels of `row` of `table` with weights for this albedo: another colour, or none, has them at once.

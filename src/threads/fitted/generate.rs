@@ -1,19 +1,20 @@
-//! The fit of all rows: from the middle one outwards, each starts from its neighbour.
+//! The fit of all rows: from the middle one outwards, each starts from its neighbour; of an anisotropic BRDF, azimuth after azimuth.
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use glam::{DVec3, dvec3};
+use glam::{DVec2, DVec3, dvec3};
 use rayon::prelude::*;
 
+use super::azimuths::{View, azimuth_count};
 use super::cells::cells;
 use super::kernel::{Kernel, scale_rad};
 use super::lights::{Quadrature, TestLights};
 use super::solve::{Effort, Fit};
 use super::table::FittedTable;
-use crate::brdf::Brdf;
+use crate::brdf::{Brdf, SeenBrdf};
 use crate::error::Result;
 use crate::progress::Observer;
+use crate::threads::ThreadSettings;
 use crate::threads::slice::{Resolution, Slice};
-use crate::threads::{ThreadSettings, theta_o};
 
 /// Steps of the first row, which starts from cells, and of the others.
 const FIRST: Effort = Effort { steps: 300, least_gain: 1e-5 };
@@ -47,6 +48,8 @@ pub(super) type Neighbour<'a> = Option<(usize, &'a Row)>;
 
 /// What threads of a BRDF are fitted to: lights, and what it makes of them, in each row.
 pub struct Targets {
+    /// How many azimuths there are rows of.
+    azimuths: usize,
     /// The lights and the albedo.
     rows: Vec<(TestLights, DVec3)>,
 }
@@ -57,17 +60,20 @@ pub fn light_count(threads: usize) -> usize {
 }
 
 impl Targets {
-    /// Of `rows` rows with about `lights` lights each. 3 MB for 90 rows and 1128 lights.
+    /// Of `rows` rows, for each azimuth that `brdf` needs, with about `lights` lights each. 3 MB for 90 rows and 1128 lights.
     ///
     /// # Errors
     /// Cancelled by `observer` (noticed within a row).
     pub fn new(brdf: &Brdf, rows: usize, lights: usize, observer: &dyn Observer) -> Result<Self> {
-        let target = |row: usize| -> Result<(TestLights, DVec3)> {
+        let azimuths = azimuth_count(brdf);
+        let target = |index: usize| -> Result<(TestLights, DVec3)> {
             observer.check()?;
-            let slices = Slice::with_lobes(brdf, theta_o(row, rows), Resolution::FULL);
+            let View { theta_o, phi_o } = View::of_row(index, rows);
+            let slices = Slice::with_lobes(&SeenBrdf::from_azimuth(brdf, phi_o), theta_o, Resolution::FULL);
             Ok((TestLights::new(&slices, lights, LIGHTS_SEED, Quadrature::FIT), slices[0].albedo()))
         };
-        Ok(Self { rows: (0..rows).into_par_iter().map(target).collect::<Result<_>>()? })
+        let rows = (0..azimuths * rows).into_par_iter().map(target).collect::<Result<_>>()?;
+        Ok(Self { azimuths, rows })
     }
 
     /// Whether the cosine kernel alone does in all rows.
@@ -101,32 +107,52 @@ pub fn generate_for(
     settings.check()?;
     let rows = settings.rows;
     let done = AtomicUsize::new(0);
-    let fit = |row: usize, from: Neighbour| -> Result<Row> {
+    // Row `index` of all azimuths, from the kernels that it starts from.
+    let fit = |index: usize, start: Option<Vec<Kernel>>| -> Result<Row> {
         observer.check()?;
-        let (lights, albedo) = &targets.rows[row];
-        let (start, effort) = match from {
-            Some((before, (kernels, ..))) => (carried(kernels, theta_o(before, rows), theta_o(row, rows)), NEXT),
-            None => {
-                let [_, lobes] = Slice::with_lobes(brdf, theta_o(row, rows), Resolution::FULL);
-                (cells(&lobes, settings.count), FIRST)
-            }
-        };
+        let (lights, albedo) = &targets.rows[index];
+        let is_first = start.is_none();
+        let start = start.unwrap_or_else(|| {
+            let View { theta_o, phi_o } = View::of_row(index, rows);
+            let [_, lobes] = Slice::with_lobes(&SeenBrdf::from_azimuth(brdf, phi_o), theta_o, Resolution::FULL);
+            cells(&lobes, settings.count)
+        });
         let start = scaled(&start, 1.0 / lights.unit);
         let mut kernels = start.clone();
         let fit = Fit::new(lights, *albedo / lights.unit);
-        let fit = if from.is_some() { fit.tied(&start, TIED) } else { fit };
+        let (fit, effort) = if is_first { (fit, FIRST) } else { (fit.tied(&start, TIED), NEXT) };
         fit.solve(&mut kernels, effort, observer)?;
         let error = fit.relative_error(&kernels);
         let kernels = scaled(&kernels, lights.unit);
-        observer.progress(done.fetch_add(1, Ordering::Relaxed) + 1, rows);
+        observer.progress(done.fetch_add(1, Ordering::Relaxed) + 1, targets.rows.len());
         Ok((kernels, *albedo, error))
     };
-    let mut fitted = from_the_middle(rows, &fit)?;
+    let mut fitted: Vec<Row> = Vec::with_capacity(targets.rows.len());
+    for azimuth in 0..targets.azimuths {
+        let first = azimuth * rows;
+        let carry = |(kernels, ..): &Row, from: usize, to: usize| {
+            carried(kernels, View::of_row(from, rows), View::of_row(to, rows))
+        };
+        let column = from_the_middle(rows, &|row, neighbour| {
+            let index = first + row;
+            let beside = index.checked_sub(rows).map(|beside| carry(&fitted[beside], beside, index));
+            let start = neighbour.map(|(before, kernels)| carry(kernels, first + before, index));
+            // Between both neighbours, so that threads stay together from view angle to view angle and from azimuth to azimuth.
+            fit(
+                index,
+                match (start, beside) {
+                    (Some(a), Some(b)) => Some(a.iter().zip(&b).map(|(a, b)| a.between(b, 0.5)).collect()),
+                    (one, other) => one.or(other),
+                },
+            )
+        })?;
+        fitted.extend(column);
+    }
     if targets.are_diffuse() {
         // Where kernels are is kept, for drafts to start from.
         fitted.iter_mut().for_each(|(kernels, ..)| *kernels = scaled(kernels, 0.0));
     }
-    Ok(FittedTable::pack(&fitted))
+    Ok(FittedTable::pack(&fitted, targets.azimuths))
 }
 
 /// `fit` of each of `count` rows: of the middle one, then of the others one after the other outwards, each with the number of its neighbour
@@ -160,11 +186,14 @@ pub(super) fn scaled(kernels: &[Kernel], scale: f64) -> Vec<Kernel> {
     kernels.iter().map(|kernel| Kernel { weight: scale * kernel.weight, ..*kernel }).collect()
 }
 
-/// Kernels of the row for view angle `from` as a start for that of `to`.
-pub(super) fn carried(kernels: &[Kernel], from: f64, to: f64) -> Vec<Kernel> {
-    let [w_from, w_to] = [from, to].map(|theta_o| dvec3(theta_o.sin(), 0.0, theta_o.cos()));
+/// Kernels of the row for the view `from` as a start for that of `to`.
+pub(super) fn carried(kernels: &[Kernel], from: View, to: View) -> Vec<Kernel> {
+    let [w_from, w_to] = [from, to].map(|View { theta_o, .. }| dvec3(theta_o.sin(), 0.0, theta_o.cos()));
+    // In the frame of the view the surface turns against it.
+    let turn = DVec2::from_angle(from.phi_o - to.phi_o);
     let carry = |kernel: &Kernel| {
         let h = (kernel.direction + w_from).normalize();
+        let h = turn.rotate(h.truncate()).extend(h.z);
         let mirrored = (2.0 * w_to.dot(h) * h - w_to).normalize();
         let width = scale_rad(kernel.level);
         let follows = width < FOLLOWS_BELOW_RAD && mirrored.z > -width;

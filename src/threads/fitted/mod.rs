@@ -8,10 +8,12 @@
 //! | how kernels answer them | [`answers`] |
 //! | the fit of one row | [`solve`] |
 //! | of all rows | [`generate()`] |
+//! | azimuths of the view, for anisotropic BRDFs | [`azimuths`] |
 //! | of an edited BRDF, at once and coarsely | [`draft()`] |
 //! | what a fit leaves, under other lights | [`validation_error`] |
 //! | as stored and looked up, 12 bytes a thread and row | [`FittedTable`] |
 pub mod answers;
+pub mod azimuths;
 pub mod cells;
 mod draft;
 mod generate;
@@ -23,6 +25,7 @@ mod table;
 mod tests;
 mod validate;
 
+pub use azimuths::azimuth_count;
 pub use draft::draft;
 pub use generate::{Targets, generate, generate_for, light_count};
 pub use table::{FittedTable, PackedKernel, UnpackedKernel};

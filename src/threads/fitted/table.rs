@@ -4,6 +4,7 @@ use std::f64::consts::FRAC_PI_2;
 use glam::{DVec3, Vec3};
 use half::f16;
 
+use super::azimuths::fold_azimuth;
 use super::kernel::{Kernel, SHARPEST_LEVEL, WIDEST_LEVEL};
 use super::solve::cosine_part;
 use crate::packing::{octahedral_decode, octahedral_encode, pack_snorm_2x16, unpack_snorm_2x16};
@@ -59,41 +60,57 @@ impl PackedKernel {
     }
 }
 
-/// The fitted threads of one material: `rows` x `count` kernels. Row r is for theta_o = r 90 deg / rows.
+/// The fitted threads of one material: `azimuths` x `rows` x `count` kernels. Row r of an azimuth is for theta_o = r 90 deg / rows.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FittedTable {
     /// Number of view angles.
     pub rows: usize,
+    /// Number of azimuths of the view, as [`super::azimuth_count`] has it: 1 of an isotropic BRDF.
+    pub azimuths: usize,
     /// Number of threads.
     pub count: usize,
     /// Name of the material, for people.
     pub material: String,
-    /// What the cosine kernel is weighted by in each row: with the threads' weights it sums to the albedo, as stored.
+    /// What the cosine kernel is weighted by in each row, azimuth by azimuth: with the threads' weights it sums to the albedo, as stored.
     pub cosine_part: Vec<[f32; 3]>,
     /// Expected error of each row, relative to the radiance under lights of all sizes.
     pub relative_error: Vec<f32>,
-    /// Row by row: thread k of row r is `kernels[r * count + k]`.
+    /// Row by row: thread k of row r of azimuth a is `kernels[(a * rows + r) * count + k]`.
     pub kernels: Vec<PackedKernel>,
 }
 
 impl FittedTable {
-    /// The kernels of `row`, one per thread.
+    /// The kernels of `row`, one per thread; rows of the second azimuth follow those of the first.
     pub fn row(&self, row: usize) -> &[PackedKernel] {
         &self.kernels[row * self.count..][..self.count]
     }
 
-    /// The kernels for the view angle `theta_o` (radians): between rows as shading has them.
-    pub fn seen_from(&self, theta_o: f64) -> Vec<Kernel> {
+    /// The kernels for the view angle `theta_o` and its azimuth `phi_o` from the tangent (radians): between rows as shading has them.
+    pub fn seen_from(&self, theta_o: f64, phi_o: f64) -> Vec<Kernel> {
         let position = (theta_o / FRAC_PI_2 * self.rows as f64).clamp(0.0, (self.rows - 1) as f64);
         let (low, t) = (position as usize, position.fract());
         let high = (low + 1).min(self.rows - 1);
-        self.row(low).iter().zip(self.row(high)).map(|(a, b)| a.kernel().between(&b.kernel(), t)).collect()
+        let between = |a: Vec<Kernel>, b: Vec<Kernel>, t: f64| a.iter().zip(&b).map(|(a, b)| a.between(b, t)).collect();
+        let at_azimuth = |azimuth: usize| -> Vec<Kernel> {
+            let row = |row: usize| self.row(azimuth * self.rows + row).iter().map(|packed| packed.kernel()).collect();
+            between(row(low), row(high), t)
+        };
+        if self.azimuths == 1 {
+            return at_azimuth(0);
+        }
+        let (at, is_mirrored) = fold_azimuth(phi_o, self.azimuths);
+        let before = (at as usize).min(self.azimuths - 2);
+        let mut kernels: Vec<Kernel> = between(at_azimuth(before), at_azimuth(before + 1), at - before as f64);
+        if is_mirrored {
+            kernels.iter_mut().for_each(|kernel| kernel.direction.y *= -1.0);
+        }
+        kernels
     }
 
     /// Expected error relative to the radiance, RMS over rows as a sphere shows them: sin(theta_o) cos(theta_o) of its picture each.
     pub fn mean_relative_error(&self) -> f32 {
         let rows = self.relative_error.iter().enumerate().map(|(row, error)| {
-            let weight = (2.0 * crate::threads::theta_o(row, self.rows)).sin() as f32;
+            let weight = (2.0 * crate::threads::theta_o(row % self.rows, self.rows)).sin() as f32;
             (weight, weight * error * error)
         });
         let (weights, squares) = rows.fold((0.0, 0.0), |(w, s), (weight, square)| (w + weight, s + square));
@@ -157,11 +174,11 @@ impl FittedTable {
         if !kernels.iter().all(|kernel| kernel.is_usable()) {
             return Err("holds a thread whose level or weight is none".into());
         }
-        Ok(Self { rows: 0, count: 0, material: String::new(), cosine_part, relative_error, kernels })
+        Ok(Self { rows: 0, azimuths: 0, count: 0, material: String::new(), cosine_part, relative_error, kernels })
     }
 
-    /// Packs rows of kernels, with the albedo and the relative error of each.
-    pub(super) fn pack(rows: &[(Vec<Kernel>, DVec3, f64)]) -> Self {
+    /// Packs rows of kernels, with the albedo and the relative error of each; as many rows for each of `azimuths`.
+    pub(super) fn pack(rows: &[(Vec<Kernel>, DVec3, f64)], azimuths: usize) -> Self {
         let kernels: Vec<_> = rows.iter().flat_map(|(kernels, ..)| kernels.iter().map(PackedKernel::new)).collect();
         let count = rows.first().map_or(0, |(kernels, ..)| kernels.len());
         // From the weights as they were rounded, so that a white furnace does not see it.
@@ -169,7 +186,8 @@ impl FittedTable {
             cosine_part(&packed.iter().map(|kernel| kernel.kernel()).collect::<Vec<_>>(), *albedo).as_vec3().to_array()
         });
         Self {
-            rows: rows.len(),
+            rows: rows.len() / azimuths,
+            azimuths,
             count,
             material: String::new(),
             cosine_part: cosine.collect(),

@@ -87,7 +87,7 @@ fn weights_are_not_negative_and_sum_to_the_albedo() {
             let table = generate(&brdf, &settings, &()).unwrap();
             check(name, &table);
             for (row, cosine_part) in table.cosine_part.iter().enumerate() {
-                let albedo = Slice::new(&brdf, theta_o(row, table.rows)).albedo();
+                let albedo = Slice::new(&SeenBrdf::from_all_around(&brdf), theta_o(row, table.rows)).albedo();
                 let weights: DVec3 = table.row(row).iter().map(|packed| packed.unpack().weight.as_dvec3()).sum();
                 let sum = weights + glam::Vec3::from(*cosine_part).as_dvec3();
                 // The cosine part makes up for how weights were rounded and is itself a single float.

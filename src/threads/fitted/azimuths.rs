@@ -1,0 +1,79 @@
+//! The azimuths of the view for which an anisotropic BRDF has threads: as few as its symmetry leaves.
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+
+use crate::brdf::{Brdf, Symmetry};
+use crate::threads::theta_o;
+
+/// From one to the next, in radians. `AZIMUTH_STEP` in glsl/threads/fitted.glsl.
+pub const STEP_RAD: f64 = PI / 12.0;
+
+/// How many azimuths of the view there are rows of threads for: 1 if it does not matter; else every [`STEP_RAD`] from the tangent on, both
+/// ends included, to 90 degrees if the BRDF has mirror planes along and across the tangent, to 180 if half a turn leaves it as it is, to 360.
+pub fn azimuth_count(brdf: &Brdf) -> usize {
+    let Symmetry { isotropic, half_turn, mirror_x, mirror_y } = brdf.symmetry();
+    let span = match (half_turn, mirror_x && mirror_y) {
+        _ if isotropic => 0.0,
+        (true, true) => FRAC_PI_2,
+        (true, false) => PI,
+        (false, _) => TAU,
+    };
+    (span / STEP_RAD).round() as usize + 1
+}
+
+/// Where a surface is seen from.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct View {
+    /// Angle between the normal and w_o, in radians.
+    pub theta_o: f64,
+    /// Azimuth of w_o from the tangent, in radians.
+    pub phi_o: f64,
+}
+
+impl View {
+    /// That of row `index`, where there are `rows` for each azimuth.
+    pub fn of_row(index: usize, rows: usize) -> Self {
+        Self { theta_o: theta_o(index % rows, rows), phi_o: (index / rows) as f64 * STEP_RAD }
+    }
+
+    /// That of an isotropic BRDF.
+    pub fn of_angle(theta_o: f64) -> Self {
+        Self { theta_o, phi_o: 0.0 }
+    }
+}
+
+/// Where the azimuth `phi_o` (radians) of a view is among `count` of them, in steps, and whether what is seen is the mirror image of what is
+/// there. Twin: `fold_azimuth` in glsl/threads/fitted.glsl, in single precision.
+pub fn fold_azimuth(phi_o: f64, count: usize) -> (f64, bool) {
+    let span = (count - 1) as f64 * STEP_RAD;
+    // Half a turn leaves a BRDF with two mirror planes as it is, and so do both of them.
+    let turns = phi_o.rem_euclid(span.max(PI));
+    let is_mirrored = turns > span;
+    let folded = if is_mirrored { PI - turns } else { turns };
+    ((folded / STEP_RAD).min((count - 1) as f64), is_mirrored)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn azimuths_are_folded_by_the_symmetry_that_their_number_stands_for() {
+        let near = |(at, is_mirrored): (f64, bool), to: f64, mirrored: bool| {
+            assert!((at - to).abs() < 1e-9 && is_mirrored == mirrored, "{at} {is_mirrored}, not {to} {mirrored}");
+        };
+        let degrees = |phi_o: f64, count| fold_azimuth(phi_o.to_radians(), count);
+        for (phi_o, to, mirrored) in [
+            (0.0, 0.0, false),
+            (45.0, 3.0, false),
+            (90.0, 6.0, false),
+            (105.0, 5.0, true),
+            (-15.0, 1.0, true),
+            (195.0, 1.0, false),
+        ] {
+            near(degrees(phi_o, 7), to, mirrored);
+        }
+        near(degrees(105.0, 13), 7.0, false);
+        near(degrees(-15.0, 13), 11.0, false);
+        near(degrees(-15.0, 25), 23.0, false);
+    }
+}
