@@ -26,7 +26,7 @@ mod tabulate;
 
 pub use custom::CustomBrdf;
 pub use ggx_lobe::{Tap, ggx_lobe};
-pub use lobe::{MIN_COS_THETA_D, half_vector_width, lobe_radius};
+pub use lobe::{LobeAxes, MIN_COS_THETA_D, half_vector_width, lobe_axes, lobe_radius};
 pub use merl_export::merl_bytes;
 pub use microfacet::{Distribution, fresnel_conductor, fresnel_dielectric};
 pub use parameters::{Domain, Parameter, Parameters, Spacing, as_number, channels};
@@ -208,23 +208,32 @@ impl Brdf {
         hasher.finalize()
     }
 
-    /// Directional albedo: the integral of f(w, w_o) (n . w) dw for the view angle `theta_o` in radians, per channel.
+    /// [`Self::albedo_from`] the azimuth 0: of an isotropic BRDF that of every azimuth.
+    pub fn albedo(&self, theta_o: f64) -> DVec3 {
+        self.albedo_from(theta_o, 0.0)
+    }
+
+    /// Directional albedo: the integral of f(w, w_o) (n . w) dw per channel, for the view angle `theta_o` and its azimuth against the tangent
+    /// `phi_o`, both in radians.
     ///
     /// Midpoint rule over the half vector, theta_h = 90 deg x^2 with x uniform: lobes about the mirror direction are lobes
     /// about the normal there, at every view angle, and the square resolves narrow ones. Within about 1e-3 of the truth for
     /// roughness_alpha >= 0.001.
-    pub fn albedo(&self, theta_o: f64) -> DVec3 {
+    pub fn albedo_from(&self, theta_o: f64, phi_o: f64) -> DVec3 {
         const THETA_STEPS: usize = 768;
         const PHI_STEPS: usize = 384;
-        let w_o = dvec3(theta_o.sin(), 0.0, theta_o.cos());
+        let w_o = (DVec2::from_angle(phi_o) * theta_o.sin()).extend(theta_o.cos());
+        // A ring crosses an ellipse within its ratio in radians. GGX then leaves an error of 2 e^(-ratio phi_steps).
+        let LobeAxes { narrow_rad, wide_rad, .. } = lobe_axes(self);
+        let phi_steps = PHI_STEPS.max((8.0 * wide_rad / narrow_rad).ceil() as usize);
         let mut sum = DVec3::ZERO;
         for i in 0..THETA_STEPS {
             let x = (i as f64 + 0.5) / THETA_STEPS as f64;
             let (sin_theta_h, cos_theta_h) = (FRAC_PI_2 * x * x).sin_cos();
             // dw_h = sin(theta_h) dtheta_h dphi_h with dtheta_h = pi x dx.
-            let ring = sin_theta_h * PI * x / THETA_STEPS as f64 * (2.0 * PI / PHI_STEPS as f64);
-            for j in 0..PHI_STEPS {
-                let direction = DVec2::from_angle(2.0 * PI * (j as f64 + 0.5) / PHI_STEPS as f64);
+            let ring = sin_theta_h * PI * x / THETA_STEPS as f64 * (2.0 * PI / phi_steps as f64);
+            for j in 0..phi_steps {
+                let direction = DVec2::from_angle(2.0 * PI * (j as f64 + 0.5) / phi_steps as f64);
                 let h = (direction * sin_theta_h).extend(cos_theta_h);
                 let cos_theta_d = w_o.dot(h);
                 let w_i = 2.0 * cos_theta_d * h - w_o;

@@ -165,9 +165,44 @@ pub const SAMPLES: &[(&str, [&str; 5])] = &[
     ),
 ];
 
+/// Three sets of anisotropic parameters of every model that has any, the first two of them without a rotation.
+const ANISOTROPIC: &[(&str, [&str; 3])] = &[
+    (
+        "conductor",
+        [
+            "distribution = 'ggx'; metal = 'Al'; alpha_x = 0.05; alpha_y = 0.3",
+            "distribution = 'beckmann'; eta = 0.01; k = 100; alpha_x = 1; alpha_y = 0.02",
+            "distribution = 'ggx'; metal = 'Au'; alpha_x = 0.001; alpha_y = 0.003; rotation_deg = 30",
+        ],
+    ),
+    (
+        "plastic",
+        [
+            "distribution = 'beckmann'; ior = 1.5; diffuse = 0.9; alpha_x = 0.2; alpha_y = 0.5",
+            "distribution = 'ggx'; ior = 1.8; diffuse = 0.3; alpha_x = 0.1; alpha_y = 0.002",
+            "distribution = 'ggx'; ior = 1.5; diffuse = [0.5, 0.1, 0.05]; alpha_x = 0.5; alpha_y = 0.1; rotation_deg = -60",
+        ],
+    ),
+];
+
+/// All of them as BRDFs.
+pub fn anisotropic() -> impl Iterator<Item = (String, Brdf)> {
+    of(ANISOTROPIC)
+}
+
 /// All of them as BRDFs, with the text that they were made of.
 pub fn all() -> impl Iterator<Item = (String, Brdf)> {
-    SAMPLES.iter().flat_map(|(model, sets)| sets.iter().map(move |set| (*model, *set))).map(|(model, set)| {
+    of(SAMPLES)
+}
+
+/// The isotropic ones, and the built-in materials that are.
+pub fn isotropic() -> impl Iterator<Item = (String, Brdf)> {
+    let builtin = Brdf::builtin_names().map(|name| (name.to_owned(), Brdf::builtin(name).expect("it is built in")));
+    all().chain(builtin)
+}
+
+fn of<const N: usize>(samples: &'static [(&str, [&str; N])]) -> impl Iterator<Item = (String, Brdf)> {
+    samples.iter().flat_map(|(model, sets)| sets.iter().map(move |set| (*model, *set))).map(|(model, set)| {
         let table = set.replace(';', "\n").parse().expect("TOML");
         let name = format!("{model}: {set}");
         let brdf = Brdf::from_parameters(model, table).unwrap_or_else(|error| panic!("{name}: {error}"));

@@ -54,10 +54,15 @@ fn pair_at(theta_h: f64, theta_d: f64, phi_d: f64) -> (DVec3, DVec3) {
     (rotation * d, rotation * dvec3(-d.x, -d.y, d.z))
 }
 
+/// A table whose values jump from cell to cell.
+pub(super) fn noisy_table() -> MerlTable {
+    merl(|h, d, p, c| ((h * 7 + d * 3 + p * 5 + c) % 11) as f64 * 100.0)
+}
+
 fn all_models() -> Vec<Brdf> {
     let mut all: Vec<Brdf> = Brdf::builtin_names().map(|name| Brdf::builtin(name).unwrap()).collect();
     all.extend([conductor("ggx", 0.001), conductor("beckmann", 0.005), conductor("beckmann", 1.0), blinn_phong(0.0)]);
-    all.push(Brdf::MerlTable(merl(|h, d, p, c| ((h * 7 + d * 3 + p * 5 + c) % 11) as f64 * 100.0)));
+    all.push(Brdf::MerlTable(noisy_table()));
     all
 }
 

@@ -317,6 +317,7 @@ fn climb(mut h: DVec3, mut step: f64, height: impl Fn(DVec3) -> f64) -> DVec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::brdf::Brdf;
     use crate::threads::test_materials;
 
     #[test]

@@ -5,7 +5,7 @@ use glam::DVec3;
 
 use super::kernel::{Kernel, SHARPEST_LEVEL, WIDEST_LEVEL, scale_rad};
 use super::{FittedTable, MAX_COUNT, PackedKernel, draft, generate, validation_error};
-use crate::brdf::{Brdf, CustomBrdf};
+use crate::brdf::{Brdf, CustomBrdf, SeenBrdf};
 use crate::error::Error;
 use crate::progress::Observer;
 use crate::threads::slice::{Slice, fibonacci_lattice};
