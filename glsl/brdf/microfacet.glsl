@@ -1,13 +1,11 @@
 // Microfacet distributions, shadowing and Fresnel reflectance. Twin of src/brdf/microfacet.rs, which cites the equations.
 #ifndef MICROFACET_GLSL
 #define MICROFACET_GLSL
+#include "axes.glsl"
 
 const float DISTRIBUTION_BECKMANN = 1.0; // else GGX
 
-// w by the axes of a roughness: alpha_x, alpha_y, cosine and sine of their rotation. Below, directions are by these and alpha is along both.
-vec3 to_axes(vec4 roughness, vec3 w) {
-    return vec3(roughness.z * w.x + roughness.w * w.y, roughness.z * w.y - roughness.w * w.x, w.z);
-}
+// Below, directions are along the axes of the roughness, and alpha is along both.
 
 // D(h) in 1/sr.
 float microfacet_density(float distribution, vec3 h, vec2 alpha) {

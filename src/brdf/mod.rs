@@ -30,7 +30,7 @@ pub use merl_export::merl_bytes;
 pub use microfacet::{Distribution, fresnel_conductor, fresnel_dielectric};
 pub use parameters::{Domain, Parameter, Parameters, Spacing, as_number, channels};
 pub use record::{MaterialRecord, ThreadSetRecord};
-pub use roughness::Roughness;
+pub use roughness::{Axes, Roughness};
 pub use symmetry::Symmetry;
 pub use tabulate::tabulate;
 
