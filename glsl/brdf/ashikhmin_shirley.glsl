@@ -2,7 +2,7 @@
 // a.rgb: 28 / (23 pi) diffuse (1 - specular), a.w: exponent along x; b.rgb: specular, b.w: exponent along y;
 // c.x, c.y: cosine and sine of the rotation of these axes, c.z: sqrt((n_x + 1) (n_y + 1)) / (8 pi).
 #include "parameters.glsl"
-#include "axes.glsl"
+#include "microfacet.glsl"
 
 // 1 - (1 - cos / 2)^5
 float ashikhmin_shirley_room(float cos_theta) {
@@ -25,8 +25,5 @@ vec3 ashikhmin_shirley(BrdfParameters parameters, vec3 w_i, vec3 w_o) {
     // Where h is at the horizon 0 times infinity threatens.
     float lobe = exponent_sin2 > 0.0 ? exp(0.5 * exponent_sin2 * log_over_sin2) : 1.0;
     float specular = parameters.c.z * lobe / (cos_theta_d * max(w_i.z, w_o.z));
-    float rest = 1.0 - clamp(cos_theta_d, 0.0, 1.0);
-    float rest2 = rest * rest;
-    vec3 fresnel = parameters.b.rgb + (1.0 - parameters.b.rgb) * (rest2 * rest2 * rest);
-    return fresnel * specular + parameters.a.rgb * (ashikhmin_shirley_room(w_i.z) * ashikhmin_shirley_room(w_o.z));
+    return fresnel_schlick(cos_theta_d, parameters.b.rgb) * specular + parameters.a.rgb * (ashikhmin_shirley_room(w_i.z) * ashikhmin_shirley_room(w_o.z));
 }

@@ -42,6 +42,13 @@ float torrance_sparrow(float distribution, vec3 w_i, vec3 w_o, vec3 h, vec2 alph
         * g1_over_cos(distribution, w_o, alpha);
 }
 
+// Schlick's approximation of the Fresnel reflectance of what reflects f0 at normal incidence.
+vec3 fresnel_schlick(float cos_theta, vec3 f0) {
+    float rest = 1.0 - clamp(cos_theta, 0.0, 1.0);
+    float rest2 = rest * rest;
+    return f0 + (1.0 - f0) * (rest2 * rest2 * rest);
+}
+
 // Exact unpolarised Fresnel reflectance of a conductor, per channel.
 vec3 fresnel_conductor(float cos_theta, vec3 eta, vec3 k) {
     cos_theta = clamp(cos_theta, 0.0, 1.0);

@@ -72,6 +72,41 @@ fn equal_exponents_along_both_axes_are_the_isotropic_model() {
     assert!(error.starts_with("exponent: "), "{error}");
 }
 
+#[test]
+fn principled_has_the_anisotropy_of_gltf_and_of_openpbr() {
+    // KHR_materials_anisotropy: mix(r^2, 1, strength^2) along the tangent, r^2 across. OpenPBR: r^2 sqrt(2 / (1 + (1 - a)^2)), (1 - a) times that.
+    let rest = "base_colour = [1, 0.8, 0.4]; metallic = 1; roughness = 0.5";
+    for (convention, alpha) in [
+        ("gltf", DVec2::new(0.25 + 0.75 * 0.36, 0.25)),
+        ("openpbr", DVec2::new(0.25 * (2.0f64 / 1.16).sqrt(), 0.1 * (2.0f64 / 1.16).sqrt())),
+    ] {
+        let principled = of_model(
+            "principled",
+            &format!("{rest}; anisotropy = 0.6; anisotropy_convention = '{convention}'; rotation_deg = 25"),
+        );
+        let roughness = Roughness::new(alpha.x, alpha.y, 25.0);
+        for (w_i, w_o) in pairs() {
+            let h = (w_i + w_o).normalize();
+            let expected = microfacet::fresnel_schlick(w_o.dot(h), dvec3(1.0, 0.8, 0.4))
+                * Distribution::Ggx.torrance_sparrow(w_i, w_o, h, roughness);
+            let f = principled.evaluate(w_i, w_o);
+            assert!(
+                (f - expected).abs().max_element() <= 1e-12 * expected.max_element(),
+                "{convention}: {f}, {expected}"
+            );
+        }
+        let none = of_model("principled", &format!("{rest}; anisotropy = 0; anisotropy_convention = '{convention}'"));
+        let isotropic = of_model("principled", rest);
+        let (w_i, w_o) = (direction(30.0, 10.0), direction(40.0, 150.0));
+        assert!((none.evaluate(w_i, w_o) - isotropic.evaluate(w_i, w_o)).abs().max_element() < 1e-12);
+    }
+    for (keys, key) in [("anisotropy = 0.5", "anisotropy_convention"), ("rotation_deg = 5", "anisotropy")] {
+        let table = format!("{rest}; {keys}").replace(';', "\n").parse().unwrap();
+        let error = Brdf::from_parameters("principled", table).unwrap_err().to_string();
+        assert!(error.starts_with(&format!("{key}: ")), "{error}");
+    }
+}
+
 /// Anisotropic sets of parameters of every model that has any: what follows goes through them.
 fn all() -> impl Iterator<Item = (String, Brdf)> {
     samples::anisotropic()

@@ -57,6 +57,11 @@ pub trait Model: Sized {
         [0.0; 12]
     }
 
+    /// Whether shaders have to look it up in a table although its model has a GLSL twin: where the twin leaves out what its parameters ask for.
+    fn needs_table(&self) -> bool {
+        false
+    }
+
     /// Adds everything that `evaluate` depends on to `hasher`.
     fn hash_content(&self, hasher: &mut blake3::Hasher);
 }
@@ -190,7 +195,7 @@ impl Brdf {
 
     /// Whether shaders evaluate it by themselves; otherwise they look it up in a table that [`tabulate`] makes.
     pub fn has_twin(&self) -> bool {
-        TWINS.contains(&self.model())
+        TWINS.contains(&self.model()) && !dispatch!(self, model => model.needs_table())
     }
 
     /// The model's parameters for its GLSL twin, `BrdfParameters { vec4 a, b, c }` in memory order.

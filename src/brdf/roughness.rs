@@ -44,7 +44,8 @@ impl Axes {
     }
 }
 
-const ROTATION: &str = "rotation_deg";
+/// The key of [`Axes`].
+pub(super) const ROTATION: &str = "rotation_deg";
 
 /// Whether `parameters` has one of `keys`, which are along axes, or the rotation of these.
 ///

@@ -199,6 +199,14 @@ const ANISOTROPIC: &[(&str, [&str; 3])] = &[
             "diffuse = 0; specular = 1; exponent_x = 4000; exponent_y = 200; rotation_deg = 15",
         ],
     ),
+    (
+        "principled",
+        [
+            "base_colour = [1, 0.8, 0.4]; metallic = 1; roughness = 0.2; anisotropy = 0.6; anisotropy_convention = 'gltf'",
+            "base_colour = 0.1; metallic = 0; roughness = 0.6; anisotropy = 1; anisotropy_convention = 'openpbr'; coat = 1; coat_roughness = 0.1",
+            "base_colour = 0.3; metallic = 0.5; roughness = 0.4; anisotropy = 0.7; anisotropy_convention = 'openpbr'; rotation_deg = 70; sheen = 0.5; sheen_roughness = 0.4",
+        ],
+    ),
 ];
 
 /// All of them as BRDFs.
