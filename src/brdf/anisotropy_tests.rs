@@ -135,7 +135,7 @@ fn anisotropic_models_are_reciprocal() {
 
 #[test]
 fn turning_the_material_is_turning_both_directions_the_other_way() {
-    for (name, brdf) in all().filter(|(name, _)| !name.contains("rotation_deg")) {
+    for (name, brdf) in all().filter(|(name, _)| name.contains(": ") && !name.contains("rotation_deg")) {
         for rotation_deg in [-90.0f64, -20.0, 37.5, 90.0] {
             let (model, parameters) = name.split_once(": ").unwrap();
             let turned = of_model(model, &format!("{parameters}; rotation_deg = {rotation_deg}"));

@@ -209,9 +209,10 @@ const ANISOTROPIC: &[(&str, [&str; 3])] = &[
     ),
 ];
 
-/// All of them as BRDFs.
+/// All of them as BRDFs, and the built-in materials that are anisotropic.
 pub fn anisotropic() -> impl Iterator<Item = (String, Brdf)> {
-    of(ANISOTROPIC)
+    let builtin = ANISOTROPIC_BUILTIN.map(|name| (name.to_owned(), Brdf::builtin(name).expect("it is built in")));
+    of(ANISOTROPIC).chain(builtin)
 }
 
 /// All of them as BRDFs, with the text that they were made of.
@@ -219,10 +220,13 @@ pub fn all() -> impl Iterator<Item = (String, Brdf)> {
     of(SAMPLES)
 }
 
-/// The isotropic ones, and the built-in materials that are.
+/// Built-in materials that are anisotropic.
+const ANISOTROPIC_BUILTIN: [&str; 3] = ["brushed-aluminium", "brushed-steel", "silk"];
+
+/// [`all`], and the built-in materials that are isotropic.
 pub fn isotropic() -> impl Iterator<Item = (String, Brdf)> {
-    let builtin = Brdf::builtin_names().map(|name| (name.to_owned(), Brdf::builtin(name).expect("it is built in")));
-    all().chain(builtin)
+    let builtin = Brdf::builtin_names().filter(|name| !ANISOTROPIC_BUILTIN.contains(name));
+    all().chain(builtin.map(|name| (name.to_owned(), Brdf::builtin(name).expect("it is built in"))))
 }
 
 fn of<const N: usize>(samples: &'static [(&str, [&str; N])]) -> impl Iterator<Item = (String, Brdf)> {
