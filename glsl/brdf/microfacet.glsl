@@ -1,13 +1,11 @@
 // Microfacet distributions, shadowing and Fresnel reflectance. Twin of src/brdf/microfacet.rs, which cites the equations.
 #ifndef MICROFACET_GLSL
 #define MICROFACET_GLSL
+#include "axes.glsl"
 
 const float DISTRIBUTION_BECKMANN = 1.0; // else GGX
 
-// w by the axes of a roughness: alpha_x, alpha_y, cosine and sine of their rotation. Below, directions are by these and alpha is along both.
-vec3 to_axes(vec4 roughness, vec3 w) {
-    return vec3(roughness.z * w.x + roughness.w * w.y, roughness.z * w.y - roughness.w * w.x, w.z);
-}
+// Below, directions are along the axes of the roughness, and alpha is along both.
 
 // D(h) in 1/sr.
 float microfacet_density(float distribution, vec3 h, vec2 alpha) {
@@ -42,6 +40,13 @@ float g1_over_cos(float distribution, vec3 w, vec2 alpha) {
 float torrance_sparrow(float distribution, vec3 w_i, vec3 w_o, vec3 h, vec2 alpha) {
     return 0.25 * microfacet_density(distribution, h, alpha) * g1_over_cos(distribution, w_i, alpha)
         * g1_over_cos(distribution, w_o, alpha);
+}
+
+// Schlick's approximation of the Fresnel reflectance of what reflects f0 at normal incidence.
+vec3 fresnel_schlick(float cos_theta, vec3 f0) {
+    float rest = 1.0 - clamp(cos_theta, 0.0, 1.0);
+    float rest2 = rest * rest;
+    return f0 + (1.0 - f0) * (rest2 * rest2 * rest);
 }
 
 // Exact unpolarised Fresnel reflectance of a conductor, per channel.

@@ -15,10 +15,10 @@ macro_rules! materials {
 
 materials! {
     "metals": "gold" "silver" "copper" "aluminium" "chrome" "tungsten" "titanium-nitride" "nickel" "sandblasted-aluminium"
-        "ground-chromium";
+        "ground-chromium" "brushed-aluminium" "brushed-steel";
     "plastics": "red-plastic" "blue-plastic" "white-plastic" "billiard-ball";
     "paints": "flat-white-paint" "grey-primer" "green-enamel" "red-car-paint" "blue-flake-paint" "varnished-oak";
-    "fabrics": "linen" "satin" "blue-velvet" "reflective-tape";
+    "fabrics": "linen" "satin" "silk" "blue-velvet" "reflective-tape";
     "ceramics": "clay" "terracotta" "porcelain";
     "others": "skin" "black-rubber" "eraser" "moon-dust";
 }

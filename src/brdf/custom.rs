@@ -25,8 +25,8 @@
 //! [`MaterialSource::Custom`](crate::scene::MaterialSource::Custom) puts it into a scene.
 //!
 //! On the CPU, and so in threads, pdfs and the reference, the BRDF is the function itself. Where a shader evaluates BRDFs it looks
-//! them up in a table that is made of the function, as it does for models without a form in GLSL. So the function has to be isotropic,
-//! reciprocal and the same in a mirror. The table is as fine as the function's lobe needs. Its error, as the integral of |difference| cos
+//! them up in a table that is made of the function, as it does for models without a form in GLSL. So the function has to be isotropic there,
+//! which is checked, reciprocal and the same in a mirror. The table is as fine as the function's lobe needs. Its error, as the integral of |difference| cos
 //! over that of f cos, is found when it is made, and logged. For GGX, by roughness and view angle:
 //!
 //! | alpha | 0 to 60 degrees | 80 degrees | 87 degrees |
@@ -77,7 +77,8 @@ pub trait CustomBrdf: Send + Sync {
     /// Bytes that stand for all values: of equal name and key are only equal BRDFs, today and in the next run. Caches go by them.
     fn key(&self) -> Vec<u8>;
 
-    /// f(w_i, w_o) in 1/sr, linear Rec. 709, for unit vectors with both z positive; z is the normal. Isotropic, reciprocal and the same in a mirror. A channel
+    /// f(w_i, w_o) in 1/sr, linear Rec. 709, for unit vectors with both z positive; z is the normal, x the tangent. Reciprocal, and where shaders evaluate it
+    /// isotropic and the same in a mirror. A channel
     /// that is negative, infinite or NaN counts as 0.
     fn evaluate(&self, w_i: DVec3, w_o: DVec3) -> DVec3;
 }

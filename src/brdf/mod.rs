@@ -31,8 +31,12 @@ pub use merl_export::merl_bytes;
 pub use microfacet::{Distribution, fresnel_conductor, fresnel_dielectric};
 pub use parameters::{Domain, Parameter, Parameters, Spacing, as_number, channels};
 pub use record::{MaterialRecord, ThreadSetRecord};
+<<<<<<< HEAD
 pub use roughness::Roughness;
 pub use seen::SeenBrdf;
+=======
+pub use roughness::{Axes, Roughness};
+>>>>>>> aniso
 pub use symmetry::Symmetry;
 pub use tabulate::tabulate;
 
@@ -57,6 +61,11 @@ pub trait Model: Sized {
     /// The model's parameters as its GLSL twin expects them: `BrdfParameters { vec4 a, b, c }`. None of a model that has no twin.
     fn gpu_parameters(&self) -> [f32; 12] {
         [0.0; 12]
+    }
+
+    /// Whether shaders have to look it up in a table although its model has a GLSL twin: where the twin leaves out what its parameters ask for.
+    fn needs_table(&self) -> bool {
+        false
     }
 
     /// Adds everything that `evaluate` depends on to `hasher`.
@@ -192,7 +201,7 @@ impl Brdf {
 
     /// Whether shaders evaluate it by themselves; otherwise they look it up in a table that [`tabulate`] makes.
     pub fn has_twin(&self) -> bool {
-        TWINS.contains(&self.model())
+        TWINS.contains(&self.model()) && !dispatch!(self, model => model.needs_table())
     }
 
     /// The model's parameters for its GLSL twin, `BrdfParameters { vec4 a, b, c }` in memory order.

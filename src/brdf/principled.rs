@@ -1,4 +1,4 @@
-//! Metallic-roughness as glTF 2.0 defines it, under a sheen and a clear coat.
+//! Metallic-roughness as glTF 2.0 defines it, under a sheen and a clear coat. Twin: glsl/brdf/principled.glsl, for all but sheen.
 //!
 //! Khronos, "glTF 2.0 Specification", appendix B, for the base; names of layers as in OpenPBR. alpha = roughness^2, GGX facets with
 //! Smith's separable shadowing, Schlick's Fresnel:
@@ -7,6 +7,19 @@
 //! base = (1 - metallic) ((1 - F(w_o . h)) base_colour / pi + F(w_o . h) D G / (4 cos cos)) + metallic F_m(w_o . h) D G / (4 cos cos)
 //! where F has f0 = ((ior - 1) / (ior + 1))^2 and F_m has f0 = base_colour.
 //! ```
+//!
+//! With the keys `anisotropy` = a, 0 to 1, and `anisotropy_convention` the facets of the base have a roughness_alpha along the tangent,
+//! turned by `rotation_deg`, and another one across it:
+//!
+//! | `anisotropy_convention` | along the tangent | across it |
+//! |---|---|---|
+//! | `gltf` | mix(roughness^2, 1, a^2) | roughness^2 |
+//! | `openpbr` | roughness^2 sqrt(2 / (1 + (1 - a)^2)) | (1 - a) times that, and no less than 0.001 |
+//!
+//! The first is KHR_materials_anisotropy of glTF (anisotropyStrength; anisotropyRotation is `rotation_deg` in radians), which only adds
+//! roughness. The second is specular_roughness_anisotropy of OpenPBR, whose spec turns no axes but the tangent; it keeps the mean of both
+//! squares. In both, highlights are long along the tangent. glTF has the height-correlated form of Smith's shadowing, here it is
+//! separable. Sheen and coat are isotropic.
 //!
 //! Sheen (keys `sheen` and `sheen_roughness`) is Estevez and Kulla's distribution D_s = (2 + 1/r) sin(theta_h)^(1/r) / (2 pi), "Production
 //! Friendly Microfacet Sheen BRDF" (2017), r = sheen_roughness^2, as in glTF's KHR_materials_sheen, with Neubelt's and Pettineo's 1 / (4
@@ -25,6 +38,7 @@ use std::sync::{Arc, OnceLock};
 use glam::{DVec2, DVec3, dvec3};
 
 use super::microfacet::{Distribution, fresnel_schlick};
+use super::roughness::{Axes, ROTATION};
 use super::{Model, Parameters, Roughness, Spacing, hash_numbers};
 use crate::error::Result;
 
@@ -37,12 +51,54 @@ pub struct Principled {
     pub metallic: f64,
     /// 0.05 to 1; alpha is its square.
     pub roughness: f64,
+    /// roughness_alpha of the base along both axes, if it differs by direction.
+    pub anisotropic: Option<Roughness>,
     /// Index of refraction of dielectrics, 1 to 3.
     pub ior: f64,
     /// The layer of fibres, if there is one.
     pub sheen: Option<Sheen>,
     /// The clear coat, if there is one.
     pub coat: Option<Coat>,
+}
+
+/// Whose formula makes roughness along two axes of a roughness and an anisotropy.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Convention {
+    /// glTF's, KHR_materials_anisotropy.
+    Gltf,
+    /// OpenPBR's, specular_roughness_anisotropy.
+    OpenPbr,
+}
+
+impl Convention {
+    /// The roughness of the base along both axes, if there are keys of it.
+    fn from_parameters(parameters: &mut Parameters, roughness: f64) -> Result<Option<Roughness>> {
+        if !["anisotropy", "anisotropy_convention", ROTATION].iter().any(|key| parameters.has(key)) {
+            return Ok(None);
+        }
+        let help = "How much the roughness along the tangent differs from that across it: 0 not at all.";
+        let anisotropy = parameters.number("anisotropy", 0.0..=1.0, Spacing::Linear, help)?;
+        let conventions = [("gltf", Convention::Gltf), ("openpbr", Convention::OpenPbr)];
+        let help = "Whose anisotropy it is: glTF's adds roughness along the tangent, OpenPBR's keeps the mean of both.";
+        let convention = parameters.choice("anisotropy_convention", &conventions, help)?;
+        let alpha = convention.alpha(roughness, anisotropy);
+        let rotation_deg = Axes::from_parameters(parameters)?.rotation_deg();
+        Ok(Some(Roughness::new(alpha.x, alpha.y, rotation_deg)))
+    }
+
+    /// roughness_alpha along the tangent and across it.
+    pub fn alpha(self, roughness: f64, anisotropy: f64) -> DVec2 {
+        let alpha = roughness * roughness;
+        match self {
+            Convention::Gltf => DVec2::new(alpha + (1.0 - alpha) * anisotropy * anisotropy, alpha),
+            Convention::OpenPbr => {
+                let aspect = 1.0 - anisotropy;
+                let along = alpha * (2.0 / (1.0 + aspect * aspect)).sqrt();
+                // Narrower than 0.001 no quadrature of this project resolves it, and 0 would be no lobe at all.
+                DVec2::new(along, (aspect * along).max(1e-3))
+            }
+        }
+    }
 }
 
 /// A layer of upright fibres.
@@ -141,11 +197,15 @@ impl Sheen {
 }
 
 impl Principled {
+    /// roughness_alpha of the base along both axes.
+    fn facets(&self) -> Roughness {
+        self.anisotropic.unwrap_or_else(|| Roughness::isotropic(self.roughness * self.roughness))
+    }
+
     fn base(&self, w_i: DVec3, w_o: DVec3) -> DVec3 {
         let h = (w_i + w_o).normalize();
         let cos_theta_d = w_o.dot(h);
-        let lobe =
-            Distribution::Ggx.torrance_sparrow(w_i, w_o, h, Roughness::isotropic(self.roughness * self.roughness));
+        let lobe = Distribution::Ggx.torrance_sparrow(w_i, w_o, h, self.facets());
         let dielectric = fresnel_schlick(cos_theta_d, DVec3::splat(f0(self.ior)));
         let metal = fresnel_schlick(cos_theta_d, self.base_colour);
         ((1.0 - dielectric) * self.base_colour * FRAC_1_PI + dielectric * lobe) * (1.0 - self.metallic)
@@ -175,9 +235,26 @@ impl Model for Principled {
         let metallic = parameters.number("metallic", 0.0..=1.0, Spacing::Linear, "0 for dielectrics, 1 for metals.")?;
         let help = "Roughness, of which alpha is the square.";
         let roughness = parameters.number("roughness", 0.05..=1.0, Spacing::Linear, help)?;
+        let anisotropic = Convention::from_parameters(parameters, roughness)?;
         let ior = index_of_refraction(parameters, "ior")?;
         let (sheen, coat) = (Sheen::from_parameters(parameters)?, Coat::from_parameters(parameters)?);
-        Ok(Self { base_colour, metallic, roughness, ior, sheen, coat })
+        Ok(Self { base_colour, metallic, roughness, anisotropic, ior, sheen, coat })
+    }
+
+    fn needs_table(&self) -> bool {
+        // The albedo of fibres is a table of its own, and there is no room for more parameters.
+        self.sheen.is_some()
+    }
+
+    fn gpu_parameters(&self) -> [f32; 12] {
+        let mut packed = [0.0; 12];
+        packed[0..4].copy_from_slice(&self.base_colour.as_vec3().extend(self.metallic as f32).to_array());
+        packed[4] = f0(self.ior) as f32;
+        if let Some(Coat { weight, roughness, ior }) = self.coat {
+            packed[5..8].copy_from_slice(&[weight, roughness * roughness, f0(ior)].map(|number| number as f32));
+        }
+        packed[8..12].copy_from_slice(&self.facets().gpu_parameters());
+        packed
     }
 
     fn hash_content(&self, hasher: &mut blake3::Hasher) {
@@ -190,6 +267,9 @@ impl Model for Principled {
         }
         if let Some(Coat { weight, roughness, ior }) = self.coat {
             hash_numbers(hasher, [weight, roughness, ior]);
+        }
+        if let Some(facets) = self.anisotropic {
+            facets.hash_content(hasher);
         }
     }
 }

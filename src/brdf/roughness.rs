@@ -7,13 +7,65 @@ use glam::{DVec2, DVec3};
 use super::{Parameters, Spacing, hash_numbers};
 use crate::error::{Error, Result};
 
+/// Two axes at a right angle to each other in the tangent plane.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Axes {
+    rotation_deg: f64,
+    /// The first axis.
+    x: DVec2,
+}
+
+impl Axes {
+    /// The first is `rotation_deg` from the tangent, counter-clockwise seen from outside.
+    pub fn new(rotation_deg: f64) -> Self {
+        Self { rotation_deg, x: DVec2::from_angle(rotation_deg.to_radians()) }
+    }
+
+    /// Reads `rotation_deg`, which may be left out.
+    pub(super) fn from_parameters(parameters: &mut Parameters) -> Result<Self> {
+        let help = "How far the axes are turned from the tangent, counter-clockwise seen from outside, in degrees; 0 where left out.";
+        Ok(Self::new(parameters.number_or(ROTATION, -90.0..=90.0, 0.0, help)?))
+    }
+
+    /// Where the first axis points, as the key `rotation_deg` has it.
+    pub fn rotation_deg(self) -> f64 {
+        self.rotation_deg
+    }
+
+    /// The components of `w` along both.
+    #[inline]
+    pub fn along(self, w: DVec3) -> DVec2 {
+        DVec2::new(self.x.dot(w.truncate()), self.x.perp_dot(w.truncate()))
+    }
+
+    /// What `to_axes` in glsl/brdf/axes.glsl reads: cosine and sine of the rotation.
+    pub(super) fn gpu_parameters(self) -> [f32; 2] {
+        self.x.as_vec2().to_array()
+    }
+}
+
+/// The key of [`Axes`].
+pub(super) const ROTATION: &str = "rotation_deg";
+
+/// Whether `parameters` has one of `keys`, which are along axes, or the rotation of these.
+///
+/// # Errors
+/// Beside one of them stands `single`, which is for all directions.
+pub(super) fn is_along_axes(parameters: &Parameters, single: &str, keys: [&str; 2]) -> Result<bool> {
+    let is_along_axes = keys.iter().chain(&[ROTATION]).any(|key| parameters.has(key));
+    if is_along_axes && parameters.has(single) {
+        let [x, y] = keys;
+        let remedy = format!("give `{single}` alone, for all directions, or `{x}` and `{y}`");
+        return Err(Error::input(single, format!("stands beside `{x}`, `{y}` or `{ROTATION}`"), remedy));
+    }
+    Ok(is_along_axes)
+}
+
 /// roughness_alpha along both axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Roughness {
     alpha: DVec2,
-    rotation_deg: f64,
-    /// The first axis in the tangent plane.
-    axis: DVec2,
+    axes: Axes,
 }
 
 impl Roughness {
@@ -24,25 +76,22 @@ impl Roughness {
 
     /// `alpha_x` along an axis that is `rotation_deg` from the tangent, counter-clockwise seen from outside, and `alpha_y` across it.
     pub fn new(alpha_x: f64, alpha_y: f64, rotation_deg: f64) -> Self {
-        let axis = DVec2::from_angle(rotation_deg.to_radians());
-        Self { alpha: DVec2::new(alpha_x, alpha_y), rotation_deg, axis }
+        // What is alike in all directions is the same however it is turned, but for digits.
+        let axes = Axes::new(if alpha_x == alpha_y { 0.0 } else { rotation_deg });
+        Self { alpha: DVec2::new(alpha_x, alpha_y), axes }
     }
 
     /// Reads `alpha`, or `alpha_x`, `alpha_y` and `rotation_deg`, of which the last may be left out.
     pub(super) fn from_parameters(parameters: &mut Parameters, help: &'static str) -> Result<Self> {
         // Narrower than 0.001 (a lobe of 0.06 degrees) no quadrature of this project resolves it: that is a mirror.
         let range = 1e-3..=1.0;
-        if !["alpha_x", "alpha_y", ROTATION].iter().any(|key| parameters.has(key)) {
+        if !is_along_axes(parameters, "alpha", ["alpha_x", "alpha_y"])? {
             return Ok(Self::isotropic(parameters.number("alpha", range, Spacing::Logarithmic, help)?));
         }
-        if parameters.has("alpha") {
-            let remedy = "give `alpha` for all directions alone, or `alpha_x` and `alpha_y`";
-            return Err(Error::input("alpha", "stands beside roughness along axes", remedy));
-        }
-        let help = "Roughness along the first axis: along the tangent where the rotation is 0.";
+        let help = "Roughness along the first axis, which is the tangent where the rotation is 0.";
         let alpha_x = parameters.number("alpha_x", range.clone(), Spacing::Logarithmic, help)?;
         let alpha_y = parameters.number("alpha_y", range, Spacing::Logarithmic, "Roughness across the first axis.")?;
-        Ok(Self::new(alpha_x, alpha_y, rotation_deg(parameters)?))
+        Ok(Self::new(alpha_x, alpha_y, Axes::from_parameters(parameters)?.rotation_deg()))
     }
 
     /// Whether both are the same.
@@ -56,19 +105,13 @@ impl Roughness {
         self.alpha
     }
 
-    /// The components of `w` along both axes.
-    #[inline]
-    pub fn along_axes(self, w: DVec3) -> DVec2 {
-        DVec2::new(self.axis.dot(w.truncate()), self.axis.perp_dot(w.truncate()))
-    }
-
     /// roughness_alpha of the isotropic surface whose shadows along `w` are the same: alpha^2 sin^2 = alpha_x^2 x^2 + alpha_y^2 y^2. Heitz eq 80.
     #[inline]
     pub fn seen_along(self, w: DVec3) -> f64 {
         if self.is_isotropic() {
             return self.alpha.x;
         }
-        let tangential = self.along_axes(w);
+        let tangential = self.axes.along(w);
         let sin2 = tangential.length_squared();
         // The normal has no azimuth, and nothing shadows it.
         if sin2 > 0.0 { ((self.alpha * tangential).length_squared() / sin2).sqrt() } else { self.alpha.x }
@@ -80,7 +123,7 @@ impl Roughness {
         if self.is_isotropic() {
             return self.alpha.x;
         }
-        let tangential = self.along_axes(h);
+        let tangential = self.axes.along(h);
         let scaled2 = (tangential / self.alpha).length_squared();
         // The normal has no azimuth, and no slope.
         if scaled2 > 0.0 { (tangential.length_squared() / scaled2).sqrt() } else { self.alpha.x }
@@ -92,28 +135,19 @@ impl Roughness {
         self.alpha.x * self.alpha.y
     }
 
-    /// What `to_axes` and its users in glsl/brdf/microfacet.glsl read: alpha_x, alpha_y, cosine and sine of the rotation.
+    /// As shaders have it: alpha_x, alpha_y, cosine and sine of the rotation.
     pub(super) fn gpu_parameters(self) -> [f32; 4] {
-        // Turning what is alike in all directions would cost it digits.
-        let axis = if self.is_isotropic() { DVec2::X } else { self.axis };
-        [self.alpha.x, self.alpha.y, axis.x, axis.y].map(|number| number as f32)
+        let [cos, sin] = self.axes.gpu_parameters();
+        [self.alpha.x as f32, self.alpha.y as f32, cos, sin]
     }
 
     /// Adds it to a fingerprint. What is alike in all directions has none.
     pub(super) fn hash_content(self, hasher: &mut blake3::Hasher) {
         match self.is_isotropic() {
             true => hash_numbers(hasher, [self.alpha.x]),
-            false => hash_numbers(hasher, [self.alpha.x, self.alpha.y, self.rotation_deg]),
+            false => hash_numbers(hasher, [self.alpha.x, self.alpha.y, self.axes.rotation_deg]),
         }
     }
-}
-
-const ROTATION: &str = "rotation_deg";
-
-/// The key `rotation_deg`, which may be left out.
-pub(super) fn rotation_deg(parameters: &mut Parameters) -> Result<f64> {
-    let help = "How far the axes are turned from the tangent, counter-clockwise seen from outside, in degrees; 0 where left out.";
-    parameters.number_or(ROTATION, -90.0..=90.0, 0.0, help)
 }
 
 #[cfg(test)]
@@ -128,6 +162,7 @@ mod tests {
     #[test]
     fn roughness_is_read_along_all_directions_or_along_two_axes() {
         assert_eq!(read("alpha = 0.2").unwrap(), Roughness::isotropic(0.2));
+        assert_eq!(read("alpha_x = 0.2\nalpha_y = 0.2\nrotation_deg = 9").unwrap(), Roughness::isotropic(0.2));
         assert_eq!(read("alpha_x = 0.2\nalpha_y = 0.1").unwrap(), Roughness::new(0.2, 0.1, 0.0));
         assert_eq!(read("alpha_x = 0.2\nalpha_y = 0.1\nrotation_deg = 30").unwrap(), Roughness::new(0.2, 0.1, 30.0));
         for (text, key) in [

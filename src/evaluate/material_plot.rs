@@ -3,7 +3,7 @@ use std::error::Error as Cause;
 use std::f64::consts::FRAC_PI_2;
 use std::path::Path;
 
-use glam::{DVec3, dvec3};
+use glam::{DMat3, DVec3, dvec3};
 use plotters::coord::Shift;
 use plotters::prelude::*;
 
@@ -27,25 +27,53 @@ type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 type Drawn = std::result::Result<(), Box<dyn Cause>>;
 
 /// The picture of `brdf`, called `name`, as SVG: left the cube root of luminance times cosine in the plane of incidence, light from the right; in the
-/// middle display values at phi_d = 90 degrees over theta_h (across) and theta_d (upwards), as BRDF Explorer has them; right albedo.
+/// middle display values at phi_d = 90 degrees over theta_h (across) and theta_d (upwards), as BRDF Explorer has them; right albedo. Of an
+/// anisotropic BRDF in two rows: seen along the tangent, which is azimuth 0, and across it.
 ///
 /// # Errors
 /// What cannot be drawn; `path` is what messages name.
 pub fn svg(brdf: &Brdf, name: &str, path: &Path) -> Result<String> {
     let mut svg = String::new();
     {
-        let area = SVGBackend::with_string(&mut svg, (3 * SIDE_PX, SIDE_PX)).into_drawing_area();
-        draw(&area, brdf, name).map_err(|cause| Error::unwritable(path, cause))?;
+        let sides = Side::of(brdf);
+        let area = SVGBackend::with_string(&mut svg, (3 * SIDE_PX, sides.len() as u32 * SIDE_PX)).into_drawing_area();
+        draw(&area, &sides, name).map_err(|cause| Error::unwritable(path, cause))?;
     }
     Ok(svg)
 }
 
-fn draw(area: &Area, brdf: &Brdf, name: &str) -> Drawn {
+/// A BRDF seen from one azimuth, which panels have as the plane of incidence or that of the half vector.
+struct Side<'a> {
+    brdf: &'a Brdf,
+    azimuth_deg: f64,
+    /// What captions say of it.
+    note: String,
+}
+
+impl<'a> Side<'a> {
+    /// Those to draw.
+    fn of(brdf: &'a Brdf) -> Vec<Self> {
+        if brdf.is_isotropic() {
+            return vec![Self { brdf, azimuth_deg: 0.0, note: String::new() }];
+        }
+        let side = |azimuth_deg| Self { brdf, azimuth_deg, note: format!(", azimuth {azimuth_deg}") };
+        [0.0, 90.0].map(side).into()
+    }
+
+    /// f for directions whose azimuths count from that of the side.
+    fn evaluate(&self, w_i: DVec3, w_o: DVec3) -> DVec3 {
+        let turn = DMat3::from_rotation_z(self.azimuth_deg.to_radians());
+        self.brdf.evaluate(turn * w_i, turn * w_o)
+    }
+}
+
+fn draw(area: &Area, sides: &[Side], name: &str) -> Drawn {
     area.fill(&WHITE)?;
-    let panels = area.split_evenly((1, 3));
-    lobes(&panels[0], brdf, name)?;
-    image(&panels[1], brdf)?;
-    albedo(&panels[2], brdf)?;
+    for (side, panels) in sides.iter().zip(area.split_evenly((sides.len(), 3)).chunks(3)) {
+        lobes(&panels[0], side, name)?;
+        image(&panels[1], side)?;
+        albedo(&panels[2], side)?;
+    }
     Ok(area.present()?)
 }
 
@@ -55,13 +83,13 @@ fn in_plane(theta_deg: f64) -> DVec3 {
     dvec3(sin, 0.0, cos)
 }
 
-fn lobes(area: &Area, brdf: &Brdf, name: &str) -> Drawn {
+fn lobes(area: &Area, side: &Side, name: &str) -> Drawn {
     let lobe = |theta_i: f64| -> Vec<(f64, f64)> {
         let point = |i: i32| {
             // Steps of an eighth of a degree, so that narrow lobes have a tip.
             let theta_o = f64::from(i) / 8.0;
             let w_o = in_plane(theta_o);
-            let radius = (luminance(brdf.evaluate(in_plane(theta_i), w_o)) * w_o.z).max(0.0).cbrt();
+            let radius = (luminance(side.evaluate(in_plane(theta_i), w_o)) * w_o.z).max(0.0).cbrt();
             (radius * w_o.x, radius * w_o.z)
         };
         (-719..720).map(point).collect()
@@ -69,7 +97,10 @@ fn lobes(area: &Area, brdf: &Brdf, name: &str) -> Drawn {
     let drawn = LIGHTS.map(|(theta_i, colour)| (theta_i, colour, lobe(theta_i)));
     let reach = drawn.iter().flat_map(|(_, _, points)| points).fold(1e-3, |reach: f64, (x, z)| reach.max(x.hypot(*z)));
     let mut chart = ChartBuilder::on(area)
-        .caption(format!("{name}: cube root of f cos theta_o"), ("sans-serif", 15).into_font().color(&TEXT))
+        .caption(
+            format!("{name}: cube root of f cos theta_o{}", side.note),
+            ("sans-serif", 15).into_font().color(&TEXT),
+        )
         .margin(8)
         .x_label_area_size(22)
         .y_label_area_size(34)
@@ -86,10 +117,10 @@ fn lobes(area: &Area, brdf: &Brdf, name: &str) -> Drawn {
     Ok(())
 }
 
-fn image(area: &Area, brdf: &Brdf) -> Drawn {
+fn image(area: &Area, side: &Side) -> Drawn {
     const CELLS: i32 = 90;
     let mut chart = ChartBuilder::on(area)
-        .caption("phi_d = 90 degrees, f^(1/2.2)", ("sans-serif", 15).into_font().color(&TEXT))
+        .caption(format!("phi_d = 90 degrees, f^(1/2.2){}", side.note), ("sans-serif", 15).into_font().color(&TEXT))
         .margin(8)
         .x_label_area_size(32)
         .y_label_area_size(38)
@@ -99,22 +130,23 @@ fn image(area: &Area, brdf: &Brdf) -> Drawn {
         let (h, d) = (index % CELLS, index / CELLS);
         let [theta_h, theta_d] = [h, d].map(|cell| (f64::from(cell) + 0.5) / f64::from(CELLS) * FRAC_PI_2);
         let along = theta_d.cos() * theta_h.sin();
-        let [w_i, w_o] = [1.0, -1.0].map(|side| dvec3(along, side * theta_d.sin(), theta_d.cos() * theta_h.cos()));
+        let [w_i, w_o] = [1.0, -1.0].map(|sign| dvec3(along, sign * theta_d.sin(), theta_d.cos() * theta_h.cos()));
         let shown =
-            brdf.evaluate(w_i, w_o).to_array().map(|f| (255.0 * f.clamp(0.0, 1.0).powf(1.0 / 2.2)).round() as u8);
+            side.evaluate(w_i, w_o).to_array().map(|f| (255.0 * f.clamp(0.0, 1.0).powf(1.0 / 2.2)).round() as u8);
         Rectangle::new([(h, d), (h + 1, d + 1)], RGBColor(shown[0], shown[1], shown[2]).filled())
     };
     chart.draw_series((0..CELLS * CELLS).map(cell))?;
     Ok(())
 }
 
-fn albedo(area: &Area, brdf: &Brdf) -> Drawn {
+fn albedo(area: &Area, side: &Side) -> Drawn {
     // Every third degree, and where it changes most.
     let angles: Vec<f64> = (0..29).map(|i| 3.0 * f64::from(i)).chain([86.0, 87.5, 89.0]).collect();
-    let albedos: Vec<DVec3> = angles.iter().map(|angle| brdf.albedo(angle.to_radians())).collect();
+    let phi_o = side.azimuth_deg.to_radians();
+    let albedos: Vec<DVec3> = angles.iter().map(|angle| side.brdf.albedo_from(angle.to_radians(), phi_o)).collect();
     let most = albedos.iter().fold(1.0, |most: f64, albedo| most.max(albedo.max_element()));
     let mut chart = ChartBuilder::on(area)
-        .caption("albedo by view angle, degrees", ("sans-serif", 15).into_font().color(&TEXT))
+        .caption(format!("albedo by view angle, degrees{}", side.note), ("sans-serif", 15).into_font().color(&TEXT))
         .margin(8)
         .x_label_area_size(22)
         .y_label_area_size(34)
@@ -142,6 +174,13 @@ mod tests {
                 "{name}"
             );
             assert!(drawn.matches("<rect").count() > 8100 && drawn.contains("albedo"), "{name}");
+            assert!(!drawn.contains("azimuth"), "{name}");
         }
+    }
+
+    #[test]
+    fn an_anisotropic_material_is_drawn_along_and_across_the_tangent() {
+        let drawn = svg(&Brdf::builtin("brushed-steel").unwrap(), "steel", Path::new("x.svg")).unwrap();
+        assert!(drawn.matches("azimuth 0").count() == 3 && drawn.matches("azimuth 90").count() == 3);
     }
 }

@@ -101,7 +101,7 @@ fn load(memo: &Memo, source: &MaterialSource) -> Result<Brdf> {
     }
 }
 
-/// Makes the table by which shaders know a BRDF that they do not evaluate. Its error is logged.
+/// Makes the table by which shaders know a BRDF that they do not evaluate. Its error is logged. An anisotropic BRDF has none.
 pub struct Tabulate<'a>(pub &'a Keyed<Brdf>);
 
 impl Step for Tabulate<'_> {
@@ -114,10 +114,33 @@ impl Step for Tabulate<'_> {
 
     fn make(&self, _: &Round) -> Result<Tabulated> {
         if !self.0.is_isotropic() {
-            let problem = "is anisotropic, and shaders have no form of it";
-            let remedy = "use --method reference, or fitted under light without small lamps";
+            let remedy = "use one of the models that shaders evaluate (principled without sheen is one), or the reference on the CPU";
+            let problem =
+                "is anisotropic here, and shaders would look it up in a table, which only holds isotropic BRDFs";
             return Err(Error::input(format!("model `{}`", self.0.model()), problem, remedy));
         }
         Ok(tabulate(self.0).0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_anisotropic_brdf_that_shaders_do_not_evaluate_is_refused() {
+        let memo = Memo::default();
+        let table_of = |anisotropy: &str| {
+            let text = format!(
+                "base_colour = 0.3\nmetallic = 1\nroughness = 0.4\nsheen = 0.5\nsheen_roughness = 0.4\n{anisotropy}"
+            );
+            let source = MaterialSource::Model { model: "principled".into(), parameters: text.parse().expect("TOML") };
+            let round = memo.round(&());
+            let brdf = round.ask(&LoadMaterial(&source)).unwrap();
+            round.ask(&Tabulate(&brdf)).map(|_| ())
+        };
+        assert!(table_of("").is_ok());
+        let error = table_of("anisotropy = 0.5\nanisotropy_convention = 'gltf'").unwrap_err().to_string();
+        assert!(error.contains("`principled`: is anisotropic"), "{error}");
     }
 }

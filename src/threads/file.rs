@@ -13,7 +13,7 @@
 //!
 //! Row r is for the view angle theta_o = r 90 deg / rows, in the frame whose z is the normal and in which w_o = (sin theta_o, 0,
 //! cos theta_o). Colours are linear Rec. 709. Thread k of row r is the (r count + k)-th. Of an anisotropic BRDF there are as many rows for
-//! each of 7, 13 or 25 azimuths of w_o from the tangent, every 15 degrees; then those of the second azimuth follow those of the first.
+//! each of 10, 19 or 37 azimuths of w_o from the tangent, every 10 degrees; then those of the second azimuth follow those of the first.
 //!
 //! | method | a row | a thread |
 //! |---|---|---|
@@ -118,7 +118,7 @@ fn decode(bytes: &[u8]) -> Result<Threads, String> {
     let per_row = count.checked_mul(3).and_then(|words| words.checked_add(words_a_row));
     let all_rows = rows.checked_mul(azimuths);
     let expected = per_row.and_then(|words| words.checked_mul(all_rows?)?.checked_mul(4));
-    let is_possible = azimuths == 1 || kind == ThreadKind::Fitted && [7, 13, 25].contains(&azimuths);
+    let is_possible = azimuths == 1 || kind == ThreadKind::Fitted && [10, 19, 37].contains(&azimuths);
     if count == 0 || rows == 0 || !is_possible || expected != Some(payload.len()) {
         return Err("has a header that does not fit its content".into());
     }

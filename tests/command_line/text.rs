@@ -116,6 +116,23 @@ fn a_material_is_evaluated_at_angles_and_at_vectors() {
 }
 
 #[test]
+fn an_anisotropic_material_is_evaluated_from_any_azimuth_and_plotted_but_not_exported() {
+    let folder = workplace();
+    let (code, by_angles, _) = evaluated(&folder, "brushed-steel", "30 60 180 0\n30 60 180\n30 60 180 90\n");
+    assert_eq!((code, &by_angles[..3]), (Some(0), &by_angles[3..6]));
+    assert!((by_angles[0] / by_angles[6] - 1.0).abs() > 0.1, "{by_angles:?}");
+    let s = 0.75f64.sqrt();
+    let (_, by_vectors, _) = evaluated(&folder, "brushed-steel --directions", &format!("0 -0.5 {s} 0 {s} 0.5\n"));
+    for (a, b) in by_angles[6..].iter().zip(&by_vectors) {
+        assert!((a - b).abs() < 1e-9 * a, "{a} {b}");
+    }
+    threadlight(&folder, "materials plot silk -o silk.svg").assert().success();
+    assert!(String::from_utf8(bytes(&folder, "silk.svg")).unwrap().contains("azimuth 90"));
+    let refused = threadlight(&folder, "materials export silk -o silk.binary").assert().code(2);
+    assert!(String::from_utf8_lossy(&refused.get_output().stderr).contains("anisotropic"));
+}
+
+#[test]
 fn a_material_is_exported_and_plotted() {
     let folder = workplace();
     threadlight(&folder, "materials export clay -o clay.binary").assert().success();

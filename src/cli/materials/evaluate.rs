@@ -13,13 +13,14 @@ Examples:
 /// Reads pairs of directions, a line each, and writes f for red, green and blue in 1/sr, linear Rec. 709.
 ///
 /// A line is `theta_i theta_o phi` in degrees: the angles of light and view to the normal and the azimuth between them, so that 30 30 180 is a
-/// mirror direction. Empty lines, and what begins with #, are passed over.
+/// mirror direction. Of an anisotropic material a fourth number is the azimuth of the view, counter-clockwise from the tangent; 0 if it is
+/// left out. Empty lines, and what begins with #, are passed over.
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
 pub struct Evaluate {
     #[command(flatten)]
     named: Named,
-    /// A line is two unit vectors instead, `w_i w_o` towards light and view, six numbers; z is the normal.
+    /// A line is two unit vectors instead, `w_i w_o` towards light and view, six numbers; z is the normal, x the tangent.
     #[arg(long)]
     directions: bool,
 }
@@ -53,14 +54,20 @@ fn numbers<const N: usize>(line: &str, form: &str) -> Result<[f64; N]> {
 }
 
 fn of_angles(line: &str) -> Result<(DVec3, DVec3)> {
-    let [theta_i, theta_o, phi] = numbers(line, "theta_i theta_o phi, in degrees")?;
+    const FORM: &str = "theta_i theta_o phi, in degrees, and of an anisotropic material the azimuth of the view";
+    let [theta_i, theta_o, phi, phi_o] = match line.split_whitespace().count() {
+        4 => numbers(line, FORM)?,
+        _ => numbers::<3>(line, FORM).map(|[theta_i, theta_o, phi]| [theta_i, theta_o, phi, 0.0])?,
+    };
     if !(0.0..=180.0).contains(&theta_i) || !(0.0..=180.0).contains(&theta_o) {
         return Err(Error::input(line.trim(), "has an angle to the normal out of range", "use 0 to 180 degrees"));
     }
-    let (sin_i, cos_i) = theta_i.to_radians().sin_cos();
-    let (sin_o, cos_o) = theta_o.to_radians().sin_cos();
-    let (sin_phi, cos_phi) = phi.to_radians().sin_cos();
-    Ok((dvec3(sin_i * cos_phi, sin_i * sin_phi, cos_i), dvec3(sin_o, 0.0, cos_o)))
+    let direction = |theta: f64, phi: f64| {
+        let (sin_theta, cos_theta) = theta.to_radians().sin_cos();
+        let (sin_phi, cos_phi) = phi.to_radians().sin_cos();
+        dvec3(sin_theta * cos_phi, sin_theta * sin_phi, cos_theta)
+    };
+    Ok((direction(theta_i, phi + phi_o), direction(theta_o, phi_o)))
 }
 
 fn of_vectors(line: &str) -> Result<(DVec3, DVec3)> {

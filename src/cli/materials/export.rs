@@ -25,6 +25,16 @@ impl Export {
             return Err(Error::in_file(&self.output, "is no known kind of material file", remedy).into());
         }
         output::check_writable(&self.output)?;
-        Ok(output::write_whole(&self.output, &merl_bytes(&*self.named.load()?))?)
+        let brdf = self.named.load()?;
+        if !brdf.is_isotropic() {
+            let remedy = "export an isotropic material";
+            return Err(Error::input(
+                self.named.material,
+                "is anisotropic, and such a table holds isotropic BRDFs",
+                remedy,
+            )
+            .into());
+        }
+        Ok(output::write_whole(&self.output, &merl_bytes(&brdf))?)
     }
 }

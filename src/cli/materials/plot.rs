@@ -6,6 +6,8 @@ use threadlight::low_level::evaluate::material_plot;
 use threadlight::low_level::output;
 
 /// Draws the BRDF as SVG: lobes in the plane of incidence, the image over half and difference angle, albedo by angle.
+///
+/// An anisotropic one is drawn twice, from the azimuths 0, along the tangent, and 90 degrees.
 #[derive(clap::Args)]
 pub struct Plot {
     #[command(flatten)]

@@ -196,7 +196,8 @@ pub(super) fn carried(kernels: &[Kernel], from: View, to: View) -> Vec<Kernel> {
         let h = turn.rotate(h.truncate()).extend(h.z);
         let mirrored = (2.0 * w_to.dot(h) * h - w_to).normalize();
         let width = scale_rad(kernel.level);
-        let follows = width < FOLLOWS_BELOW_RAD && mirrored.z > -width;
+        // Lobes turn with the surface as a whole.
+        let follows = (width < FOLLOWS_BELOW_RAD || from.phi_o != to.phi_o) && mirrored.z > -width;
         Kernel { direction: if follows { mirrored } else { kernel.direction }, ..*kernel }
     };
     kernels.iter().map(carry).collect()
