@@ -16,6 +16,8 @@ struct Material {
     ThreadSet threads;          // of a pixel whose sub-pixels share one sum
     ThreadSet subpixel_threads; // of each sub-pixel of another pixel
     uint azimuth_count;         // of the view, that there are rows of threads for; 1 of an isotropic BRDF
+    vec2 long_axis;             // of the lobe, from the tangent; across it the lobe has lobe_width
+    float narrowness;           // the lobe's width across that axis over the one along it: 1 of an isotropic BRDF
 };
 
 layout(set = 0, binding = 5, std430) readonly buffer Materials {

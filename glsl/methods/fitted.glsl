@@ -15,46 +15,63 @@ layout(constant_id = 4) const uint HAS_SHARP_KERNELS = 1;    // 0: no kernel is 
 
 #include "shared_sum.glsl"
 
+// A lobe, seen from w_o in the shading frame.
+struct Lobe {
+    vec3 w_o;
+    vec3 mirror;  // the mirrored view, in the environment's coordinates
+    float width;  // lobe_width of what is seen from w_o
+};
+
+// How far `direction` is from the middle of the lobe, in radians: of a long one measured across it, with what is along it shortened by as
+// much as the lobe is long.
+float away_from(Lobe lobe, Surface surface, Material material, vec3 direction) {
+    if (HAS_TANGENTS == 0 || material.azimuth_count == 1) {
+        return distance(direction, lobe.mirror);
+    }
+    // Opposite directions have no half vector; 1e-6 is far below any other sum of two above the horizon.
+    vec3 h = turned(direction * surface.frame + lobe.w_o, surface.phi_o);
+    h /= max(length(h), 1e-6);
+    vec2 axis = material.long_axis;
+    // Reflection doubles angles.
+    return 2.0 * length(vec2(dot(h.xy, axis) * material.narrowness, dot(h.xy, vec2(-axis.y, axis.x))));
+}
+
 // How far a source is from where the BRDF cannot be taken at a few points of it, because it is mirrored towards the eye and wider than
 // the lobe; in half standard deviations of the source. Within a half vector of lobe_width f loses a quarter, as a Gaussian does
 // at 0.76 of its width; reflection doubles that. Twin: src/environment/sources.rs, with CLEAR for the bounds of its use below.
-float clearance(Source source, float lobe_width, vec3 mirror) {
-    return (distance(source.direction.xyz, mirror) + 4.0 * 2.6 * lobe_width) / (2.0 * source.direction.w);
+float clearance(Source source, float lobe_width, float away) {
+    return (away + 4.0 * 2.6 * lobe_width) / (2.0 * source.direction.w);
 }
 
 // How much of the answer to sources is the BRDF's: the rest is the kernels', which fit best where the mirrored view is. Sources count
 // as no narrower than `least_width`. There is at least one.
-float share_of_brdf(float lobe_width, vec3 mirror, float least_width) {
+float share_of_brdf(Lobe lobe, Surface surface, Material material, float least_width) {
     float share = 1.0;
     uint s = 0;
     do {
         Source source = sources[s];
         source.direction.w = max(source.direction.w, least_width);
-        share = min(share, smoothstep(1.25, 2.5, clearance(source, lobe_width, mirror)));
+        float away = away_from(lobe, surface, material, source.direction.xyz);
+        share = min(share, smoothstep(1.25, 2.5, clearance(source, lobe.width, away)));
     } while (++s < source_count);
     return share;
 }
 
-// lobe_width of what is seen from w_o: across the plane of incidence a lobe is narrower by the cosine. Twin of the bound:
-// MIN_COS_THETA_D in src/brdf/lobe.rs.
-float lobe_width_from(Material material, vec3 w_o) {
-    return material.lobe_width * max(w_o.z, 0.05);
-}
-
-// The mirrored view, in the environment's coordinates.
-vec3 mirrored(Surface surface, vec3 w_o) {
-    return surface.frame * vec3(-w_o.x, -w_o.y, w_o.z);
+// The lobe of what is seen: across the plane of incidence it is narrower by the cosine. Twin of the bound: MIN_COS_THETA_D in
+// src/brdf/lobe.rs.
+Lobe lobe_of(Surface surface, Material material) {
+    vec3 w_o = view_direction(surface);
+    return Lobe(w_o, surface.frame * vec3(-w_o.x, -w_o.y, w_o.z), material.lobe_width * max(w_o.z, 0.05));
 }
 
 // A sum at one normal does not do where normals vary more than half vectors within the lobe: what sub-pixels mirror there is not one
 // blur. Nor where a sun is mirrored within the pixel, or so near that its highlight bends within it.
 bool needs_subpixels(Surface surface, Material material) {
     float deviation = sqrt(surface.normal_variance);
-    vec3 w_o = view_direction(surface);
     // Normals mirrored turn twice as far; three standard deviations of that.
     return deviation > material.lobe_width
         || HAS_SOURCES != 0
-        && share_of_brdf(lobe_width_from(material, w_o), mirrored(surface, w_o), 3.0 * 2.0 * deviation) < 1.0;
+        && share_of_brdf(lobe_of(surface, material), surface, material, 3.0 * 2.0 * deviation) < 1.0;
 }
 
 // Powers of all sources times what is to be integrated over them.
@@ -75,13 +92,14 @@ vec2 risen(float z, float deviation) {
     return vec2(above * above / (4.0 * half_side), 2.0 / 3.0 * above);
 }
 
-AtSources at_sources(Surface surface, Material material, float lobe_width, vec3 w_o, vec3 mirror) {
+AtSources at_sources(Surface surface, Material material, Lobe lobe) {
     AtSources sum = AtSources(vec3(0.0), vec3(0.0));
     uint s = 0;
     do {
         Source source = sources[s];
         // Gauss and Legendre's points on a square of the source's variance; from afar, where a lobe is four times wider, its middle.
-        int side = clearance(source, lobe_width, mirror) > 8.0 ? 1 : 3;
+        float away = away_from(lobe, surface, material, source.direction.xyz);
+        int side = clearance(source, lobe.width, away) > 8.0 ? 1 : 3;
         float deviation = length(vec2(dot(source.axis[0].xyz, surface.frame[2]), dot(source.axis[1].xyz, surface.frame[2])));
         int i = 0;
         do {
@@ -93,7 +111,7 @@ AtSources at_sources(Surface surface, Material material, float lobe_width, vec3 
             if (above.x > 0.0) {
                 vec3 power = weights.x * weights.y * above.x * source.power.rgb;
                 w_i = normalize(vec3(w_i.xy, above.y));
-                sum.f_cos += power * brdf_at(surface, material, w_i, w_o);
+                sum.f_cos += power * brdf_at(surface, material, w_i, lobe.w_o);
                 sum.cosine += power;
             }
         } while (++i < side * side);
@@ -174,12 +192,10 @@ vec3 estimate(Surface surface, Material material, ThreadSet set) {
     }
     float of_kernels = 0.0;
     if (HAS_SOURCES != 0) {
-        vec3 w_o = view_direction(surface);
-        vec3 mirror = mirrored(surface, w_o);
-        float lobe_width = lobe_width_from(material, w_o);
-        AtSources at = at_sources(surface, material, lobe_width, w_o, mirror);
+        Lobe lobe = lobe_of(surface, material);
+        AtSources at = at_sources(surface, material, lobe);
         if (HAS_MIRRORED_SOURCES != 0) {
-            of_kernels = 1.0 - share_of_brdf(lobe_width, mirror, 0.0);
+            of_kernels = 1.0 - share_of_brdf(lobe, surface, material, 0.0);
         }
         // The irradiance map has no sources.
         sum += mix(at.f_cos, at.cosine * cosine_part / radians(180.0), of_kernels);

@@ -31,12 +31,8 @@ pub use merl_export::merl_bytes;
 pub use microfacet::{Distribution, fresnel_conductor, fresnel_dielectric};
 pub use parameters::{Domain, Parameter, Parameters, Spacing, as_number, channels};
 pub use record::{MaterialRecord, ThreadSetRecord};
-<<<<<<< HEAD
-pub use roughness::Roughness;
-pub use seen::SeenBrdf;
-=======
 pub use roughness::{Axes, Roughness};
->>>>>>> aniso
+pub use seen::SeenBrdf;
 pub use symmetry::Symmetry;
 pub use tabulate::tabulate;
 

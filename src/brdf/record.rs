@@ -1,5 +1,5 @@
 //! A material as shaders have it. Twin of the layout: glsl/material.glsl.
-use super::{Brdf, Tabulated, half_vector_width};
+use super::{Brdf, LobeAxes, Tabulated, half_vector_width, lobe_axes};
 
 /// `ThreadSet` in glsl/material.glsl.
 #[repr(C)]
@@ -33,11 +33,18 @@ pub struct MaterialRecord {
     pub subpixel_threads: ThreadSetRecord,
     /// Azimuths of the view for which there are rows of threads: 1 of an isotropic BRDF.
     pub azimuth_count: u32,
+    /// The direction of the lobe's long axis in the tangent plane: [`LobeAxes::wide_azimuth`](super::LobeAxes).
+    pub long_axis: [f32; 2],
+    /// The lobe's width across that axis over the one along it: 1 of an isotropic BRDF.
+    pub narrowness: f32,
+    /// The size of a structure in the buffer is a multiple of 16 bytes.
+    pub padding: u32,
 }
 
 impl MaterialRecord {
     /// Of `brdf`, without threads and CDFs.
     pub fn new(brdf: &Brdf) -> Self {
+        let LobeAxes { narrow_rad, wide_rad, wide_azimuth } = lobe_axes(brdf);
         Self {
             parameters: brdf.gpu_parameters(),
             model: brdf.model_index(),
@@ -46,6 +53,9 @@ impl MaterialRecord {
             threads: ThreadSetRecord::default(),
             subpixel_threads: ThreadSetRecord::default(),
             azimuth_count: 1,
+            long_axis: wide_azimuth.as_vec2().to_array(),
+            narrowness: (narrow_rad / wide_rad) as f32,
+            padding: 0,
         }
     }
 

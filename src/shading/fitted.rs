@@ -1,9 +1,9 @@
 //! Fitted threads. Twin of glsl/methods/fitted.glsl, by functions of the same names.
 use std::f32::consts::{FRAC_PI_2, PI};
 
-use glam::{IVec2, Vec3, Vec4};
+use glam::{IVec2, Vec2, Vec3, Vec4};
 
-use super::{CpuShader, Point, Surface};
+use super::{CpuShader, Point, Surface, turned};
 use crate::brdf::MIN_COS_THETA_D;
 use crate::environment::sources::{CLEAR, clearance};
 use crate::environment::{LightMap, SourceRecord};
@@ -82,23 +82,43 @@ fn smoothstep([from, to]: [f32; 2], x: f32) -> f32 {
     x * x * (3.0 - 2.0 * x)
 }
 
-/// Twin of `share_of_brdf`.
-fn share_of_brdf(lobe_width: f32, sources: &[SourceRecord], mirror: Vec3, least_width: f32) -> f32 {
-    let share = |source: &SourceRecord| {
-        let away = source.direction.truncate().distance(mirror);
-        smoothstep(CLEAR, clearance(away, source.direction.w.max(least_width), lobe_width))
-    };
-    sources.iter().map(share).fold(1.0, f32::min)
+/// A lobe, seen from w_o in the shading frame. Twin of `Lobe`.
+struct Lobe<'a> {
+    point: &'a Point<'a>,
+    w_o: Vec3,
+    mirror: Vec3,
+    width: f32,
 }
 
-/// Twin of `lobe_width_from`.
-fn lobe_width_from(point: &Point, w_o: Vec3) -> f32 {
-    point.lobe_width() * w_o.z.max(MIN_COS_THETA_D as f32)
-}
+impl<'a> Lobe<'a> {
+    /// Twin of `lobe_of`.
+    fn of(point: &'a Point) -> Self {
+        let w_o = point.surface.view_direction();
+        let mirror = point.surface.frame * Vec3::new(-w_o.x, -w_o.y, w_o.z);
+        Self { point, w_o, mirror, width: point.record().lobe_width * w_o.z.max(MIN_COS_THETA_D as f32) }
+    }
 
-/// Twin of `mirrored`.
-fn mirrored(surface: &Surface, w_o: Vec3) -> Vec3 {
-    surface.frame * Vec3::new(-w_o.x, -w_o.y, w_o.z)
+    /// Twin of `away_from`.
+    fn away(&self, direction: Vec3) -> f32 {
+        let (surface, record) = (&self.point.surface, self.point.record());
+        let is_isotropic = matches!(self.point.threads(), Some(Threads::Fitted(table)) if table.azimuths == 1);
+        if is_isotropic {
+            return direction.distance(self.mirror);
+        }
+        let h = turned(surface.frame.transpose() * direction + self.w_o, surface.phi_o);
+        let h = (h / h.length().max(1e-6)).truncate();
+        let axis = Vec2::from(record.long_axis);
+        2.0 * (h.dot(axis) * record.narrowness).hypot(h.dot(axis.perp()))
+    }
+
+    /// Twin of `share_of_brdf`.
+    fn share_of_brdf(&self, sources: &[SourceRecord], least_width: f32) -> f32 {
+        let share = |source: &SourceRecord| {
+            let away = self.away(source.direction.truncate());
+            smoothstep(CLEAR, clearance(away, source.direction.w.max(least_width), self.width))
+        };
+        sources.iter().map(share).fold(1.0, f32::min)
+    }
 }
 
 /// Twin of `needs_subpixels`.
@@ -108,10 +128,7 @@ pub(super) fn needs_subpixels(point: &Point) -> bool {
     }
     let sources = &point.twin.sources;
     let deviation = point.surface.normal_variance.sqrt();
-    let w_o = point.surface.view_direction();
-    let mirror = mirrored(&point.surface, w_o);
-    deviation > point.lobe_width()
-        || share_of_brdf(lobe_width_from(point, w_o), sources, mirror, 3.0 * 2.0 * deviation) < 1.0
+    deviation > point.record().lobe_width || Lobe::of(point).share_of_brdf(sources, 3.0 * 2.0 * deviation) < 1.0
 }
 
 /// Twin of `risen`.
@@ -125,11 +142,11 @@ fn risen(z: f32, deviation: f32) -> [f32; 2] {
 }
 
 /// Twin of `at_sources`: powers of all sources times f cos, and times cos.
-fn at_sources(point: &Point, sources: &[SourceRecord], lobe_width: f32, w_o: Vec3, mirror: Vec3) -> (Vec3, Vec3) {
+fn at_sources(lobe: &Lobe, sources: &[SourceRecord]) -> (Vec3, Vec3) {
+    let point = lobe.point;
     let (mut f_cos, mut cosine) = (Vec3::ZERO, Vec3::ZERO);
     for source in sources {
-        let away = source.direction.truncate().distance(mirror);
-        let from_afar = clearance(away, source.direction.w, lobe_width) > 8.0;
+        let from_afar = clearance(lobe.away(source.direction.truncate()), source.direction.w, lobe.width) > 8.0;
         let side = if from_afar { 1 } else { 3 };
         let deviation = source.axes.map(|axis| axis.truncate().dot(point.surface.frame.z_axis));
         let deviation = deviation[0].hypot(deviation[1]);
@@ -148,7 +165,7 @@ fn at_sources(point: &Point, sources: &[SourceRecord], lobe_width: f32, w_o: Vec
             if cos > 0.0 {
                 let power = weight(place.x) * weight(place.y) * cos * source.power.truncate();
                 let w_i = w_i.with_z(middle).normalize();
-                f_cos += power * point.brdf(w_i, w_o);
+                f_cos += power * point.brdf(w_i, lobe.w_o);
                 cosine += power;
             }
         }
@@ -227,11 +244,9 @@ pub(super) fn estimate(point: &Point) -> Vec3 {
     let mut sum = Vec3::ZERO;
     let mut of_kernels = 0.0;
     if !sources.is_empty() {
-        let w_o = surface.view_direction();
-        let mirror = mirrored(surface, w_o);
-        let lobe_width = lobe_width_from(point, w_o);
-        of_kernels = 1.0 - share_of_brdf(lobe_width, sources, mirror, 0.0);
-        let (f_cos, cosine) = at_sources(point, sources, lobe_width, w_o, mirror);
+        let lobe = Lobe::of(point);
+        of_kernels = 1.0 - lobe.share_of_brdf(sources, 0.0);
+        let (f_cos, cosine) = at_sources(&lobe, sources);
         sum = f_cos.lerp(cosine * cosine_part / PI, of_kernels);
     }
     for k in 0..threads.count {

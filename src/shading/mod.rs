@@ -274,8 +274,8 @@ impl Point<'_> {
         Some(if self.is_pixel { &sets.pixel } else { &sets.subpixel })
     }
 
-    fn lobe_width(&self) -> f32 {
-        self.twin.records[self.material].lobe_width
+    fn record(&self) -> &MaterialRecord {
+        &self.twin.records[self.material]
     }
 
     fn sample_count(&self) -> u32 {
