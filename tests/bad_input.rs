@@ -1,4 +1,6 @@
 //! Bad input: a reason on one line that names what is at fault, exit code 2, no panic and nothing written.
+mod common;
+
 use assert_cmd::Command;
 use std::fs;
 use std::path::Path;
@@ -230,6 +232,34 @@ fn hostile_measured_materials_are_refused() {
         refuses(&folder, &render(&format!("--material {name}")), &[&name, reason]);
     }
     refuses(&folder, "threads zero.binary --count 2 -o out/zero.threads", &["zero.binary"]);
+}
+
+#[test]
+fn hostile_rgl_files_are_refused() {
+    let folder = workplace();
+    let good = common::rgl_like_file();
+    let shape: &[u64] = &[1, 3, 2, 2];
+    let with = |vndf: &[f32]| {
+        common::rgl_file(&[("phi_i", &[1], &[0.0]), ("theta_i", &[3], &[0.0, 0.8, 1.4]), ("vndf", shape, vndf)])
+    };
+    let huge = common::rgl_file(&[("phi_i", &[u64::MAX], &[0.0])]);
+    for (name, bytes, reason) in [
+        ("missing", None, "cannot be read"),
+        ("empty", Some(&b""[..]), "no tensor file"),
+        ("header", Some(&good[..30]), "ends within its list"),
+        ("cut", Some(&good[..good.len() - 1]), "ends before its field rgb"),
+        ("huge", Some(&huge), "ends before its field phi_i"),
+        ("zero", Some(&with(&[0.0; 12])), "nothing but zeros"),
+        ("nan", Some(&with(&[f32::NAN; 12])), "NaN"),
+        ("anisotropic", Some(&common::rgl_file(&[("phi_i", &[2], &[0.0; 2])])), "is anisotropic: not supported yet"),
+        ("noise", Some(&noise(4096)), "no tensor file"),
+    ] {
+        let name = format!("{name}.bsdf");
+        if let Some(bytes) = bytes {
+            fs::write(folder.path().join(&name), bytes).unwrap();
+        }
+        refuses(&folder, &render(&format!("--material {name}")), &[&name, reason]);
+    }
 }
 
 #[test]
