@@ -306,6 +306,9 @@ fn hostile_environments_are_refused() {
         ("cut.hdr", [hdr("-Y 4 +X 8"), vec![128; 4 * 31]].concat(), "Radiance"),
         ("huge.hdr", hdr("-Y 1000000 +X 1000000"), "2^28"),
         ("none.hdr", hdr("-Y 0 +X 0"), "none.hdr"),
+        // A header of some bytes must not ask for gigabytes.
+        ("claims.hdr", hdr("-Y 16384 +X 16384"), "more than 16 pixels for each"),
+        ("break.hdr", hdr("-Y 1\rX 1"), "break.hdr"),
         ("empty.exr", vec![], "EXR"),
         ("cut.exr", colour[..colour.len() - 9].to_vec(), "EXR"),
         ("head.exr", colour[..60].to_vec(), "EXR"),
@@ -313,6 +316,7 @@ fn hostile_environments_are_refused() {
         ("red.exr", exr(&["R", "A"]), "R, G, B"),
         ("map.jpg", b"hello".to_vec(), ".hdr"),
         ("noise.hdr", noise(4096), "Radiance"),
+        ("claims.exr", claiming(&colour, 16000), "more than 1024 pixels for each"),
         ("noise.exr", noise(4096), "EXR"),
     ] {
         fs::write(folder.path().join(name), bytes).unwrap();
@@ -338,6 +342,8 @@ fn hostile_scene_files_are_refused() {
         ("[image]\nsubpixels = 5", "subpixels"),
         ("[image]\nexposure = nan", "exposure"),
         ("[image]\nexposure = 1e39", "exposure"),
+        ("[environment]\nbuiltin = \"\"\"\na\rb\"\"\"", "a"),
+        ("[shading]\nmethod = \"\"\"\nmagic\nspell\"\"\"", "magic"),
         ("[image]\ngamma = 0", "gamma"),
         ("[image]\nbackground = 'black'", "black"),
         ("[shading]\nthreads = 0", "threads"),
@@ -374,6 +380,18 @@ fn hostile_scene_files_are_refused() {
     for name in ["noise.toml", "folder.toml", "missing.toml"] {
         refuses(&folder, &format!("render {name} -o out/image.png"), &[name]);
     }
+}
+
+/// An EXR whose header says that it is this wide and high.
+fn claiming(exr: &[u8], side: i32) -> Vec<u8> {
+    let mut bytes = exr.to_vec();
+    for window in ["dataWindow\0box2i\0", "displayWindow\0box2i\0"] {
+        let name = exr.windows(window.len()).position(|bytes| bytes == window.as_bytes()).expect("a window");
+        // After the size of the value, 4 bytes, its corners: 0, 0, and the last pixel.
+        let last = name + window.len() + 4 + 8;
+        bytes[last..last + 8].copy_from_slice(&[side - 1; 2].map(i32::to_le_bytes).concat());
+    }
+    bytes
 }
 
 /// Bytes without meaning, always the same.
