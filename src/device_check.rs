@@ -9,6 +9,7 @@ use crate::vulkan::{Device, PipelineCache};
 use glam::{Vec3, Vec4};
 use half::f16;
 use serde::{Deserialize, Serialize};
+use std::path::Path;
 use std::sync::Arc;
 
 /// What was found out about a device.
@@ -23,6 +24,15 @@ pub enum Verdict {
 }
 
 impl Verdict {
+    /// The verdict in the bytes of the cache's file at `path`.
+    ///
+    /// # Errors
+    /// They are no verdict.
+    pub fn parse(path: &Path, bytes: &[u8]) -> Result<Self> {
+        serde_json::from_slice(bytes)
+            .map_err(|cause| Error::in_file(path, format!("is damaged ({cause})"), "the device is checked again"))
+    }
+
     /// How the device is used; an error for one that cannot be.
     ///
     /// # Errors

@@ -45,7 +45,8 @@ impl Error {
 
     /// An [`Error::Input`] about `subject`: a flag, a key, a name.
     pub fn input(subject: impl ToString, problem: impl ToString, remedy: impl ToString) -> Self {
-        Self::Input { subject: subject.to_string(), problem: problem.to_string(), remedy: remedy.to_string() }
+        let [subject, problem, remedy] = [subject.to_string(), problem.to_string(), remedy.to_string()].map(one_line);
+        Self::Input { subject, problem, remedy }
     }
 
     /// An [`Error::Input`] for a file that cannot be opened or read.
@@ -67,9 +68,46 @@ impl Error {
     pub fn within(self, context: impl std::fmt::Display) -> Self {
         match self {
             Self::Input { subject, problem, remedy } => {
-                Self::Input { subject: format!("{context}: {subject}"), problem, remedy }
+                Self::Input { subject: one_line(format!("{context}: {subject}")), problem, remedy }
             }
             other => other,
         }
+    }
+}
+
+/// Longest part of an error, in characters.
+const MAX_LETTERS: usize = 2000;
+
+/// What is said quotes files, in which anything can stand: breaks of lines and other control characters are escaped, and what is very long
+/// is cut.
+fn one_line(text: String) -> String {
+    if text.len() <= MAX_LETTERS && !text.contains(char::is_control) {
+        return text;
+    }
+    let mut line = String::new();
+    for letter in text.chars().take(MAX_LETTERS) {
+        if letter.is_control() {
+            line.extend(letter.escape_default());
+        } else {
+            line.push(letter);
+        }
+    }
+    if text.chars().nth(MAX_LETTERS).is_some() {
+        line += "...";
+    }
+    line
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_quoted_from_a_file_stays_on_one_line() {
+        let error = Error::in_file(Path::new("a\nb.toml"), "has no `x\r\n\u{85}\u{1b}[2J`", "remove\nit");
+        let said = error.within("c\n").to_string();
+        assert_eq!(said, "c\\n: a\\nb.toml: has no `x\\r\\n\\u{85}\\u{1b}[2J`; remove\\nit");
+        let long = Error::input("x", "y".repeat(1 << 20), "z").to_string();
+        assert!(long.len() < 3000 && long.ends_with("y...; z"), "{}", long.len());
     }
 }

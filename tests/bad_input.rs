@@ -1,4 +1,6 @@
 //! Bad input: a reason on one line that names what is at fault, exit code 2, no panic and nothing written.
+mod common;
+
 use assert_cmd::Command;
 use std::fs;
 use std::path::Path;
@@ -233,6 +235,34 @@ fn hostile_measured_materials_are_refused() {
 }
 
 #[test]
+fn hostile_rgl_files_are_refused() {
+    let folder = workplace();
+    let good = common::rgl_like_file();
+    let shape: &[u64] = &[1, 3, 2, 2];
+    let with = |vndf: &[f32]| {
+        common::rgl_file(&[("phi_i", &[1], &[0.0]), ("theta_i", &[3], &[0.0, 0.8, 1.4]), ("vndf", shape, vndf)])
+    };
+    let huge = common::rgl_file(&[("phi_i", &[u64::MAX], &[0.0])]);
+    for (name, bytes, reason) in [
+        ("missing", None, "cannot be read"),
+        ("empty", Some(&b""[..]), "no tensor file"),
+        ("header", Some(&good[..30]), "ends within its list"),
+        ("cut", Some(&good[..good.len() - 1]), "ends before its field rgb"),
+        ("huge", Some(&huge), "ends before its field phi_i"),
+        ("zero", Some(&with(&[0.0; 12])), "nothing but zeros"),
+        ("nan", Some(&with(&[f32::NAN; 12])), "NaN"),
+        ("anisotropic", Some(&common::rgl_file(&[("phi_i", &[2], &[0.0; 2])])), "is anisotropic: not supported yet"),
+        ("noise", Some(&noise(4096)), "no tensor file"),
+    ] {
+        let name = format!("{name}.bsdf");
+        if let Some(bytes) = bytes {
+            fs::write(folder.path().join(&name), bytes).unwrap();
+        }
+        refuses(&folder, &render(&format!("--material {name}")), &[&name, reason]);
+    }
+}
+
+#[test]
 fn hostile_material_descriptions_are_refused() {
     let folder = workplace();
     for (name, text, key) in [
@@ -276,6 +306,9 @@ fn hostile_environments_are_refused() {
         ("cut.hdr", [hdr("-Y 4 +X 8"), vec![128; 4 * 31]].concat(), "Radiance"),
         ("huge.hdr", hdr("-Y 1000000 +X 1000000"), "2^28"),
         ("none.hdr", hdr("-Y 0 +X 0"), "none.hdr"),
+        // A header of some bytes must not ask for gigabytes.
+        ("claims.hdr", hdr("-Y 16384 +X 16384"), "more than 16 pixels for each"),
+        ("break.hdr", hdr("-Y 1\rX 1"), "break.hdr"),
         ("empty.exr", vec![], "EXR"),
         ("cut.exr", colour[..colour.len() - 9].to_vec(), "EXR"),
         ("head.exr", colour[..60].to_vec(), "EXR"),
@@ -283,6 +316,7 @@ fn hostile_environments_are_refused() {
         ("red.exr", exr(&["R", "A"]), "R, G, B"),
         ("map.jpg", b"hello".to_vec(), ".hdr"),
         ("noise.hdr", noise(4096), "Radiance"),
+        ("claims.exr", claiming(&colour, 16000), "more than 1024 pixels for each"),
         ("noise.exr", noise(4096), "EXR"),
     ] {
         fs::write(folder.path().join(name), bytes).unwrap();
@@ -308,6 +342,8 @@ fn hostile_scene_files_are_refused() {
         ("[image]\nsubpixels = 5", "subpixels"),
         ("[image]\nexposure = nan", "exposure"),
         ("[image]\nexposure = 1e39", "exposure"),
+        ("[environment]\nbuiltin = \"\"\"\na\rb\"\"\"", "a"),
+        ("[shading]\nmethod = \"\"\"\nmagic\nspell\"\"\"", "magic"),
         ("[image]\ngamma = 0", "gamma"),
         ("[image]\nbackground = 'black'", "black"),
         ("[shading]\nthreads = 0", "threads"),
@@ -344,6 +380,18 @@ fn hostile_scene_files_are_refused() {
     for name in ["noise.toml", "folder.toml", "missing.toml"] {
         refuses(&folder, &format!("render {name} -o out/image.png"), &[name]);
     }
+}
+
+/// An EXR whose header says that it is this wide and high.
+fn claiming(exr: &[u8], side: i32) -> Vec<u8> {
+    let mut bytes = exr.to_vec();
+    for window in ["dataWindow\0box2i\0", "displayWindow\0box2i\0"] {
+        let name = exr.windows(window.len()).position(|bytes| bytes == window.as_bytes()).expect("a window");
+        // After the size of the value, 4 bytes, its corners: 0, 0, and the last pixel.
+        let last = name + window.len() + 4 + 8;
+        bytes[last..last + 8].copy_from_slice(&[side - 1; 2].map(i32::to_le_bytes).concat());
+    }
+    bytes
 }
 
 /// Bytes without meaning, always the same.

@@ -65,6 +65,9 @@ fn the_shader_agrees_with_its_cpu_twin() {
     let table = folder.path().join("table.binary");
     std::fs::write(&table, common::merl_like_table()).unwrap();
     materials.push(("table", MaterialSource::File(table)));
+    let measured = folder.path().join("measured.bsdf");
+    std::fs::write(&measured, common::rgl_like_file()).unwrap();
+    materials.push(("measured", MaterialSource::File(measured)));
     // Of a BRDF without a form in GLSL the twin has the table, too.
     materials.push(("made table", custom_metal()));
     // Small, as a pyramid of kernels is made from it for each material.

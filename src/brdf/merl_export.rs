@@ -8,14 +8,17 @@ use super::Brdf;
 use super::merl::{Horizon, PHI_D_BINS, SCALE, THETA_D_BINS, THETA_H_BINS};
 
 /// The bytes of a `.binary` file with the values of `brdf` in the middle of each cell; -1, as in the database, where light or view is below
-/// the horizon.
+/// the horizon. The form is reciprocal: of a BRDF that is not, the mean of both ways is written.
 pub fn merl_bytes(brdf: &Brdf) -> Vec<u8> {
     let line = |line: usize| {
         let (theta_h, theta_d) = (line / THETA_D_BINS, line % THETA_D_BINS);
         let horizon = Horizon::of_bins(theta_h, theta_d);
         (0..PHI_D_BINS).map(move |phi_d| {
             let (w_i, w_o) = middle_of_cell(theta_h, theta_d, phi_d);
-            horizon.is_above(phi_d).then(|| brdf.evaluate(w_i, w_o))
+            horizon.is_above(phi_d).then(|| match brdf.is_reciprocal() {
+                true => brdf.evaluate(w_i, w_o),
+                false => 0.5 * (brdf.evaluate(w_i, w_o) + brdf.evaluate(w_o, w_i)),
+            })
         })
     };
     let cells: Vec<_> = (0..THETA_H_BINS * THETA_D_BINS).into_par_iter().flat_map_iter(line).collect();

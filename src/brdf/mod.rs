@@ -21,8 +21,10 @@ mod parameters;
 mod record;
 mod roughness;
 mod seen;
+mod spectrum;
 mod symmetry;
 mod tabulate;
+mod tensor_file;
 
 pub use custom::CustomBrdf;
 pub use ggx_lobe::{Tap, ggx_lobe};
@@ -36,12 +38,15 @@ pub use seen::SeenBrdf;
 pub use symmetry::Symmetry;
 pub use tabulate::tabulate;
 
-file_formats!(Brdf: merl_file, toml_file);
+file_formats!(Brdf: merl_file, rgl_file, toml_file);
 
 /// What every model offers; [`Brdf`] dispatches to it.
 pub trait Model: Sized {
     /// Whether material and scene files can have its parameters.
     const HAS_PARAMETERS: bool = true;
+
+    /// Whether f stays what it is when light and view change places. Measurements are reciprocal only approximately.
+    const IS_RECIPROCAL: bool = true;
 
     /// f(w_i, w_o) in 1/sr, linear Rec. 709, for unit vectors with both z positive.
     fn evaluate(&self, w_i: DVec3, w_o: DVec3) -> DVec3;
@@ -87,6 +92,11 @@ macro_rules! brdf_models {
             pub fn models_with_parameters() -> Vec<&'static str> {
                 let models = [$((stringify!($name), $Model::HAS_PARAMETERS)),+];
                 models.into_iter().filter_map(|(name, has_parameters)| has_parameters.then_some(name)).collect()
+            }
+
+            /// Whether f stays what it is when light and view change places.
+            pub fn is_reciprocal(&self) -> bool {
+                match self { $(Brdf::$Model(_) => $Model::IS_RECIPROCAL,)+ }
             }
 
             /// Name of this BRDF's model: one of [`Brdf::MODELS`].
@@ -294,6 +304,8 @@ mod closed_form_tests;
 mod fit_tests;
 #[cfg(test)]
 mod model_tests;
+#[cfg(test)]
+mod rgl_tests;
 #[cfg(test)]
 mod samples;
 #[cfg(test)]

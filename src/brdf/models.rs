@@ -22,4 +22,5 @@ brdf_models! {
     multiscatter_conductor => MultiscatterConductor,
     tabulated => Tabulated,
     custom => Custom,
+    rgl => Rgl,
 }

@@ -29,7 +29,8 @@ pub fn tabulate(brdf: &Brdf) -> (Tabulated, f64) {
     let samples: Vec<_> = VIEW_DEG.into_iter().map(|theta_o_deg| Sample::of_view(&f, theta_o_deg, knee)).collect();
     let mut tangents = TANGENT_NODES[0];
     loop {
-        let table = Tabulated::of(&f, Grid { nodes: [Tabulated::NODES[0], Tabulated::NODES[1], tangents], knee });
+        let nodes = [Tabulated::NODES[0], Tabulated::NODES[1], tangents];
+        let table = Tabulated::of(&f, Grid { nodes, knee, is_reciprocal: brdf.is_reciprocal() });
         let error = error(&table, &samples);
         if error <= TARGET_ERROR || 2 * tangents - 1 > TANGENT_NODES[1] {
             tracing::info!("{}: a table of {:?} nodes, error {:.2} %", brdf.model(), table.size(), 100.0 * error);

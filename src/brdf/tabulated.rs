@@ -11,6 +11,9 @@
 //! What is stored is f (n . w_i + n . w_o) / 2 = f cos theta_h cos theta_d, which stays finite where both directions graze, in
 //! half precision. Nodes below the horizon hold what is found above it at the same theta_h and theta_d. How many nodes, and what error
 //! they leave: `tabulate.rs`.
+//!
+//! Of a BRDF that is not reciprocal, as measured ones are not, there are two such tables, one behind the other: for light that is farther
+//! from the normal than the view, and for light that is nearer. They hold f (n . w_i), which is what was measured.
 use std::f64::consts::LN_2;
 use std::sync::Arc;
 
@@ -33,7 +36,8 @@ const GREATEST_TEXEL: f64 = 6e4;
 /// A BRDF as shaders look it up. Cheap to clone.
 #[derive(Clone)]
 pub struct Tabulated {
-    /// Values over `scale`, index (|cos phi_d|) + nodes[0] ((cos theta_d) + nodes[1] (tan(theta_h / 2))); the fourth channel is not used.
+    /// Values over `scale`, index (|cos phi_d|) + nodes[0] ((cos theta_d) + nodes[1] (tan(theta_h / 2) + nodes[2] side)); the fourth channel
+    /// is not used.
     texels: Arc<[[f16; 4]]>,
     grid: Grid,
     /// 1/sr: what a texel of 1 stands for.
@@ -47,15 +51,28 @@ pub(super) struct Grid {
     pub nodes: [usize; 3],
     /// tan(theta_h / 2) below which nodes are equally spaced rather than by factors.
     pub knee: f64,
+    /// Whether f stays what it is when light and view change places. Otherwise there is a second side, for light that is nearer to the
+    /// normal than the view.
+    pub is_reciprocal: bool,
 }
 
 impl Grid {
+    /// Those of one side.
     pub fn cells(&self) -> usize {
         self.nodes.iter().product()
     }
 
-    /// The position of a pair of directions in nodes, from 0 to nodes - 1.
-    fn position(&self, w_i: DVec3, w_o: DVec3) -> DVec3 {
+    fn sides(&self) -> usize {
+        if self.is_reciprocal { 1 } else { 2 }
+    }
+
+    /// The cosine by which f is multiplied in the table.
+    fn cosine(&self, w_i: DVec3, w_o: DVec3) -> f64 {
+        if self.is_reciprocal { 0.5 * (w_i.z + w_o.z) } else { w_i.z }
+    }
+
+    /// The side of a pair of directions, and its position there in nodes, from 0 to nodes - 1.
+    fn position(&self, w_i: DVec3, w_o: DVec3) -> (usize, DVec3) {
         let h = (w_i + w_o).normalize();
         let sin_theta_h = (h.x * h.x + h.y * h.y).sqrt();
         // The azimuth of a half vector at the pole is arbitrary.
@@ -70,10 +87,11 @@ impl Grid {
             logarithmic((1.0 - square.sqrt() / (1.0 + w_i.dot(h))).clamp(0.0, 1.0), KNEE_THETA_D),
             logarithmic((sin_theta_h / (1.0 + h.z)).min(1.0), self.knee),
         );
-        unit * DVec3::from_array(self.nodes.map(|count| (count - 1) as f64))
+        let side = usize::from(!self.is_reciprocal && along < 0.0);
+        (side, unit * DVec3::from_array(self.nodes.map(|count| (count - 1) as f64)))
     }
 
-    /// The directions w_i and w_o at a node, moved above the horizon.
+    /// The directions w_i and w_o at a node of the first side, moved above the horizon; on the second one they change places.
     fn directions(&self, node: [usize; 3]) -> (DVec3, DVec3) {
         let [p, c, t] = std::array::from_fn(|axis| node[axis] as f64 / (self.nodes[axis] - 1) as f64);
         let half_tangent = 1.0 - exponential(c, KNEE_THETA_D).clamp(1e-3, 1.0);
@@ -115,11 +133,13 @@ impl Tabulated {
     /// The table of `f` on `grid`.
     pub(super) fn of(f: &(impl Fn(DVec3, DVec3) -> DVec3 + Sync), grid: Grid) -> Self {
         let value = |index: usize| {
-            let [columns, rows, _] = grid.nodes;
-            let (w_i, w_o) = grid.directions([index % columns, index / columns % rows, index / columns / rows]);
-            f(w_i, w_o) * (0.5 * (w_i.z + w_o.z))
+            let [columns, rows, layers] = grid.nodes;
+            let node = [index % columns, index / columns % rows, index / columns / rows % layers];
+            let (lower, higher) = grid.directions(node);
+            let (w_i, w_o) = if index < grid.cells() { (lower, higher) } else { (higher, lower) };
+            f(w_i, w_o) * grid.cosine(w_i, w_o)
         };
-        let values: Vec<DVec3> = (0..grid.cells()).into_par_iter().map(value).collect();
+        let values: Vec<DVec3> = (0..grid.sides() * grid.cells()).into_par_iter().map(value).collect();
         let greatest = values.iter().fold(0.0, |greatest: f64, value| greatest.max(value.max_element()));
         // A table that is black has any scale.
         let scale = if greatest > 0.0 { greatest / GREATEST_TEXEL } else { 1.0 };
@@ -128,9 +148,10 @@ impl Tabulated {
         Self { texels, grid, scale }
     }
 
-    /// Number of texels along x, y and z of a 3D texture: |cos phi_d|, 1 - tan(theta_d / 2), tan(theta_h / 2).
+    /// Number of texels along x, y and z of a 3D texture: |cos phi_d|, 1 - tan(theta_d / 2), tan(theta_h / 2), of both sides if there are two.
     pub fn size(&self) -> [usize; 3] {
-        self.grid.nodes
+        let [x, y, z] = self.grid.nodes;
+        [x, y, z * self.grid.sides()]
     }
 
     /// The texels, x fastest. Between them one interpolates linearly.
@@ -140,7 +161,7 @@ impl Tabulated {
 
     /// What glsl/brdf/tabulated.glsl reads of a table whose first texel lies at this y and z in the atlas.
     pub fn parameters_at(&self, [y, z]: [usize; 2]) -> [f32; 12] {
-        let Grid { nodes, knee } = self.grid;
+        let Grid { nodes, knee, is_reciprocal } = self.grid;
         let per_doubling = |count: usize, knee: f64| (count - 1) as f64 * LN_2 / knee.recip().ln_1p();
         let numbers = [
             (nodes[0] - 1) as f64,
@@ -151,6 +172,7 @@ impl Tabulated {
             knee.recip(),
             y as f64,
             z as f64,
+            if is_reciprocal { 0.0 } else { nodes[2] as f64 },
         ];
         std::array::from_fn(|i| numbers.get(i).map_or(0.0, |number| *number as f32))
     }
@@ -170,16 +192,17 @@ impl Model for Tabulated {
     const HAS_PARAMETERS: bool = false;
 
     fn evaluate(&self, w_i: DVec3, w_o: DVec3) -> DVec3 {
-        let position = self.grid.position(w_i, w_o).to_array();
+        let (side, position) = self.grid.position(w_i, w_o);
+        let position = position.to_array();
         let [columns, rows, _] = self.grid.nodes;
         let first: [usize; 3] = std::array::from_fn(|axis| (position[axis] as usize).min(self.grid.nodes[axis] - 2));
         let [x, y, z] = std::array::from_fn(|axis| (position[axis] - first[axis] as f64) as f32);
-        let start = first[0] + columns * (first[1] + rows * first[2]);
+        let start = first[0] + columns * (first[1] + rows * first[2]) + side * self.grid.cells();
         let texel = |place: usize| Vec3::from_slice(&self.texels[place].map(f16::to_f32));
         let line = |offset: usize| texel(start + offset).lerp(texel(start + offset + 1), x);
         let plane = |offset: usize| line(offset).lerp(line(offset + columns), y);
         let value = plane(0).lerp(plane(columns * rows), z);
-        value.as_dvec3() * (2.0 * self.scale / (w_i.z + w_o.z))
+        value.as_dvec3() * (self.scale / self.grid.cosine(w_i, w_o))
     }
 
     fn from_parameters(_: &mut Parameters) -> Result<Self> {
@@ -189,6 +212,7 @@ impl Model for Tabulated {
     fn hash_content(&self, hasher: &mut blake3::Hasher) {
         super::hash_numbers(hasher, [self.scale, self.grid.knee]);
         super::hash_numbers(hasher, self.grid.nodes.map(|count| count as f64));
+        super::hash_numbers(hasher, [self.grid.sides() as f64]);
         hasher.update(bytemuck::cast_slice(&self.texels));
     }
 }

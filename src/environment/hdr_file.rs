@@ -13,6 +13,9 @@ use crate::output;
 pub(super) const FORMAT: FileFormat<Environment> =
     FileFormat { extension: "hdr", name: "a Radiance .hdr", is_of_format: |_| true, parse };
 
+/// A run of each of four channels takes two bytes and is of 127 pixels at most.
+const MAX_PIXELS_PER_BYTE: u64 = 16;
+
 fn parse(path: &Path, bytes: &[u8]) -> Result<Environment> {
     let broken = |cause: image::ImageError| {
         let cause = cause.to_string().replace('\n', " ");
@@ -20,9 +23,7 @@ fn parse(path: &Path, bytes: &[u8]) -> Result<Environment> {
     };
     let decoder = HdrDecoder::new(Cursor::new(bytes)).map_err(broken)?;
     let (width, height) = decoder.dimensions();
-    if u64::from(width) * u64::from(height) > output::MAX_PIXELS as u64 {
-        return Err(Error::in_file(path, "says that it has more than 2^28 pixels", "make it smaller"));
-    }
+    output::check_pixels(path, [u64::from(width) * u64::from(height)], bytes.len(), MAX_PIXELS_PER_BYTE)?;
     let picture = DynamicImage::from_decoder(decoder).map_err(broken)?.into_rgb32f();
     let texels = picture.pixels().map(|pixel| pixel.0).collect();
     Environment::of_file(path, width as usize, height as usize, texels)

@@ -12,6 +12,7 @@ use std::path::Path;
 use super::pyramid::MAX_FACE_SIZE;
 use super::{BlurKernel, Pyramid, VmfPyramid};
 use crate::error::{Error, Result};
+use crate::file_format;
 use crate::output::write_whole;
 
 /// Version of the file format and of the maps in it: to be raised when the same environment gets others.
@@ -44,8 +45,15 @@ pub fn write(path: &Path, pyramid: &VmfPyramid) -> Result<()> {
 /// # Errors
 /// A file that cannot be read, or is not whole.
 pub fn read(path: &Path) -> Result<VmfPyramid> {
-    let bytes = std::fs::read(path).map_err(|cause| Error::unreadable(path, cause))?;
-    decode(&bytes).ok_or_else(|| Error::in_file(path, "is damaged", "it is made again"))
+    parse(path, &file_format::read(path)?)
+}
+
+/// The pyramid in the bytes of the file at `path`.
+///
+/// # Errors
+/// They are not a whole file of this version.
+pub fn parse(path: &Path, bytes: &[u8]) -> Result<VmfPyramid> {
+    decode(bytes).ok_or_else(|| Error::in_file(path, "is damaged", "it is made again"))
 }
 
 fn decode(bytes: &[u8]) -> Option<VmfPyramid> {

@@ -10,11 +10,11 @@ use exr::prelude::{
     Vec2, WritableImage,
 };
 
-use super::{Format, PictureFile, write_whole};
+use super::{Format, PictureFile, check_pixels, write_whole};
 use crate::error::{Error, Result};
 
-/// More pixels than any picture of use, few enough for memory: a damaged header must not ask for all of it.
-pub(crate) const MAX_PIXELS: usize = 1 << 28;
+/// Pixels of all channels to each byte of a file, at most: deflate makes 1032 bytes of one, most of it for one channel of half floats.
+const MAX_SAMPLES_PER_BYTE: u64 = 1024;
 
 /// How a picture was made: written to the header of an EXR, each field under its own name.
 #[derive(Clone, Debug, PartialEq)]
@@ -139,9 +139,12 @@ pub fn parse_exr(path: &Path, bytes: &[u8]) -> Result<PictureFile> {
     };
     let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(broken)?;
     let area = |size: Vec2<usize>| size.0.saturating_mul(size.1);
-    if meta.headers.iter().any(|header| area(header.layer_size) > MAX_PIXELS) {
-        return Err(Error::in_file(path, "says that it has more than 2^28 pixels", "make it smaller"));
-    }
+    // Every layer is read before one is chosen.
+    let samples = meta
+        .headers
+        .iter()
+        .flat_map(|header| std::iter::repeat_n(area(header.layer_size) as u64, header.channels.list.len().max(1)));
+    check_pixels(path, samples, bytes.len(), MAX_SAMPLES_PER_BYTE)?;
     let image: FlatImage = exr::prelude::read()
         .no_deep_data()
         .largest_resolution_level()

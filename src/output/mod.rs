@@ -8,8 +8,8 @@ use crate::file_format;
 mod exr_file;
 mod png_file;
 
+pub(crate) use exr_file::parse_exr;
 pub use exr_file::{ExrHeader, write_exr};
-pub(crate) use exr_file::{MAX_PIXELS, parse_exr};
 pub use png_file::write_png;
 
 /// The file formats of a picture, told apart by the extension of the file's name.
@@ -51,11 +51,44 @@ pub struct PictureFile {
 
 /// Reads the PNG or EXR at `path`. EXR may have R, G, B or only Y, with or without A.
 pub fn read_image(path: &Path) -> Result<PictureFile> {
-    let parse = match Format::of(path)? {
-        Format::Png => png_file::parse,
-        Format::Exr => parse_exr,
-    };
-    parse(path, &file_format::read(path)?)
+    Format::of(path)?;
+    parse_image(path, &file_format::read(path)?)
+}
+
+/// The picture in the bytes of the PNG or EXR at `path`.
+///
+/// # Errors
+/// An extension of neither; bytes that are no whole picture.
+pub fn parse_image(path: &Path, bytes: &[u8]) -> Result<PictureFile> {
+    match Format::of(path)? {
+        Format::Png => png_file::parse(path, bytes),
+        Format::Exr => parse_exr(path, bytes),
+    }
+}
+
+/// Largest picture that is read.
+const MAX_PIXELS: u64 = 1 << 28;
+
+/// Checks a picture's size before anything is allocated for it: a header of some bytes can claim any number of pixels, but compression
+/// makes only so many, `most`, of a byte of the file. `pixels` are those of each layer and channel.
+pub(crate) fn check_pixels(
+    path: &Path,
+    pixels: impl IntoIterator<Item = u64>,
+    file_bytes: usize,
+    most: u64,
+) -> Result<()> {
+    let mut sum = 0_u64;
+    for pixels in pixels {
+        if pixels > MAX_PIXELS {
+            return Err(Error::in_file(path, "says that it has more than 2^28 pixels", "make it smaller"));
+        }
+        sum += pixels;
+        if sum > most.saturating_mul(file_bytes as u64) {
+            let problem = format!("says that it has more than {most} pixels for each of its {file_bytes} bytes");
+            return Err(Error::in_file(path, problem, "fetch or save it again"));
+        }
+    }
+    Ok(())
 }
 
 /// Says at once whether a file could be written to `path`, so that a long rendering does not end in an error.

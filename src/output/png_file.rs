@@ -1,16 +1,20 @@
 //! Writes and reads PNG pictures, 8 bits a channel.
+use std::io::Cursor;
 use std::path::Path;
 
-use image::codecs::png::PngEncoder;
-use image::{ExtendedColorType, ImageEncoder};
+use image::codecs::png::{PngDecoder, PngEncoder};
+use image::{DynamicImage, ExtendedColorType, ImageDecoder, ImageEncoder};
 
-use super::{Format, PictureFile, write_whole};
+use super::{Format, PictureFile, check_pixels, write_whole};
 use crate::error::{Error, Result};
 
 /// The bytes of a PNG before its first optional chunk: signature (8) and the IHDR chunk (25).
 const AFTER_HEADER: usize = 8 + 25;
 /// The chunk that says "these values are sRGB, perceptual intent": length 1, name, intent 0, CRC-32.
 const SRGB_CHUNK: [u8; 13] = [0, 0, 0, 1, b's', b'R', b'G', b'B', 0, 0xae, 0xce, 0x1c, 0xe9];
+
+/// Deflate makes 1032 bytes of one, and a pixel takes one as a rule.
+const MAX_PIXELS_PER_BYTE: u64 = 1032;
 
 /// Writes a PNG of `width` x `height` pixels, rows from the top, straight alpha; without `alpha` only RGB.
 ///
@@ -33,8 +37,14 @@ pub fn write_png(path: &Path, width: u32, height: u32, rgba8: &[u8], alpha: bool
 
 /// Reads the bytes of the PNG at `path` as display values in [0, 1].
 pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<PictureFile> {
-    let decoded = image::load_from_memory_with_format(bytes, image::ImageFormat::Png)
-        .map_err(|cause| Error::in_file(path, format!("is not a whole PNG ({cause})"), "give another picture"))?;
+    let broken = |cause: image::ImageError| {
+        let cause = cause.to_string().replace('\n', " ");
+        Error::in_file(path, format!("is not a whole PNG ({cause})"), "give another picture")
+    };
+    let decoder = PngDecoder::new(Cursor::new(bytes)).map_err(broken)?;
+    let (width, height) = decoder.dimensions();
+    check_pixels(path, [u64::from(width) * u64::from(height)], bytes.len(), MAX_PIXELS_PER_BYTE)?;
+    let decoded = DynamicImage::from_decoder(decoder).map_err(broken)?;
     Ok(PictureFile {
         width: decoded.width(),
         height: decoded.height(),

@@ -35,8 +35,7 @@ impl Step for CheckDevice<'_> {
 }
 
 fn read(path: &Path) -> Result<Verdict> {
-    serde_json::from_slice(&file_format::read(path)?)
-        .map_err(|cause| Error::in_file(path, format!("is damaged ({cause})"), "the device is checked again"))
+    Verdict::parse(path, &file_format::read(path)?)
 }
 
 fn write(path: &Path, verdict: &Verdict) -> Result<()> {

@@ -66,8 +66,15 @@ pub fn write(threads: &Threads, path: &Path) -> Result<()> {
 
 /// Reads threads back. Errors: unreadable, not a thread file, of another version, damaged.
 pub fn read(path: &Path) -> Result<Threads> {
-    let bytes = file_format::read(path)?;
-    decode(&bytes).map_err(|problem| Error::in_file(path, problem, "generate it again"))
+    parse(path, &file_format::read(path)?)
+}
+
+/// The threads in the bytes of the file at `path`.
+///
+/// # Errors
+/// Not a thread file, of another version, damaged.
+pub fn parse(path: &Path, bytes: &[u8]) -> Result<Threads> {
+    decode(bytes).map_err(|problem| Error::in_file(path, problem, "generate it again"))
 }
 
 fn encode(threads: &Threads) -> Vec<u8> {

@@ -35,7 +35,7 @@ mod table;
 #[cfg(test)]
 pub(crate) mod test_materials;
 
-pub use file::{FORMAT_VERSION, read, write};
+pub use file::{FORMAT_VERSION, parse, read, write};
 pub use fitted::FittedTable;
 pub use plot::plot;
 pub use sets::{ThreadSets, WithThreads};

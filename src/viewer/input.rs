@@ -155,8 +155,11 @@ pub fn read_replay(path: &Path) -> Result<Vec<(usize, Input)>> {
     parse_replay(file_format::text(path, &bytes)?, path)
 }
 
-/// The events in the text of the replay file at `path`.
-fn parse_replay(text: &str, path: &Path) -> Result<Vec<(usize, Input)>> {
+/// The events in the text of the replay file at `path`, with their lines.
+///
+/// # Errors
+/// A line that is no event.
+pub fn parse_replay(text: &str, path: &Path) -> Result<Vec<(usize, Input)>> {
     let folder = path.parent().unwrap_or(Path::new(""));
     let lines = text.lines().enumerate().map(|(index, line)| (index + 1, line.trim()));
     let events = lines.filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));

@@ -152,6 +152,50 @@ pub fn alumina_oxide() -> Option<Vec<u8>> {
     }))
 }
 
+/// An RGL file of a made-up material, diffuse and a lobe, with a view that is brighter the more it grazes: not reciprocal.
+pub fn rgl_like_file() -> Vec<u8> {
+    const SIDE: u64 = 8;
+    let angles = [0.0_f32, 0.8, 1.4];
+    let mut rgb = Vec::new();
+    for theta in angles {
+        for diffuse in [0.2, 0.1, 0.05] {
+            // u = 0 is the half vector along the normal; all azimuths are the same.
+            let row = (0..SIDE).map(|u| (diffuse + 2.0 * (-(u as f32)).exp()) * (0.5 + theta));
+            rgb.extend((0..SIDE).flat_map(|_| row.clone()));
+        }
+    }
+    rgl_file(&[
+        ("phi_i", &[1], &[0.0]),
+        ("theta_i", &[3], &angles),
+        ("ndf", &[2, 2], &[1.0; 4]),
+        ("sigma", &[2, 2], &[1.0; 4]),
+        ("vndf", &[1, 3, 2, 2], &[1.0; 12]),
+        ("rgb", &[1, 3, 3, SIDE, SIDE], &rgb),
+    ])
+}
+
+/// An RGL file of these fields, each a name, dimensions and numbers; M is f cos theta_i.
+pub fn rgl_file(fields: &[(&str, &[u64], &[f32])]) -> Vec<u8> {
+    let header = |name: &str, shape: &[u64], kind: u8, offset: usize| {
+        let mut bytes = [&(name.len() as u16).to_le_bytes(), name.as_bytes()].concat();
+        bytes.extend((shape.len() as u16).to_le_bytes());
+        bytes.push(kind);
+        bytes.extend((offset as u64).to_le_bytes());
+        bytes.extend(shape.iter().flat_map(|size| size.to_le_bytes()));
+        bytes
+    };
+    let mut offset = 18 + header("jacobian", &[1], 1, 0).len();
+    offset += fields.iter().map(|(name, shape, _)| header(name, shape, 10, 0).len()).sum::<usize>();
+    let mut bytes = [&b"tensor_file\0\x01\0"[..], &(fields.len() as u32 + 1).to_le_bytes()].concat();
+    bytes.extend(header("jacobian", &[1], 1, offset));
+    let mut values = vec![0_u8];
+    for (name, shape, numbers) in fields {
+        bytes.extend(header(name, shape, 10, offset + values.len()));
+        values.extend(numbers.iter().flat_map(|number| number.to_le_bytes()));
+    }
+    [bytes, values].concat()
+}
+
 /// A MERL file of a BRDF of theta_h and theta_d (radians, bin centres), with -1 below the horizon as in the database.
 fn merl_file(brdf: impl Fn(f64, f64) -> [f64; 3]) -> Vec<u8> {
     let mut bytes: Vec<u8> = [90_i32, 90, 180].iter().flat_map(|size| size.to_le_bytes()).collect();

@@ -39,6 +39,7 @@ mod tests;
 use integrator::rms;
 pub use integrator::{Integrator, MAX_THETA_O_DEG, PixelEstimate, Point};
 pub use progressive::{Estimate, Refinement, STAGES, progressive};
+pub use step::parse;
 
 /// Tolerance where none is given: a twentieth of a step of an 8-bit display value.
 pub const TOLERANCE: f64 = 2e-4;

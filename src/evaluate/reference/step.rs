@@ -3,8 +3,9 @@ use std::path::Path;
 
 use super::{Integrator, ReferenceImage};
 use crate::error::{Error, Result};
+use crate::file_format;
 use crate::memo::{Key, Memo, Round, Step, Stored};
-use crate::output::{ExrHeader, read_image, write_exr};
+use crate::output::{ExrHeader, parse_image, write_exr};
 use crate::passes::View;
 use crate::prepare::Prepared;
 
@@ -49,14 +50,18 @@ impl Step for Integrate<'_> {
         let view = &self.prepared.view;
         Some(Stored {
             extension: "reference.exr",
-            read: Box::new(move |path| parse(path, view)),
+            read: Box::new(move |path| parse(path, &file_format::read(path)?, [view.width, view.height])),
             write: Box::new(move |path, image| write(path, view, image)),
         })
     }
 }
 
-fn parse(path: &Path, view: &View) -> Result<ReferenceImage> {
-    let picture = read_image(path)?;
+/// The reference in the bytes of the cache's file at `path`, of a picture of this width and height.
+///
+/// # Errors
+/// They are no such reference, or not whole.
+pub fn parse(path: &Path, bytes: &[u8], size: [u32; 2]) -> Result<ReferenceImage> {
+    let picture = parse_image(path, bytes)?;
     let damaged = || Error::in_file(path, "is damaged", "it is made again");
     let number =
         |name: &str| picture.attributes.get(name).and_then(|text| text.parse::<f64>().ok()).ok_or_else(damaged);
@@ -69,8 +74,8 @@ fn parse(path: &Path, view: &View) -> Result<ReferenceImage> {
         cached: true,
         radiance: picture.rgba,
     };
-    let whole = (picture.width, picture.height) == (view.width, view.height)
-        && picture.attributes.get("digest") == Some(&digest(&image.radiance));
+    let whole =
+        [picture.width, picture.height] == size && picture.attributes.get("digest") == Some(&digest(&image.radiance));
     if whole { Ok(image) } else { Err(damaged()) }
 }
 
