@@ -170,7 +170,7 @@ fn prepare_by(scene: &Scene, round: &Round, ask_threads: &AskThreads) -> Result<
     let count = scene.shading.threads.unwrap_or(method.default_count());
     check_count(method, count, scene.image.subpixels)?;
     let sampling = Sampling { count, seed: scene.shading.seed };
-    let (meshes, mut objects) = place_meshes(scene, round)?;
+    let (meshes, objects) = place_meshes(scene, round)?;
     let environment = round.ask(&LoadEnvironment(&scene.environment.source))?;
     for object in &objects {
         check_size(&meshes[object.mesh].0, world_sphere(&meshes, object))?;
@@ -188,8 +188,7 @@ fn prepare_by(scene: &Scene, round: &Round, ask_threads: &AskThreads) -> Result<
         let threads = ask_threads(method, name, &brdf, sampling)?;
         materials.push(PreparedMaterial { name: name.to_owned(), brdf, threads });
     }
-    place_tangents(scene, &materials, &mut objects);
-    Ok(Prepared {
+    let mut prepared = Prepared {
         scene: scene.clone(),
         method,
         sampling,
@@ -199,7 +198,9 @@ fn prepare_by(scene: &Scene, round: &Round, ask_threads: &AskThreads) -> Result<
         meshes,
         objects,
         materials,
-    })
+    };
+    prepared.place_tangents();
+    Ok(prepared)
 }
 
 /// The key of all that a renderer of `scene` is made of: of all but what a frame is given anew each time, such as the camera.
@@ -249,23 +250,6 @@ fn place_meshes(scene: &Scene, round: &Round) -> Result<(Vec<NamedMesh>, Vec<Pla
     Ok((meshes, objects))
 }
 
-/// Gives `objects` the tangents that their materials need.
-fn place_tangents(scene: &Scene, materials: &[PreparedMaterial], objects: &mut [PlacedMesh]) {
-    for (object, settings) in objects.iter_mut().zip(&scene.objects) {
-        let material = &materials[object.material as usize];
-        if material.brdf.is_isotropic() {
-            continue;
-        }
-        if settings.tangent.is_none() {
-            let name = &material.name;
-            tracing::info!(
-                "an object of \"{name}\", which is anisotropic, has no `tangent`: it is brushed around its y axis"
-            );
-        }
-        object.tangent = Some(settings.tangent.unwrap_or(TangentRule::DEFAULT));
-    }
-}
-
 /// An error for more materials than a texel of the geometry cache can tell apart.
 fn check_materials(scene: &Scene) -> Result<()> {
     let count = scene.used_materials().len();
@@ -309,6 +293,21 @@ impl Prepared {
     /// Centre and radius of a sphere that holds all objects.
     pub fn bounding_sphere(&self) -> (DVec3, f64) {
         bounding_sphere(&self.meshes, &self.objects)
+    }
+
+    /// Gives objects the tangents that their materials need, and no others: to be called when materials were changed.
+    pub fn place_tangents(&mut self) {
+        for (object, settings) in self.objects.iter_mut().zip(&self.scene.objects) {
+            let material = &self.materials[object.material as usize];
+            let needs_tangent = !material.brdf.is_isotropic();
+            if needs_tangent && settings.tangent.is_none() {
+                let name = &material.name;
+                tracing::info!(
+                    "an object of \"{name}\", which is anisotropic, has no `tangent`: it is brushed around its y axis"
+                );
+            }
+            object.tangent = needs_tangent.then(|| settings.tangent.unwrap_or(TangentRule::DEFAULT));
+        }
     }
 
     /// Whether a material of it is anisotropic, so that objects have tangents.
