@@ -69,7 +69,7 @@ pub fn ask_threads(
     sampling: Sampling,
     subpixels: u32,
 ) -> Result<Option<ThreadSets<Keyed<Threads>>>> {
-    let Some(settings) = thread_settings(method, sampling, subpixels) else { return Ok(None) };
+    let Some(settings) = thread_settings(method, brdf, sampling, subpixels) else { return Ok(None) };
     if let Some(known) = known_threads(round, brdf, settings)? {
         return Ok(Some(known));
     }
@@ -92,12 +92,22 @@ fn known_threads(
     Ok(pixel.zip(subpixel).map(|(pixel, subpixel)| ThreadSets { pixel, subpixel }))
 }
 
-/// Which threads `method` shades by, if it does.
-fn thread_settings(method: Method, sampling: Sampling, subpixels: u32) -> Option<ThreadSets<ThreadSettings>> {
+/// Fewest threads of a sub-pixel of an anisotropic material, if a pixel has as many: fewer leave gaps in a long lobe. Of a metal of
+/// roughness_alpha 0.05 x 0.3, 4 threads err by 0.066 of the radiance, 8 by 0.024, 16 by 0.010.
+const FEWEST_OF_LONG_LOBE: u32 = 8;
+
+/// Which threads `method` shades `brdf` by, if it does.
+fn thread_settings(
+    method: Method,
+    brdf: &Brdf,
+    sampling: Sampling,
+    subpixels: u32,
+) -> Option<ThreadSets<ThreadSettings>> {
     let Sampling { count, seed } = sampling;
     let settings = ThreadSettings { kind: method.threads()?, count: count as usize, seed, ..ThreadSettings::default() };
     let parts = if method.shares_surface() { subpixels * subpixels } else { 1 };
-    let of_subpixel = ThreadSettings { count: (count / parts).max(1) as usize, ..settings };
+    let fewest = if parts == 1 || brdf.is_isotropic() { 1 } else { FEWEST_OF_LONG_LOBE.min(count) };
+    let of_subpixel = ThreadSettings { count: (count / parts).max(fewest) as usize, ..settings };
     Some(ThreadSets { pixel: settings, subpixel: of_subpixel })
 }
 
@@ -140,7 +150,7 @@ pub fn prepare_draft(scene: &Scene, before: &Prepared, round: &Round) -> Result<
     let is_draft = Cell::new(false);
     let subpixels = scene.image.subpixels;
     let ask = |method, name: &str, brdf: &Keyed<Brdf>, sampling| {
-        let Some(settings) = thread_settings(method, sampling, subpixels) else { return Ok(None) };
+        let Some(settings) = thread_settings(method, brdf, sampling, subpixels) else { return Ok(None) };
         if let Some(finished) = known_threads(round, brdf, settings)? {
             return Ok(Some(finished));
         }

@@ -2,7 +2,7 @@
 //!
 //! Karis, "Real Shading in Unreal Engine 4" (2013), for any BRDF: roughness and diffuse part are those by which the split sum answers lights
 //! best, and the BRDF's own albedo is in the place of Karis's table of scale and bias, which approximates that of GGX.
-use std::f64::consts::TAU;
+use std::f64::consts::{FRAC_PI_2, TAU};
 
 use glam::{DVec3, dvec3};
 use rayon::prelude::*;
@@ -41,7 +41,7 @@ pub struct SplitSum {
 impl SplitSum {
     /// Of `brdf`; of an anisotropic one the mean over the azimuths of the view.
     pub fn new(brdf: &Brdf) -> Self {
-        let seen = SeenBrdf::from_all_around(brdf);
+        let (seen, is_isotropic) = (SeenBrdf::from_all_around(brdf), brdf.is_isotropic());
         let answers: Vec<_> = FITTED_ROWS.into_par_iter().map(|row| Answers::new(&seen, row)).collect();
         let cost_at = |log_alpha: f64| fit(&answers, log_alpha.exp()).1;
         let step = -LEAST_ALPHA.ln() / ALPHA_STEPS as f64;
@@ -56,7 +56,9 @@ impl SplitSum {
         let roughness_alpha = (0.5 * (low + high)).exp();
         let (diffuse, _) = fit(&answers, roughness_alpha);
         let row = |row: usize| {
-            let albedo = brdf.albedo(theta_o(row, ROWS));
+            let from = |phi_o: f64| brdf.albedo_from(theta_o(row, ROWS), phi_o);
+            // Along and across the tangent: of a long lobe the least and the most.
+            let albedo = if is_isotropic { from(0.0) } else { 0.5 * (from(0.0) + from(FRAC_PI_2)) };
             let diffuse = diffuse.min(albedo);
             [diffuse, albedo - diffuse]
         };

@@ -27,6 +27,11 @@ const LIGHTS_SEED: usize = 0;
 /// rows, threads turn from row to row by 2 to 4 times less than without, for errors up to a third larger.
 const TIED: f64 = 1e-6;
 
+/// Between rows of an anisotropic BRDF kernels must not err by more than this part of what the worse of both rows does; where they would,
+/// since some changed places, the row is fitted again, tied ten times as strongly, up to the most.
+const MOST_BETWEEN: f64 = 1.1;
+const MOST_TIED: f64 = 1e-3;
+
 /// Test lights of a row: so many, and so many more for each thread. Of too few, many threads answer each alone and err between them: with
 /// 64 threads 1536 lights leave a tenth less error than 1200. Up to 16 threads have the same lights, which are made once for all of them.
 const FEWEST_LIGHTS: usize = 1000;
@@ -107,25 +112,40 @@ pub fn generate_for(
     settings.check()?;
     let rows = settings.rows;
     let done = AtomicUsize::new(0);
-    // Row `index` of all azimuths, from the kernels that it starts from.
-    let fit = |index: usize, start: Option<Vec<Kernel>>| -> Result<Row> {
+    // Row `index` of all azimuths, from what its neighbours' kernels are there: those of the view angle before and of the azimuth before.
+    let fit = |index: usize, neighbours: Vec<Vec<Kernel>>| -> Result<Row> {
         observer.check()?;
         let (lights, albedo) = &targets.rows[index];
-        let is_first = start.is_none();
-        let start = start.unwrap_or_else(|| {
-            let View { theta_o, phi_o } = View::of_row(index, rows);
-            let [_, lobes] = Slice::with_lobes(&SeenBrdf::from_azimuth(brdf, phi_o), theta_o, Resolution::FULL);
-            cells(&lobes, settings.count)
-        });
-        let start = scaled(&start, 1.0 / lights.unit);
-        let mut kernels = start.clone();
-        let fit = Fit::new(lights, *albedo / lights.unit);
-        let (fit, effort) = if is_first { (fit, FIRST) } else { (fit.tied(&start, TIED), NEXT) };
-        fit.solve(&mut kernels, effort, observer)?;
-        let error = fit.relative_error(&kernels);
-        let kernels = scaled(&kernels, lights.unit);
+        let in_units = |kernels: &[Kernel]| scaled(kernels, 1.0 / lights.unit);
+        let neighbours: Vec<_> = neighbours.iter().map(|kernels| in_units(kernels)).collect();
+        let start = match &neighbours[..] {
+            [] => {
+                let View { theta_o, phi_o } = View::of_row(index, rows);
+                let [_, lobes] = Slice::with_lobes(&SeenBrdf::from_azimuth(brdf, phi_o), theta_o, Resolution::FULL);
+                in_units(&cells(&lobes, settings.count))
+            }
+            [one] => one.clone(),
+            [a, b, ..] => half_way(a, b),
+        };
+        let effort = if neighbours.is_empty() { FIRST } else { NEXT };
+        let mut tied = TIED;
+        let (kernels, error) = loop {
+            let mut kernels = start.clone();
+            let fit = Fit::new(lights, *albedo / lights.unit);
+            let fit = if neighbours.is_empty() { fit } else { fit.tied(&start, tied) };
+            fit.solve(&mut kernels, effort, observer)?;
+            let error = fit.relative_error(&kernels);
+            let is_near = |neighbour: &Vec<Kernel>| {
+                let between = fit.relative_error(&half_way(neighbour, &kernels));
+                between < MOST_BETWEEN * error.max(fit.relative_error(neighbour))
+            };
+            if targets.azimuths == 1 || tied >= MOST_TIED || neighbours.iter().all(is_near) {
+                break (kernels, error);
+            }
+            tied *= 10.0;
+        };
         observer.progress(done.fetch_add(1, Ordering::Relaxed) + 1, targets.rows.len());
-        Ok((kernels, *albedo, error))
+        Ok((scaled(&kernels, lights.unit), *albedo, error))
     };
     let mut fitted: Vec<Row> = Vec::with_capacity(targets.rows.len());
     for azimuth in 0..targets.azimuths {
@@ -135,16 +155,9 @@ pub fn generate_for(
         };
         let column = from_the_middle(rows, &|row, neighbour| {
             let index = first + row;
+            let before = neighbour.map(|(before, kernels)| carry(kernels, first + before, index));
             let beside = index.checked_sub(rows).map(|beside| carry(&fitted[beside], beside, index));
-            let start = neighbour.map(|(before, kernels)| carry(kernels, first + before, index));
-            // Between both neighbours, so that threads stay together from view angle to view angle and from azimuth to azimuth.
-            fit(
-                index,
-                match (start, beside) {
-                    (Some(a), Some(b)) => Some(a.iter().zip(&b).map(|(a, b)| a.between(b, 0.5)).collect()),
-                    (one, other) => one.or(other),
-                },
-            )
+            fit(index, before.into_iter().chain(beside).collect())
         })?;
         fitted.extend(column);
     }
@@ -179,6 +192,11 @@ pub(super) fn from_the_middle(
     all.push(first);
     all.extend(up?);
     Ok(all)
+}
+
+/// Half way from each kernel of `a` to that of `b`.
+fn half_way(a: &[Kernel], b: &[Kernel]) -> Vec<Kernel> {
+    a.iter().zip(b).map(|(a, b)| a.between(b, 0.5)).collect()
 }
 
 /// The same with `scale` times the weights.
