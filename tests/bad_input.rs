@@ -263,6 +263,24 @@ fn hostile_rgl_files_are_refused() {
 }
 
 #[test]
+fn hostile_goniometric_files_are_refused() {
+    let folder = workplace();
+    for (name, bytes, reason) in [
+        ("empty.bin", vec![], "1990656"),
+        ("cut.bin", vec![0; 3 * 8 * 288 * 288 - 1], "1990656"),
+        ("zero.bin", vec![0; 3 * 8 * 288 * 288], "nothing but zero"),
+        ("nan.bin", vec![0xff; 3 * 8 * 288 * 288], "NaN in plane 0"),
+        ("empty.dat", vec![], "too short"),
+        ("zero.dat", vec![0; 64], "parameterisation 0"),
+        ("noise.dat", noise(4096), "parameterisation"),
+        ("cut.dat", common::mit_like_file()[..100].to_vec(), "bytes behind its header"),
+    ] {
+        fs::write(folder.path().join(name), bytes).unwrap();
+        refuses(&folder, &render(&format!("--material {name}")), &[name, reason]);
+    }
+}
+
+#[test]
 fn hostile_material_descriptions_are_refused() {
     let folder = workplace();
     for (name, text, key) in [

@@ -138,6 +138,8 @@ macro_rules! readers {
 readers! {
     merl_table,
     rgl_file,
+    mit_file,
+    utia_file,
     material,
     mesh,
     hdr_environment,

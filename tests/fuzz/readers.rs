@@ -94,6 +94,31 @@ pub fn rgl_file() -> Reader {
     }
 }
 
+pub fn mit_file() -> Reader {
+    Reader {
+        file_name: "x.dat",
+        seeds: || vec![common::mit_like_file()],
+        words: &["\0\0\0\0", "\x01\0\0\0", "\x03\0\0\0"],
+        seal: None,
+        bytes_per_byte: 3,
+        read: read_material,
+    }
+}
+
+pub fn utia_file() -> Reader {
+    Reader {
+        file_name: "x.bin",
+        seeds: || {
+            let values = (0..3 * 288 * 288).map(|index| 0.01 * f64::from(index % 13) - 0.02);
+            vec![values.flat_map(f64::to_le_bytes).collect()]
+        },
+        words: &["\0\0\0\0\0\0\0\0"],
+        seal: None,
+        bytes_per_byte: 3,
+        read: read_material,
+    }
+}
+
 pub fn material() -> Reader {
     Reader {
         file_name: "x.toml",
