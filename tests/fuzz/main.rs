@@ -128,8 +128,9 @@ fn fuzz(reader: &Reader) {
 }
 
 macro_rules! readers {
-    ($($name:ident,)+) => {
-        $(#[test]
+    ($($(#[$condition:meta])? $name:ident,)+) => {
+        $($(#[$condition])?
+        #[test]
         fn $name() {
             fuzz(&readers::$name());
         })+
@@ -149,6 +150,7 @@ readers! {
     pyramid,
     kept_reference,
     device_verdict,
+    #[cfg(feature = "viewer")]
     replay,
     png_picture,
     measurements,
