@@ -263,6 +263,24 @@ fn hostile_rgl_files_are_refused() {
 }
 
 #[test]
+fn hostile_goniometric_files_are_refused() {
+    let folder = workplace();
+    for (name, bytes, reason) in [
+        ("empty.bin", vec![], "1990656"),
+        ("cut.bin", vec![0; 3 * 8 * 288 * 288 - 1], "1990656"),
+        ("zero.bin", vec![0; 3 * 8 * 288 * 288], "nothing but zero"),
+        ("nan.bin", vec![0xff; 3 * 8 * 288 * 288], "NaN in plane 0"),
+        ("empty.dat", vec![], "too short"),
+        ("zero.dat", vec![0; 64], "parameterisation 0"),
+        ("noise.dat", noise(4096), "parameterisation"),
+        ("cut.dat", common::mit_like_file()[..100].to_vec(), "bytes behind its header"),
+    ] {
+        fs::write(folder.path().join(name), bytes).unwrap();
+        refuses(&folder, &render(&format!("--material {name}")), &[name, reason]);
+    }
+}
+
+#[test]
 fn hostile_material_descriptions_are_refused() {
     let folder = workplace();
     for (name, text, key) in [
@@ -317,6 +335,7 @@ fn hostile_environments_are_refused() {
         ("map.jpg", b"hello".to_vec(), ".hdr"),
         ("noise.hdr", noise(4096), "Radiance"),
         ("claims.exr", claiming(&colour, 16000), "more than 1024 pixels for each"),
+        ("tiles.exr", with_large_tiles(), "more than 1024 pixels for each"),
         ("noise.exr", noise(4096), "EXR"),
     ] {
         fs::write(folder.path().join(name), bytes).unwrap();
@@ -391,6 +410,23 @@ fn claiming(exr: &[u8], side: i32) -> Vec<u8> {
         let last = name + window.len() + 4 + 8;
         bytes[last..last + 8].copy_from_slice(&[side - 1; 2].map(i32::to_le_bytes).concat());
     }
+    bytes
+}
+
+/// An EXR of 4 x 2 pixels whose tiles say that they are 2 x 4 million.
+fn with_large_tiles() -> Vec<u8> {
+    use exr::prelude::*;
+    let channel = |name| AnyChannel::new(name, FlatSamples::F32(vec![1.0; 8]));
+    let channels = AnyChannels::sort(["R", "G", "B"].map(channel).into_iter().collect());
+    let encoding = Encoding { blocks: Blocks::Tiles(Vec2(2, 2)), ..Encoding::FAST_LOSSLESS };
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    let layer = Layer::new((4, 2), LayerAttributes::default(), encoding, channels);
+    Image::from_layer(layer).write().to_buffered(&mut bytes).unwrap();
+    let mut bytes = bytes.into_inner();
+    let name = b"tiles\0tiledesc\0";
+    let place = bytes.windows(name.len()).position(|window| window == name).expect("tiles");
+    // After the size of the value and the width, 4 bytes each.
+    bytes[place + name.len() + 8..][..4].copy_from_slice(&(1_u32 << 22).to_le_bytes());
     bytes
 }
 

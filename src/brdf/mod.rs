@@ -38,7 +38,7 @@ pub use seen::SeenBrdf;
 pub use symmetry::Symmetry;
 pub use tabulate::tabulate;
 
-file_formats!(Brdf: merl_file, rgl_file, toml_file);
+file_formats!(Brdf: merl_file, rgl_file, mit_file, utia_file, toml_file);
 
 /// What every model offers; [`Brdf`] dispatches to it.
 pub trait Model: Sized {

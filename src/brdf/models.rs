@@ -23,4 +23,5 @@ brdf_models! {
     tabulated => Tabulated,
     custom => Custom,
     rgl => Rgl,
+    goniometric => Goniometric,
 }

@@ -64,6 +64,7 @@ fn measured_files_reflect_no_more_than_they_receive() {
     let Some(folder) = folder() else { return };
     for file in ["paper_white", "cg_sunflower", "vch_golden_yellow", "cc_ibiza_sunset"] {
         let brdf = Brdf::load(&folder.join(format!("{file}_rgb.bsdf"))).unwrap();
+        assert!(brdf.is_isotropic(), "{file}");
         for theta_o_deg in [0.0f64, 30.0, 60.0, 80.0, 89.0, 89.9] {
             let albedo = brdf.albedo(theta_o_deg.to_radians());
             assert!(albedo.is_finite() && albedo.max_element() < 1.0, "{file} at {theta_o_deg}: {albedo}");

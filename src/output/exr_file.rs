@@ -3,8 +3,8 @@ use std::collections::BTreeMap;
 use std::io::Cursor;
 use std::path::Path;
 
-use exr::meta::MetaData;
 use exr::meta::attribute::{AttributeValue, Chromaticities, Text};
+use exr::meta::{BlockDescription, MetaData};
 use exr::prelude::{
     AnyChannel, AnyChannels, Encoding, FlatImage, FlatSamples, Image, Layer, LayerAttributes, ReadChannels, ReadLayers,
     Vec2, WritableImage,
@@ -139,11 +139,14 @@ pub fn parse_exr(path: &Path, bytes: &[u8]) -> Result<PictureFile> {
     };
     let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(broken)?;
     let area = |size: Vec2<usize>| size.0.saturating_mul(size.1);
-    // Every layer is read before one is chosen.
-    let samples = meta
-        .headers
-        .iter()
-        .flat_map(|header| std::iter::repeat_n(area(header.layer_size) as u64, header.channels.list.len().max(1)));
+    // Every layer is read before one is chosen, tile by tile; a tile may claim to be larger than the picture.
+    let samples = meta.headers.iter().flat_map(|header| {
+        let tile = match &header.blocks {
+            BlockDescription::Tiles(tiles) => area(tiles.tile_size),
+            BlockDescription::ScanLines => 0,
+        };
+        std::iter::repeat_n(area(header.layer_size).max(tile) as u64, header.channels.list.len().max(1))
+    });
     check_pixels(path, samples, bytes.len(), MAX_SAMPLES_PER_BYTE)?;
     let image: FlatImage = exr::prelude::read()
         .no_deep_data()

@@ -54,3 +54,29 @@ pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<PictureFile> {
         attributes: Default::default(),
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The checksum of a chunk: CRC-32 of ISO 3309, bit by bit.
+    fn crc(bytes: &[u8]) -> u32 {
+        let step = |crc: u32| if crc & 1 == 1 { (crc >> 1) ^ 0xedb8_8320 } else { crc >> 1 };
+        !bytes.iter().fold(u32::MAX, |crc, &byte| (0..8).fold(crc ^ u32::from(byte), |crc, _| step(crc)))
+    }
+
+    #[test]
+    fn a_picture_that_claims_more_pixels_than_its_bytes_can_hold_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("claims.png");
+        write_png(&path, 4, 2, &[7; 32], false).unwrap();
+        let mut bytes = std::fs::read(&path).unwrap();
+        assert!(parse(&path, &bytes).is_ok());
+        // Width and height stand behind the signature (8), the chunk's length (4) and its name (4), its checksum at its end.
+        bytes[16..24].copy_from_slice(&[16000_u32; 2].map(u32::to_be_bytes).concat());
+        let checksum = crc(&bytes[12..AFTER_HEADER - 4]);
+        bytes[AFTER_HEADER - 4..AFTER_HEADER].copy_from_slice(&checksum.to_be_bytes());
+        let error = parse(&path, &bytes).unwrap_err().to_string();
+        assert!(error.contains("claims.png") && error.contains("more than 1032 pixels"), "{error}");
+    }
+}

@@ -174,6 +174,13 @@ pub fn rgl_like_file() -> Vec<u8> {
     ])
 }
 
+/// A file of MIT CSAIL's form of a made-up material: three angles of light and view, four azimuths, two turns of the material.
+pub fn mit_like_file() -> Vec<u8> {
+    let header = [3_i32, 3, 4, 2, 0, 0, 1, 0, 0, 1, 3, 0, 0, 0, 0, 0];
+    let values = (0..3 * 3 * 3 * 4 * 2).map(|index| if index % 7 == 0 { -1.0 } else { 0.01 * (index % 11) as f32 });
+    header.into_iter().flat_map(i32::to_le_bytes).chain(values.flat_map(f32::to_le_bytes)).collect()
+}
+
 /// An RGL file of these fields, each a name, dimensions and numbers; M is f cos theta_i.
 pub fn rgl_file(fields: &[(&str, &[u64], &[f32])]) -> Vec<u8> {
     let header = |name: &str, shape: &[u64], kind: u8, offset: usize| {

@@ -128,8 +128,9 @@ fn fuzz(reader: &Reader) {
 }
 
 macro_rules! readers {
-    ($($name:ident,)+) => {
-        $(#[test]
+    ($($(#[$condition:meta])? $name:ident,)+) => {
+        $($(#[$condition])?
+        #[test]
         fn $name() {
             fuzz(&readers::$name());
         })+
@@ -138,6 +139,8 @@ macro_rules! readers {
 readers! {
     merl_table,
     rgl_file,
+    mit_file,
+    utia_file,
     material,
     mesh,
     hdr_environment,
@@ -147,6 +150,7 @@ readers! {
     pyramid,
     kept_reference,
     device_verdict,
+    #[cfg(feature = "viewer")]
     replay,
     png_picture,
     measurements,

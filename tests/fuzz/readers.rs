@@ -9,7 +9,6 @@ use threadlight::low_level::evaluate::{Row, reference};
 use threadlight::low_level::output::{ExrHeader, parse_image, write_exr, write_png};
 use threadlight::low_level::scene::{Mesh, Scene};
 use threadlight::low_level::threads::{self, FittedTable, Sample, ThreadTable, Threads, fitted::PackedKernel};
-use threadlight::low_level::viewer::input::parse_replay;
 
 use crate::common;
 
@@ -20,7 +19,7 @@ pub struct Reader {
     pub seeds: fn() -> Vec<Vec<u8>>,
     pub words: &'static [&'static str],
     /// Makes the checksum right, without which nothing else is looked at.
-    pub seal: Option<fn(&mut Vec<u8>)>,
+    pub seal: Option<fn(&mut [u8])>,
     /// Memory for each byte of a file.
     pub bytes_per_byte: usize,
     /// Reads a file; the error is the reason why not. Panics if what is read is not sound.
@@ -40,7 +39,7 @@ fn written(name: &str, write: impl FnOnce(&Path)) -> Vec<u8> {
 }
 
 /// Replaces the BLAKE3 digest at the end.
-fn seal_end(bytes: &mut Vec<u8>) {
+fn seal_end(bytes: &mut [u8]) {
     if let Some(content) = bytes.len().checked_sub(blake3::OUT_LEN) {
         let digest = blake3::hash(&bytes[..content]);
         bytes[content..].copy_from_slice(digest.as_bytes());
@@ -90,6 +89,31 @@ pub fn rgl_file() -> Reader {
         words: &["tensor_file\0", "theta_i", "vndf", "rgb", "spectra", "wavelengths", "\x01\0\0\0\0\0\0\0", "\0\0\0\0"],
         seal: None,
         bytes_per_byte: 16,
+        read: read_material,
+    }
+}
+
+pub fn mit_file() -> Reader {
+    Reader {
+        file_name: "x.dat",
+        seeds: || vec![common::mit_like_file()],
+        words: &["\0\0\0\0", "\x01\0\0\0", "\x03\0\0\0"],
+        seal: None,
+        bytes_per_byte: 3,
+        read: read_material,
+    }
+}
+
+pub fn utia_file() -> Reader {
+    Reader {
+        file_name: "x.bin",
+        seeds: || {
+            let values = (0..3 * 288 * 288).map(|index| 0.01 * f64::from(index % 13) - 0.02);
+            vec![values.flat_map(f64::to_le_bytes).collect()]
+        },
+        words: &["\0\0\0\0\0\0\0\0"],
+        seal: None,
+        bytes_per_byte: 3,
         read: read_material,
     }
 }
@@ -321,16 +345,18 @@ pub fn threads() -> Reader {
                 albedo: vec![[0.5; 3]; 3],
                 samples,
             };
-            let fitted = FittedTable {
-                rows: 2,
+            let fitted = |rows, azimuths| FittedTable {
+                rows,
+                azimuths,
                 count: 1,
-                material,
-                cosine_part: vec![[0.1, 0.2, -0.01]; 2],
-                relative_error: vec![1e-3; 2],
-                kernels: vec![PackedKernel([0x1234_5678, 0x3800_4000, 0x3400_3000]); 2],
+                material: material.clone(),
+                cosine_part: vec![[0.1, 0.2, -0.01]; rows * azimuths],
+                relative_error: vec![1e-3; rows * azimuths],
+                kernels: vec![PackedKernel([0x1234_5678, 0x3800_4000, 0x3400_3000]); rows * azimuths],
             };
+            let (isotropic, anisotropic) = (Threads::Fitted(fitted(2, 1)), Threads::Fitted(fitted(1, 10)));
             let file = |threads| written("x.threads", |path| threads::write(&threads, path).expect("a file"));
-            vec![file(Threads::Paper(paper)), file(Threads::Fitted(fitted))]
+            vec![file(Threads::Paper(paper)), file(isotropic), file(anisotropic)]
         },
         words: &[
             "\"rows\":",
@@ -381,6 +407,7 @@ pub fn device_verdict() -> Reader {
     }
 }
 
+#[cfg(feature = "viewer")]
 pub fn replay() -> Reader {
     Reader {
         file_name: "x.jsonl",
@@ -404,7 +431,7 @@ pub fn replay() -> Reader {
         bytes_per_byte: 400,
         read: |path, bytes| {
             let text_of = std::str::from_utf8(bytes).map_err(|cause| format!("{}: {cause}", path.display()))?;
-            parse_replay(text_of, path).map(drop).map_err(text)
+            threadlight::low_level::viewer::input::parse_replay(text_of, path).map(drop).map_err(text)
         },
     }
 }
