@@ -78,6 +78,8 @@ impl Model for AshikhminShirley {
         let help = "Exponent of the lobe across the first axis.";
         let exponent_y = parameters.number("exponent_y", range, Spacing::Logarithmic, help)?;
         let axes = Axes::from_parameters(parameters)?;
+        // Equal exponents are the same however they are turned.
+        let axes = if exponent_x == exponent_y { Axes::new(0.0) } else { axes };
         Ok(Self { diffuse, specular, exponent: DVec2::new(exponent_x, exponent_y), axes })
     }
 

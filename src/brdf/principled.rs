@@ -17,7 +17,7 @@
 //! | `openpbr` | roughness^2 sqrt(2 / (1 + (1 - a)^2)) | (1 - a) times that, and no less than 0.001 |
 //!
 //! The first is KHR_materials_anisotropy of glTF (anisotropyStrength; anisotropyRotation is `rotation_deg` in radians), which only adds
-//! roughness. The second is specular_roughness_anisotropy of OpenPBR, whose spec turns no axes but the tangent; it keeps the mean of both
+//! roughness. The second is specular_roughness_anisotropy of OpenPBR, where the tangent is an input of its own; it keeps the mean of both
 //! squares. In both, highlights are long along the tangent. glTF has the height-correlated form of Smith's shadowing, here it is
 //! separable. Sheen and coat are isotropic.
 //!

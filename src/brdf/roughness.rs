@@ -153,6 +153,7 @@ impl Roughness {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::brdf::{Brdf, Domain};
     use glam::dvec3;
 
     fn read(text: &str) -> Result<Roughness> {
@@ -177,6 +178,15 @@ mod tests {
             let error = read(text).unwrap_err().to_string();
             assert!(error.starts_with(&format!("{key}: ")), "{text:?}: {error}");
         }
+    }
+
+    #[test]
+    fn a_rotation_that_is_left_out_is_known_to_be_0_and_to_have_a_range() {
+        let table = "distribution = 'ggx'\nmetal = 'Al'\nalpha_x = 0.2\nalpha_y = 0.1".parse().unwrap();
+        let parameters = Brdf::parameters("conductor", &table).unwrap();
+        let rotation = parameters.iter().find(|parameter| parameter.key == ROTATION).expect("a rotation");
+        assert_eq!(rotation.default, Some(0.0));
+        assert_eq!(rotation.domain, Domain::Number(-90.0..=90.0, Spacing::Linear));
     }
 
     #[test]

@@ -114,9 +114,8 @@ impl Step for Tabulate<'_> {
 
     fn make(&self, _: &Round) -> Result<Tabulated> {
         if !self.0.is_isotropic() {
-            let remedy = "use one of the models that shaders evaluate (principled without sheen is one), or the reference on the CPU";
-            let problem =
-                "is anisotropic here, and shaders would look it up in a table, which only holds isotropic BRDFs";
+            let problem = "is anisotropic with these parameters, for which shaders have no form of it";
+            let remedy = "use --method reference, or fitted under light without small lamps";
             return Err(Error::input(format!("model `{}`", self.0.model()), problem, remedy));
         }
         Ok(tabulate(self.0).0)
