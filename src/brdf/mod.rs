@@ -178,6 +178,16 @@ impl Brdf {
         Ok(parameters.read())
     }
 
+    /// What `model` reads where `table` is all that is given: what is missing counts as the middle of its range.
+    ///
+    /// # Errors
+    /// What is given is not sound.
+    pub fn possible_parameters(model: &str, table: &toml::Table) -> Result<Vec<Parameter>> {
+        let mut parameters = Parameters::filled(table.clone());
+        Brdf::read_model(model, &mut parameters)?;
+        Ok(parameters.read())
+    }
+
     /// The model that a material file (`.toml`) names, and its parameters, not yet checked.
     pub fn load_model(path: &Path) -> Result<(String, toml::Table)> {
         toml_file::parse_model(path, &file_format::read(path)?)

@@ -11,6 +11,8 @@ use crate::error::{Error, Result};
 pub struct Parameters {
     table: Table,
     read: Vec<Parameter>,
+    /// Whether what is missing counts as the middle of its range.
+    fills: bool,
 }
 
 /// What a model reads, and what it takes: what a slider needs to know.
@@ -37,6 +39,16 @@ pub enum Domain {
     Choice(Vec<String>),
 }
 
+impl Domain {
+    /// Something that it may be.
+    fn middle(&self) -> Value {
+        match self {
+            Self::Number(range, _) | Self::Colour(range) => (0.5 * (range.start() + range.end())).into(),
+            Self::Choice(words) => words.first().map_or("", String::as_str).into(),
+        }
+    }
+}
+
 /// How steps along a slider change a number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Spacing {
@@ -49,7 +61,12 @@ pub enum Spacing {
 impl Parameters {
     /// All entries of `table` are parameters.
     pub fn new(table: Table) -> Self {
-        Self { table, read: Vec::new() }
+        Self { table, read: Vec::new(), fills: false }
+    }
+
+    /// The same, but what is missing counts as the middle of its range, or as the first of its words.
+    pub(super) fn filled(table: Table) -> Self {
+        Self { fills: true, ..Self::new(table) }
     }
 
     /// Those that have been read, in the order in which they were.
@@ -127,9 +144,10 @@ impl Parameters {
         let inner = match self.table.remove(key) {
             Some(Value::Table(inner)) => inner,
             Some(other) => return Err(Error::input(key, format!("is {other}"), format!("give {what}"))),
+            None if self.fills => Table::new(),
             None => return Err(Error::input(key, "is missing", format!("give {what}"))),
         };
-        let mut inner = Parameters::new(inner);
+        let mut inner = Parameters { fills: self.fills, ..Parameters::new(inner) };
         let value = read(&mut inner).map_err(|error| inside(error, key))?;
         let of_inner = |parameter: Parameter| Parameter { key: format!("{key}.{}", parameter.key), ..parameter };
         self.read.extend(inner.read.drain(..).map(of_inner));
@@ -148,8 +166,9 @@ impl Parameters {
     }
 
     pub(super) fn take(&mut self, key: &str, what: &str, domain: Domain, help: &'static str) -> Result<Value> {
+        let middle = self.fills.then(|| domain.middle());
         self.read.push(Parameter { key: key.into(), help, domain, default: None });
-        self.table.remove(key).ok_or_else(|| Error::input(key, "is missing", format!("give {what}")))
+        self.table.remove(key).or(middle).ok_or_else(|| Error::input(key, "is missing", format!("give {what}")))
     }
 }
 
