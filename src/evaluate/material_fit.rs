@@ -17,6 +17,7 @@ use argmin::core::{CostFunction, Executor, State};
 use argmin::solver::neldermead::NelderMead;
 use glam::{DVec2, DVec3, dvec3};
 use rayon::prelude::*;
+use tracing::subscriber::NoSubscriber;
 
 use crate::brdf::{Brdf, Domain, Parameter, Spacing, parameter, set_parameter};
 use crate::error::{Error, Result};
@@ -227,7 +228,9 @@ impl Problem<'_> {
 
     /// The error of the model with these parameters; infinite if it takes offence at them.
     fn error(&self, parameters: &toml::Table) -> f64 {
-        match Brdf::from_parameters(&self.candidate.model, parameters.clone()) {
+        // Models warn of parameters that reflect too much: of all that are tried nobody wants to hear.
+        let make = || Brdf::from_parameters(&self.candidate.model, parameters.clone());
+        match tracing::subscriber::with_default(NoSubscriber::new(), make) {
             Ok(brdf) => distance(self.samples, |sample| brdf.evaluate(sample.w_i, sample.w_o)),
             Err(_) => f64::INFINITY,
         }
