@@ -27,7 +27,7 @@
 //! Left out: the coat's roughness as to what goes through (it would widen the base's lobe; Guo et al., "Position-Free Monte Carlo
 //! Simulation for Arbitrary Layered BSDFs", 2018, have it), light that facets of the coat reflect among them (it is taken to go in),
 //! scattering in the coat, and that Fresnel's reflectance of the base is less against the coat than against air: the base is as it was
-//! measured in air. Of an anisotropic base, light that comes later is that of a view along the tangent.
+//! measured in air. Of an anisotropic base, how much light comes later is a mean over azimuths.
 use std::sync::{Arc, OnceLock};
 
 use glam::DVec3;

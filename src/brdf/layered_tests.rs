@@ -63,6 +63,20 @@ fn no_coat_makes_more_light_than_its_base_does() {
 }
 
 #[test]
+fn brushed_metal_under_a_coat_makes_no_light_at_any_azimuth() {
+    let brushed = "distribution = 'ggx', alpha_x = 0.05, alpha_y = 0.3, eta = 0.01, k = 100";
+    for rotation_deg in [0, 45, 90] {
+        let base = format!("{{ model = 'conductor', {brushed}, rotation_deg = {rotation_deg} }}");
+        let coated = under(&base, 0.05, 1.5);
+        for theta_o_deg in [0.0f64, 60.0, 85.0] {
+            let albedo = coated.albedo(theta_o_deg.to_radians()).x;
+            // Facets lose some light at each return.
+            assert!((0.7..1.001).contains(&albedo), "{rotation_deg} at {theta_o_deg}: {albedo}");
+        }
+    }
+}
+
+#[test]
 fn a_coat_of_air_is_not_there() {
     for base in ["'gold'", "'linen'", WHITE] {
         let coated = brdf(&format!(
