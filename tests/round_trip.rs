@@ -20,7 +20,7 @@ fn a_model_that_is_exported_and_rendered_looks_as_before() {
     ] {
         let source = model(text);
         let picture = |source: MaterialSource| {
-            let mut scene = sphere(source, "studio", 32, (64, 48));
+            let mut scene = sphere(source, "studio", 32, (160, 120));
             scene.image.background = Background::None;
             let prepared = ready(&scene);
             let brdf = (*prepared.materials[0].brdf).clone();
