@@ -83,7 +83,7 @@ impl Renderer {
     /// As for [`Self::render`]; [`Error::Cancelled`](crate::Error::Cancelled).
     pub fn render_watched(&mut self, scene: &Scene, observer: &dyn Observer) -> Result<Picture> {
         for path in scene.files() {
-            self.memo.look_again(path);
+            self.memo.look_again(&path);
         }
         let round = self.memo.round(observer);
         let prepared = prepare(scene, &round)?;

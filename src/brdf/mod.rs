@@ -11,8 +11,11 @@ use glam::{DVec2, DVec3, dvec3};
 use crate::error::{Error, Result};
 use crate::file_format::{self, FileKind, file_formats};
 
+mod base;
 mod builtin;
+mod coat;
 mod ggx_lobe;
+mod interreflection;
 mod lobe;
 mod merl_export;
 mod metals;
@@ -26,12 +29,14 @@ mod symmetry;
 mod tabulate;
 mod tensor_file;
 
+pub use base::{base_files, base_files_of, change_base_files, resolve_base_files};
+pub use coat::Coat;
 pub use custom::CustomBrdf;
 pub use ggx_lobe::{Tap, ggx_lobe};
 pub use lobe::{LobeAxes, MIN_COS_THETA_D, half_vector_width, lobe_axes, lobe_radius};
 pub use merl_export::merl_bytes;
 pub use microfacet::{Distribution, fresnel_conductor, fresnel_dielectric};
-pub use parameters::{Domain, Parameter, Parameters, Spacing, as_number, channels};
+pub use parameters::{Domain, Parameter, Parameters, Spacing, as_number, channels, parameter, set_parameter};
 pub use record::{MaterialRecord, ThreadSetRecord};
 pub use roughness::{Axes, Roughness};
 pub use seen::SeenBrdf;
@@ -173,6 +178,16 @@ impl Brdf {
         Ok(parameters.read())
     }
 
+    /// What `model` reads where `table` is all that is given: what is missing counts as the middle of its range.
+    ///
+    /// # Errors
+    /// What is given is not sound.
+    pub fn possible_parameters(model: &str, table: &toml::Table) -> Result<Vec<Parameter>> {
+        let mut parameters = Parameters::filled(table.clone());
+        Brdf::read_model(model, &mut parameters)?;
+        Ok(parameters.read())
+    }
+
     /// The model that a material file (`.toml`) names, and its parameters, not yet checked.
     pub fn load_model(path: &Path) -> Result<(String, toml::Table)> {
         toml_file::parse_model(path, &file_format::read(path)?)
@@ -267,12 +282,7 @@ fn model_of(text: &str) -> Result<(String, toml::Table)> {
     let mut table: toml::Table = text.parse().map_err(|error: toml::de::Error| {
         Error::input("TOML", error.message().replace('\n', " "), "correct the file's syntax")
     })?;
-    let models = Brdf::models_with_parameters().join(", ");
-    match table.remove("model") {
-        Some(toml::Value::String(model)) => Ok((model, table)),
-        Some(_) => Err(Error::input("model", "is not a string", format!("name one of {models}"))),
-        None => Err(Error::input("model", "is missing", format!("name one of {models}"))),
-    }
+    Ok((parameters::take_model(&mut table)?, table))
 }
 
 /// Luminance of a linear Rec. 709 colour.

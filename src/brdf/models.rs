@@ -20,6 +20,7 @@ brdf_models! {
     he_torrance => HeTorrance,
     principled => Principled,
     multiscatter_conductor => MultiscatterConductor,
+    layered => Layered,
     tabulated => Tabulated,
     custom => Custom,
     rgl => Rgl,

@@ -4,18 +4,21 @@ use std::ops::RangeInclusive;
 use glam::DVec3;
 use toml::{Table, Value};
 
+use super::Brdf;
 use crate::error::{Error, Result};
 
 /// The parameters of one material that have not been read yet.
 pub struct Parameters {
     table: Table,
     read: Vec<Parameter>,
+    /// Whether what is missing counts as the middle of its range.
+    fills: bool,
 }
 
 /// What a model reads, and what it takes: what a slider needs to know.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Parameter {
-    /// Its key in a scene or material file.
+    /// Its key in a scene or material file; `coat.alpha` is `alpha` in the table `coat`.
     pub key: String,
     /// What it is, in a sentence.
     pub help: &'static str,
@@ -36,6 +39,16 @@ pub enum Domain {
     Choice(Vec<String>),
 }
 
+impl Domain {
+    /// Something that it may be.
+    fn middle(&self) -> Value {
+        match self {
+            Self::Number(range, _) | Self::Colour(range) => (0.5 * (range.start() + range.end())).into(),
+            Self::Choice(words) => words.first().map_or("", String::as_str).into(),
+        }
+    }
+}
+
 /// How steps along a slider change a number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Spacing {
@@ -48,7 +61,12 @@ pub enum Spacing {
 impl Parameters {
     /// All entries of `table` are parameters.
     pub fn new(table: Table) -> Self {
-        Self { table, read: Vec::new() }
+        Self { table, read: Vec::new(), fills: false }
+    }
+
+    /// The same, but what is missing counts as the middle of its range, or as the first of its words.
+    pub(super) fn filled(table: Table) -> Self {
+        Self { fills: true, ..Self::new(table) }
     }
 
     /// Those that have been read, in the order in which they were.
@@ -106,6 +124,37 @@ impl Parameters {
             .ok_or_else(|| Error::input(key, format!("is {value}"), format!("use {names}")))
     }
 
+    /// The name of the model that stands beside its parameters.
+    pub(super) fn model(&mut self) -> Result<String> {
+        take_model(&mut self.table)
+    }
+
+    /// Whether `key` is a table.
+    pub(super) fn is_table(&self, key: &str) -> bool {
+        self.table.get(key).is_some_and(Value::is_table)
+    }
+
+    /// What `read` makes of the parameters in the table `key`, which holds `what`. Their names are `key.name`.
+    pub(super) fn table<T>(
+        &mut self,
+        key: &str,
+        what: &str,
+        read: impl FnOnce(&mut Parameters) -> Result<T>,
+    ) -> Result<T> {
+        let inner = match self.table.remove(key) {
+            Some(Value::Table(inner)) => inner,
+            Some(other) => return Err(Error::input(key, format!("is {other}"), format!("give {what}"))),
+            None if self.fills => Table::new(),
+            None => return Err(Error::input(key, "is missing", format!("give {what}"))),
+        };
+        let mut inner = Parameters { fills: self.fills, ..Parameters::new(inner) };
+        let value = read(&mut inner).map_err(|error| inside(error, key))?;
+        let of_inner = |parameter: Parameter| Parameter { key: format!("{key}.{}", parameter.key), ..parameter };
+        self.read.extend(inner.read.drain(..).map(of_inner));
+        inner.finish(key).map_err(|error| inside(error, key))?;
+        Ok(value)
+    }
+
     /// Reports a key that `model` does not have.
     pub fn finish(self, model: &str) -> Result<()> {
         match self.table.keys().next() {
@@ -116,9 +165,49 @@ impl Parameters {
         }
     }
 
-    fn take(&mut self, key: &str, what: &str, domain: Domain, help: &'static str) -> Result<Value> {
+    pub(super) fn take(&mut self, key: &str, what: &str, domain: Domain, help: &'static str) -> Result<Value> {
+        let middle = self.fills.then(|| domain.middle());
         self.read.push(Parameter { key: key.into(), help, domain, default: None });
-        self.table.remove(key).ok_or_else(|| Error::input(key, "is missing", format!("give {what}")))
+        self.table.remove(key).or(middle).ok_or_else(|| Error::input(key, "is missing", format!("give {what}")))
+    }
+}
+
+/// The error about a key in the table `key`.
+fn inside(error: Error, key: &str) -> Error {
+    match error {
+        Error::Input { subject, problem, remedy } => {
+            Error::Input { subject: format!("{key}.{subject}"), problem, remedy }
+        }
+        other => other,
+    }
+}
+
+/// Takes the name of the model from the keys of a material.
+pub(super) fn take_model(table: &mut Table) -> Result<String> {
+    let remedy = || format!("name one of {}", Brdf::models_with_parameters().join(", "));
+    match table.remove("model") {
+        Some(Value::String(model)) => Ok(model),
+        Some(_) => Err(Error::input("model", "is not a string", remedy())),
+        None => Err(Error::input("model", "is missing", remedy())),
+    }
+}
+
+/// The value of a parameter by its [`Parameter::key`].
+pub fn parameter<'t>(table: &'t Table, key: &str) -> Option<&'t Value> {
+    match key.split_once('.') {
+        Some((outer, inner)) => parameter(table.get(outer)?.as_table()?, inner),
+        None => table.get(key),
+    }
+}
+
+/// Gives a parameter a value by its [`Parameter::key`]. A table that is not there is made.
+pub fn set_parameter(table: &mut Table, key: &str, value: Value) {
+    let Some((outer, inner)) = key.split_once('.') else {
+        table.insert(key.into(), value);
+        return;
+    };
+    if let Value::Table(below) = table.entry(outer).or_insert_with(|| Table::new().into()) {
+        set_parameter(below, inner, value);
     }
 }
 

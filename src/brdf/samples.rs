@@ -163,6 +163,16 @@ pub const SAMPLES: &[(&str, [&str; 5])] = &[
             "alpha = 0.01; metal = 'Al'",
         ],
     ),
+    (
+        "layered",
+        [
+            "base = { model = 'lambert', reflectance = 1 }; coat = { alpha = 0.3, ior = 2.5 }",
+            "base = 'gold'; coat = { alpha = 0.02, ior = 1.5, thickness = 0.5, absorption = [0.1, 2, 3] }",
+            "base = { model = 'conductor', distribution = 'ggx', alpha = 0.01, metal = 'Al' }; coat = { alpha = 0.3, ior = 1.5 }",
+            "base = 'linen'; coat = { alpha = 1, ior = 1.2, thickness = 10, absorption = 100 }",
+            "base = { model = 'layered', base = 'red-plastic', coat = { alpha = 0.1, ior = 1.3 } }; coat = { alpha = 0.001, ior = 1.8 }",
+        ],
+    ),
 ];
 
 /// Three sets of anisotropic parameters of every model that has any, the first two of them without a rotation.

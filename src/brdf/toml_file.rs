@@ -1,8 +1,9 @@
 //! Reads materials from TOML files: a model and its parameters.
 use std::path::Path;
 
+use super::base::resolve_base_files;
 use super::{Brdf, model_of};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::file_format::{FileFormat, text};
 
 pub(super) const FORMAT: FileFormat<Brdf> =
@@ -19,7 +20,10 @@ fn parse(path: &Path, bytes: &[u8]) -> Result<Brdf> {
     Brdf::from_parameters(&model, parameters).map_err(|error| error.within(path.display()))
 }
 
-/// The model that the file names, and its parameters, not yet checked.
+/// The model that the file names, and its parameters, not yet checked. Files that it names are relative to its folder.
 pub(super) fn parse_model(path: &Path, bytes: &[u8]) -> Result<(String, toml::Table)> {
-    model_of(text(path, bytes)?).map_err(|error| error.within(path.display()))
+    let within = |error: Error| error.within(path.display());
+    let (model, mut parameters) = model_of(text(path, bytes)?).map_err(within)?;
+    resolve_base_files(&mut parameters, path.parent().unwrap_or(Path::new(""))).map_err(within)?;
+    Ok((model, parameters))
 }

@@ -12,6 +12,8 @@
 //! | what threads cost to make, beside what they are worth | [`fit`] |
 //! | what drafts of threads are worth while a parameter is dragged | [`live`] |
 //! | whether hard cases are shaded as on the CPU | [`stress`] |
+//! | what a measured material is in words of a model | [`material_fit`] |
+//! | what a material is by itself, drawn | [`material_plot`] |
 //! | pictures side by side: figures 10, 11 and 13 | [`gallery`] |
 //! | how it looks | [`tables`], [`plots`], [`sheet`] |
 //! | all of it on one page | [`report`](mod@report) |
@@ -22,6 +24,7 @@ pub mod expected;
 pub mod fit;
 pub mod gallery;
 pub mod live;
+pub mod material_fit;
 pub mod material_plot;
 pub mod metrics;
 pub mod plots;

@@ -10,6 +10,7 @@ use super::{
     Camera, DEFAULT_MATERIAL, EXPOSURE, EnvironmentSettings, GAMMA, INTENSITY, ImageSettings, MAX_SAMPLES, MAX_SIZE_PX,
     MAX_SUBPIXELS, MaterialSettings, MaterialSource, ObjectSettings, Scene, ShadingSettings, Source, TangentRule,
 };
+use crate::brdf::{change_base_files, resolve_base_files};
 use crate::error::{Error, Result};
 use crate::file_format::{self, FileFormat, FileKind, text};
 use crate::output::write_whole;
@@ -174,8 +175,13 @@ fn parse(text: &str, base_dir: &Path) -> Result<Scene, String> {
         resolve(path);
     }
     for material in &mut scene.materials {
-        if let MaterialSource::File(path) = &mut material.source {
-            resolve(path);
+        match &mut material.source {
+            MaterialSource::File(path) => resolve(path),
+            MaterialSource::Model { parameters, .. } => {
+                resolve_base_files(parameters, base_dir)
+                    .map_err(|error| error.within(format!("material \"{}\"", material.name)).to_string())?;
+            }
+            MaterialSource::Builtin(_) | MaterialSource::Custom(_) => {}
         }
     }
     for object in &mut scene.objects {
@@ -341,8 +347,10 @@ fn material_table(material: &MaterialSettings, folder: Option<&Path>) -> Result<
         MaterialSource::File(path) => table.extend([("file".into(), path_value(path, folder)?)]),
         MaterialSource::Builtin(name) => table.extend([("builtin".into(), name.clone().into())]),
         MaterialSource::Model { model, parameters } => {
+            let mut parameters = parameters.clone();
+            change_base_files(&mut parameters, &|path| path_value(path, folder))?;
             table.extend([("model".into(), model.clone().into())]);
-            table.extend(parameters.clone());
+            table.extend(parameters);
         }
         MaterialSource::Custom(_) => {
             let subject = format!("material \"{}\"", material.name);

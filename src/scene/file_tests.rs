@@ -125,10 +125,17 @@ fn files_beside_a_saved_scene_are_named_relative_to_it() {
     let mut scene = Scene::default();
     scene.environment.source = Source::File(folder.path().join("maps/x.hdr"));
     scene.objects[0].mesh = Source::File("/elsewhere/y.obj".into());
+    let base = folder.path().join("bases/z.binary");
+    let text =
+        format!("base = {{ model = 'layered', base = {base:?}, coat = {{}} }}\ncoat = {{ alpha = 0.1, ior = 1.5 }}");
+    scene.materials[0].source = MaterialSource::Model { model: "layered".into(), parameters: text.parse().unwrap() };
     scene.save(&path).unwrap();
     let text = std::fs::read_to_string(&path).unwrap();
-    assert!(text.contains("\"maps/x.hdr\"") && text.contains("\"/elsewhere/y.obj\""), "{text}");
+    for name in ["\"maps/x.hdr\"", "\"/elsewhere/y.obj\"", "\"bases/z.binary\""] {
+        assert!(text.contains(name), "{name}: {text}");
+    }
     assert_eq!(Scene::load(&path).unwrap(), scene);
+    assert!(scene.files().contains(&base));
 }
 
 #[test]

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use glam::{DMat3, DQuat, EulerRot, Mat4, Quat, Vec3};
 use serde::{Deserialize, Serialize};
 
-use crate::brdf::{Brdf, Custom};
+use crate::brdf::{Brdf, Custom, base_files, base_files_of};
 use crate::file_format::file_formats;
 
 pub mod camera;
@@ -243,18 +243,19 @@ impl Scene {
 }
 
 impl Scene {
-    /// The files that it names: of its environment, its meshes and its materials.
-    pub fn files(&self) -> impl Iterator<Item = &Path> {
-        let materials = self.materials.iter().filter_map(|material| match &material.source {
-            MaterialSource::File(path) => Some(path.as_path()),
-            _ => None,
-        });
+    /// The files that it names: of its environment, its meshes and its materials, with those under their coats.
+    pub fn files(&self) -> Vec<PathBuf> {
         let sources = std::iter::once(&self.environment.source).chain(self.objects.iter().map(|object| &object.mesh));
         let of_sources = sources.filter_map(|source| match source {
-            Source::File(path) => Some(path.as_path()),
+            Source::File(path) => Some(path.clone()),
             Source::Builtin(_) => None,
         });
-        of_sources.chain(materials)
+        let of_material = |material: &MaterialSettings| match &material.source {
+            MaterialSource::File(path) => [vec![path.clone()], base_files_of(path)].concat(),
+            MaterialSource::Model { parameters, .. } => base_files(parameters),
+            MaterialSource::Builtin(_) | MaterialSource::Custom(_) => Vec::new(),
+        };
+        of_sources.chain(self.materials.iter().flat_map(of_material)).collect()
     }
 
     /// Names of the materials that objects have, each once, in the order in which objects name them first.

@@ -1,6 +1,6 @@
 //! Parameters of a scene's materials, changed one by one.
 use super::{MaterialSettings, MaterialSource, Scene};
-use crate::brdf::Brdf;
+use crate::brdf::{Brdf, set_parameter};
 use crate::error::{Error, Result};
 
 impl MaterialSettings {
@@ -33,7 +33,7 @@ impl Scene {
             Error::input(format!("material \"{name}\""), "is not in the scene", remedy)
         })?;
         let (model, mut parameters) = material.model()?;
-        parameters.insert(key.into(), value.clone());
+        set_parameter(&mut parameters, key, value.clone());
         Brdf::from_parameters(&model, parameters.clone())
             .map_err(|error| error.within(format!("material \"{name}\"")))?;
         material.source = MaterialSource::Model { model, parameters };

@@ -152,6 +152,80 @@ mod tests {
         }
     }
 
+    /// Bins of directions: 8 by cosine and 12 by azimuth, of which the mirror direction is in the middle of one; the last is below the horizon.
+    fn bin(w_i: Option<DVec3>) -> usize {
+        const AZIMUTHS: usize = 12;
+        let Some(w_i) = w_i.filter(|w_i| w_i.z > 0.0) else { return 8 * AZIMUTHS };
+        let turn = (w_i.y.atan2(w_i.x) / std::f64::consts::TAU + 1.0 + 0.5 / AZIMUTHS as f64).fract();
+        let [ring, azimuth] = [(w_i.z * 8.0) as usize, (turn * AZIMUTHS as f64) as usize];
+        ring.min(7) * AZIMUTHS + azimuth.min(AZIMUTHS - 1)
+    }
+
+    /// How likely a direction is to be in each bin: the density, by midpoints of 8 x 8 parts of each of the table's cells.
+    fn bin_masses(rows: &SliceRows, w_o: Vec3) -> Vec<f64> {
+        const PARTS: usize = 8;
+        let mut masses = vec![0.0; bin(None) + 1];
+        for ring in 0..RINGS {
+            let [inner, outer] = [ring, ring + 1].map(|ring| f64::from(ring_edge(ring)));
+            for place in 0..PARTS * PARTS * AZIMUTHS {
+                let [i, j] = [place % PARTS, place / PARTS].map(|part| (part as f64 + 0.5) / PARTS as f64);
+                let s = inner + (outer - inner) * i;
+                let phi = std::f64::consts::TAU * j / AZIMUTHS as f64 - std::f64::consts::PI;
+                let h = (2.0 * (s * (1.0 - s)).sqrt() * glam::DVec2::from_angle(phi)).extend(1.0 - 2.0 * s);
+                let cos_theta_d = w_o.as_dvec3().dot(h);
+                let w_i = 2.0 * cos_theta_d * h - w_o.as_dvec3();
+                if cos_theta_d > 0.0 && w_i.z > 0.0 {
+                    let solid_angle = 4.0 * std::f64::consts::PI * (outer - inner) / (PARTS * PARTS * AZIMUTHS) as f64;
+                    let p = f64::from(rows.brdf_pdf(w_i.as_vec3(), w_o, h.as_vec3()));
+                    masses[bin(Some(w_i))] += p * 4.0 * cos_theta_d * solid_angle;
+                }
+            }
+        }
+        let above: f64 = masses.iter().sum();
+        masses[bin(None)] = (1.0 - above).max(0.0);
+        masses
+    }
+
+    #[test]
+    fn directions_fall_where_the_density_says_by_the_chi_square_test() {
+        use statrs::distribution::{ChiSquared, ContinuousCDF};
+        let all = test_materials::all();
+        assert!(all.len() >= 5);
+        for (name, brdf) in all {
+            let table = SliceTable::new(&brdf);
+            for theta_o_deg in [0.0, 33.3, 70.6] {
+                let w_o = view(theta_o_deg);
+                let rows = SliceRows::new(&table, w_o);
+                const DRAWS: u32 = 20_000;
+                let masses = bin_masses(&rows, w_o);
+                let mut counts = vec![0.0; masses.len()];
+                for i in 0..DRAWS {
+                    let drawn = rows.sample_brdf(w_o, random_bits(UVec2::new(3, 4), i, 5));
+                    counts[bin(drawn.map(|(w_i, _)| w_i.as_dvec3()))] += 1.0;
+                }
+                // Bins of fewer than five expected are taken together, as the test wants it.
+                let [mut square, mut bins] = [0.0, 0.0];
+                let mut rest = (0.0, 0.0);
+                for (mass, count) in masses.iter().zip(&counts) {
+                    let expected = mass * f64::from(DRAWS);
+                    if expected < 5.0 {
+                        rest = (rest.0 + expected, rest.1 + count);
+                    } else {
+                        square += (count - expected).powi(2) / expected;
+                        bins += 1.0;
+                    }
+                }
+                if rest.0 >= 5.0 {
+                    square += f64::powi(rest.1 - rest.0, 2) / rest.0;
+                    bins += 1.0;
+                }
+                let p = ChiSquared::new(bins - 1.0).unwrap().sf(square);
+                println!("{name}, {theta_o_deg}: chi square {square:.1} of {bins} bins, p = {p:.3}");
+                assert!(p > 1e-4, "{name}, {theta_o_deg}: chi square {square} of {bins} bins, p = {p}");
+            }
+        }
+    }
+
     #[test]
     fn f_cos_over_p_stays_near_the_albedo() {
         // What importance sampling is for: the spread of f cos / p, in a white furnace all of the noise, is small.

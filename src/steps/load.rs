@@ -1,12 +1,12 @@
 //! Loads what scenes name: meshes, environments and BRDFs, with their tables. A file is its contents, so an edited one is another.
 use crate::Result;
-use crate::brdf::{Brdf, Tabulated, tabulate};
+use crate::brdf::{Brdf, Tabulated, base_files, base_files_of, tabulate};
 use crate::environment::Environment;
 use crate::error::Error;
 use crate::file_format::FileKind;
 use crate::memo::{Key, Keyed, Memo, Round, Step};
 use crate::scene::{MaterialSource, Mesh, Source};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// The key of what `source` names, in a file of one of the formats `files`.
 fn key_of<T>(memo: &Memo, files: &FileKind<T>, source: &Source) -> Result<Key> {
@@ -20,6 +20,16 @@ fn key_of<T>(memo: &Memo, files: &FileKind<T>, source: &Source) -> Result<Key> {
 fn file_key<T>(memo: &Memo, files: &FileKind<T>, path: &Path) -> Result<Key> {
     let format = files.format_of(path)?;
     Ok(Key::builder("file").text(format.extension).key(memo.file_key(path)?).build())
+}
+
+/// The key of what `key` names over these files as its bases.
+fn with_files(memo: &Memo, key: Key, files: &[PathBuf]) -> Result<Key> {
+    if files.is_empty() {
+        return Ok(key);
+    }
+    let file_key = |path: &PathBuf| file_key(memo, &Brdf::FILES, path).map_err(|error| error.within("base"));
+    let files = files.iter().map(file_key).collect::<Result<Vec<_>>>()?;
+    Ok(Key::builder("over").key(key).keys(files).build())
 }
 
 /// Loads or makes a mesh, in object space.
@@ -74,8 +84,15 @@ impl Step for LoadMaterial<'_> {
 
     fn key(&self, memo: &Memo) -> Result<Key> {
         Ok(match self.0 {
-            MaterialSource::File(path) => file_key(memo, &Brdf::FILES, path)?,
-            // Models are made at once, so they are known by what they are.
+            MaterialSource::File(path) => {
+                let file = file_key(memo, &Brdf::FILES, path)?;
+                with_files(memo, file, &base_files_of(path)).map_err(|error| error.within(path.display()))?
+            }
+            MaterialSource::Model { model, parameters } if !base_files(parameters).is_empty() => {
+                let key = Key::builder("layered").text(model).text(&parameters.to_string()).build();
+                with_files(memo, key, &base_files(parameters))?
+            }
+            // Other models are made at once, so they are known by what they are.
             source => Key::builder("model").bytes(load(memo, source)?.fingerprint().as_bytes()).build(),
         })
     }
@@ -141,5 +158,32 @@ mod tests {
         assert!(table_of("").is_ok());
         let error = table_of("anisotropy = 0.5\nanisotropy_convention = 'gltf'").unwrap_err().to_string();
         assert!(error.contains("`principled`: is anisotropic"), "{error}");
+    }
+
+    #[test]
+    fn a_material_over_a_file_is_another_when_the_file_is() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name);
+        let base = |reflectance: f64| {
+            std::fs::write(path("base.toml"), format!("model = 'lambert'\nreflectance = {reflectance}")).unwrap();
+        };
+        let text = "base = 'base.toml'\ncoat = { alpha = 0.1, ior = 1.5 }";
+        std::fs::write(path("coat.toml"), format!("model = 'layered'\n{text}")).unwrap();
+        let mut parameters = text.parse().unwrap();
+        crate::brdf::resolve_base_files(&mut parameters, folder.path()).unwrap();
+        let inline = MaterialSource::Model { model: "layered".into(), parameters };
+        for source in [MaterialSource::File(path("coat.toml")), inline] {
+            let memo = Memo::default();
+            let ask = || memo.round(&()).ask(&LoadMaterial(&source)).map(|brdf| brdf.fingerprint());
+            base(0.2);
+            let first = ask().unwrap();
+            assert_eq!(ask().unwrap(), first);
+            base(0.4);
+            memo.look_again(&path("base.toml"));
+            assert_ne!(ask().unwrap(), first);
+            std::fs::remove_file(path("base.toml")).unwrap();
+            memo.look_again(&path("base.toml"));
+            assert!(ask().unwrap_err().to_string().contains("base: "));
+        }
     }
 }

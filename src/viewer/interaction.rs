@@ -157,7 +157,7 @@ impl Viewer {
                     let mut scene = Scene::load(&path)?;
                     // The window stays as large as it is.
                     (scene.image.width, scene.image.height) = (self.area.width, self.area.height);
-                    scene.files().for_each(|path| self.memo.look_again(path));
+                    scene.files().iter().for_each(|path| self.memo.look_again(path));
                     self.session.replace(scene);
                     self.changes += 1;
                     self.request();

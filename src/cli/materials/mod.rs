@@ -1,6 +1,7 @@
 //! `threadlight materials`: what can be named, and BRDFs by themselves, without a scene.
 mod evaluate;
 mod export;
+mod fit;
 mod list;
 mod plot;
 
@@ -16,7 +17,8 @@ Examples:
   threadlight materials
   echo 30 30 180 | threadlight materials evaluate gold
   threadlight materials plot gold -o gold.svg
-  threadlight materials export clay -o clay.binary";
+  threadlight materials export clay -o clay.binary
+  threadlight materials fit alumina-oxide.binary --model ggx -o alumina.toml";
 
 /// Lists what can be named: materials, models, environments, meshes, methods; or looks at one material.
 #[derive(clap::Args)]
@@ -33,6 +35,7 @@ enum Command {
     Evaluate(evaluate::Evaluate),
     Plot(plot::Plot),
     Export(export::Export),
+    Fit(fit::Fit),
 }
 
 impl Materials {
@@ -42,6 +45,7 @@ impl Materials {
             Some(Command::Evaluate(evaluate)) => evaluate.run(),
             Some(Command::Plot(plot)) => plot.run(),
             Some(Command::Export(export)) => export.run(),
+            Some(Command::Fit(fit)) => fit.run(),
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Which material, and the parameters of a model.
 use super::{group, on_change, source};
-use crate::brdf::{Brdf, Domain, Parameter, Spacing, as_number, channels};
+use crate::brdf::{self, Brdf, Domain, Parameter, Spacing, as_number, channels};
 use crate::scene::{MaterialSettings, MaterialSource};
 use crate::viewer::change::Change;
 use crate::viewer::input::Input;
@@ -59,7 +59,7 @@ fn parameters_of(settings: &MaterialSettings) -> Option<Vec<(Parameter, toml::Va
     let (model, table) = settings.model().ok()?;
     let parameters = Brdf::parameters(&model, &table).ok()?;
     let with_value = |parameter: Parameter| {
-        let value = table.get(&parameter.key).cloned().or(parameter.default.map(Into::into))?;
+        let value = brdf::parameter(&table, &parameter.key).cloned().or(parameter.default.map(Into::into))?;
         Some((parameter, value))
     };
     Some(parameters.into_iter().filter_map(with_value).collect())
