@@ -97,15 +97,17 @@ AtSources at_sources(Surface surface, Material material, Lobe lobe) {
     uint s = 0;
     do {
         Source source = sources[s];
-        // Gauss and Legendre's points on a square of the source's variance; from afar, where a lobe is four times wider, its middle.
+        // Gauss and Legendre's points on a square of the source's variance: fewer from afar, where f changes less within it. Tails of
+        // Gaussian lobes go on falling steeply, so only from very far does the middle alone do.
         float away = away_from(lobe, surface, material, source.direction.xyz);
-        int side = clearance(source, lobe.width, away) > 8.0 ? 1 : 3;
+        float clear = clearance(source, lobe.width, away);
+        int side = clear > 40.0 ? 1 : clear > 8.0 ? 2 : 3;
         float deviation = length(vec2(dot(source.axis[0].xyz, surface.frame[2]), dot(source.axis[1].xyz, surface.frame[2])));
         int i = 0;
         do {
-            ivec2 place = ivec2(i % side, i / side) - side / 2;
-            vec2 at = sqrt(3.0 * 0.6) * vec2(place);
-            vec2 weights = side == 1 ? vec2(1.0) : mix(vec2(4.0 / 9.0), vec2(2.5 / 9.0), notEqual(place, ivec2(0)));
+            vec2 place = vec2(i % side, i / side) - 0.5 * float(side - 1);
+            vec2 at = (side == 2 ? 2.0 : sqrt(3.0 * 0.6)) * place;
+            vec2 weights = side == 3 ? mix(vec2(4.0 / 9.0), vec2(2.5 / 9.0), notEqual(place, vec2(0.0))) : vec2(1.0 / float(side));
             vec3 w_i = normalize((source.direction.xyz + at.x * source.axis[0].xyz + at.y * source.axis[1].xyz) * surface.frame);
             vec2 above = risen(w_i.z, deviation / float(side));
             if (above.x > 0.0) {

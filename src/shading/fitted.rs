@@ -146,17 +146,23 @@ fn at_sources(lobe: &Lobe, sources: &[SourceRecord]) -> (Vec3, Vec3) {
     let point = lobe.point;
     let (mut f_cos, mut cosine) = (Vec3::ZERO, Vec3::ZERO);
     for source in sources {
-        let from_afar = clearance(lobe.away(source.direction.truncate()), source.direction.w, lobe.width) > 8.0;
-        let side = if from_afar { 1 } else { 3 };
+        let clear = clearance(lobe.away(source.direction.truncate()), source.direction.w, lobe.width);
+        let side = if clear > 40.0 {
+            1
+        } else if clear > 8.0 {
+            2
+        } else {
+            3
+        };
         let deviation = source.axes.map(|axis| axis.truncate().dot(point.surface.frame.z_axis));
         let deviation = deviation[0].hypot(deviation[1]);
         for i in 0..side * side {
-            let place = IVec2::new(i % side, i / side) - side / 2;
-            let at = (3.0 * 0.6_f32).sqrt() * place.as_vec2();
-            let weight = |place: i32| match (side, place) {
-                (1, _) => 1.0,
-                (_, 0) => 4.0 / 9.0,
-                _ => 2.5 / 9.0,
+            let place = IVec2::new(i % side, i / side).as_vec2() - 0.5 * (side - 1) as f32;
+            let at = if side == 2 { 2.0 } else { (3.0 * 0.6_f32).sqrt() } * place;
+            let weight = |place: f32| match side {
+                3 if place == 0.0 => 4.0 / 9.0,
+                3 => 2.5 / 9.0,
+                _ => 1.0 / side as f32,
             };
             let [x, y] = source.axes.map(Vec4::truncate);
             let towards = source.direction.truncate() + at.x * x + at.y * y;
