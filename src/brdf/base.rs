@@ -3,7 +3,7 @@ use std::path::{Path, PathBuf};
 
 use toml::{Table, Value};
 
-use super::{Brdf, Domain, Parameters, toml_file};
+use super::{Brdf, Domain, Parameters};
 use crate::error::{Error, Result};
 
 const KEY: &str = "base";
@@ -88,8 +88,7 @@ fn add_files(parameters: &Table, layers: usize, files: &mut Vec<PathBuf>) {
 }
 
 fn add_files_below(path: &Path, layers: usize, files: &mut Vec<PathBuf>) {
-    let is_model =
-        path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case(toml_file::FORMAT.extension));
+    let is_model = Brdf::is_model_file(path);
     // What cannot be read has none; whoever loads it will say why.
     if let (true, Some(layers), Ok((_, parameters))) = (is_model, layers.checked_sub(1), Brdf::load_model(path)) {
         add_files(&parameters, layers, files);

@@ -188,6 +188,11 @@ impl Brdf {
         Ok(parameters.read())
     }
 
+    /// Whether `path` is called as a file of a model and its parameters is, so that [`Self::load_model`] may read it.
+    pub fn is_model_file(path: &Path) -> bool {
+        path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case(toml_file::FORMAT.extension))
+    }
+
     /// The model that a material file (`.toml`) names, and its parameters, not yet checked.
     pub fn load_model(path: &Path) -> Result<(String, toml::Table)> {
         toml_file::parse_model(path, &file_format::read(path)?)

@@ -13,9 +13,7 @@ impl MaterialSettings {
         match &self.source {
             MaterialSource::Model { model, parameters } => Ok((model.clone(), parameters.clone())),
             MaterialSource::Builtin(name) => Brdf::builtin_model(name).ok_or_else(none),
-            MaterialSource::File(path) if path.extension().is_some_and(|extension| extension == "toml") => {
-                Brdf::load_model(path)
-            }
+            MaterialSource::File(path) if Brdf::is_model_file(path) => Brdf::load_model(path),
             MaterialSource::File(_) | MaterialSource::Custom(_) => Err(none()),
         }
     }

@@ -4,6 +4,7 @@ use crate::cli::stem;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use threadlight::Error;
+use threadlight::low_level::brdf::Brdf;
 use threadlight::low_level::evaluate::material_fit::{fit, names};
 use threadlight::low_level::output;
 
@@ -26,7 +27,7 @@ pub struct Fit {
 
 impl Fit {
     pub fn run(self) -> anyhow::Result<()> {
-        if self.output.extension().is_none_or(|extension| extension != "toml") {
+        if !Brdf::is_model_file(&self.output) {
             return Err(Error::in_file(&self.output, "is no material file", "end its name in .toml").into());
         }
         output::check_writable(&self.output)?;
