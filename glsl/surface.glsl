@@ -47,9 +47,7 @@ vec3 turned(vec3 w, vec2 angle) {
 
 // A frame at n that does not turn with w_o: its x is what is left of `axis` in the tangent plane.
 mat3 fixed_frame(vec3 n, vec3 axis) {
-    vec3 along = axis - dot(axis, n) * n;
-    // An axis within 1e-3 of n gives no direction that single precision could be trusted with.
-    vec3 x = dot(along, along) > 1e-6 ? normalize(along) : any_tangent(n);
+    vec3 x = tangent_along(axis, n);
     return mat3(x, cross(n, x), n);
 }
 

@@ -307,11 +307,13 @@ impl Prepared {
 
     /// Gives objects the tangents that their materials need, and no others: to be called when materials were changed.
     pub fn place_tangents(&mut self) {
+        // Found once a material: there may be thousands of objects.
+        let are_isotropic: Vec<_> = self.materials.iter().map(|material| material.brdf.is_isotropic()).collect();
         for (object, settings) in self.objects.iter_mut().zip(&self.scene.objects) {
-            let material = &self.materials[object.material as usize];
-            let needs_tangent = !material.brdf.is_isotropic();
+            let material = object.material as usize;
+            let needs_tangent = !are_isotropic[material];
             if needs_tangent && settings.tangent.is_none() {
-                let name = &material.name;
+                let name = &self.materials[material].name;
                 tracing::info!(
                     "an object of \"{name}\", which is anisotropic, has no `tangent`: it is brushed around its y axis"
                 );

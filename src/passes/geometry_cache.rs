@@ -21,6 +21,10 @@ const VERTEX_STRIDE: u32 = size_of::<[f32; 3]>() as u32;
 /// nearer than any surface that a camera outside of the scene sees.
 const NEAR_PLANE: f64 = 1e-6;
 
+/// How tangents go by the axis of an object, as glsl/geometry_cache.glsl has it; 0 is not at all.
+const TANGENT_AROUND: f32 = 1.0;
+const TANGENT_ALONG: f32 = 2.0;
+
 /// The triangles of a mesh on the device.
 pub struct DeviceMesh {
     triangles: Triangles,
@@ -112,8 +116,8 @@ impl GeometryCache {
             let row = |i: usize| pack(matrix3.row(i) / unit, from_eye[i] / unit);
             let tangent_axis = match object.tangent {
                 None => [0.0; 4],
-                Some(rule @ TangentRule::Around(_)) => rule.axis().extend(1.0).to_array(),
-                Some(rule @ TangentRule::Along(_)) => rule.axis().extend(2.0).to_array(),
+                Some(rule @ TangentRule::Around(_)) => rule.axis().extend(TANGENT_AROUND).to_array(),
+                Some(rule @ TangentRule::Along(_)) => rule.axis().extend(TANGENT_ALONG).to_array(),
             };
             let push = Push {
                 to_eye: [0, 1, 2].map(row),

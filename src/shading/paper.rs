@@ -3,14 +3,13 @@ use std::f32::consts::FRAC_PI_2;
 
 use glam::{Mat3, Vec2, Vec3, Vec4};
 
-use super::{Point, Surface, any_tangent, turned};
+use super::{Point, Surface, turned};
+use crate::tangent::tangent_along;
 use crate::threads::{ThreadTable, Threads};
 
 /// A frame at `n` that does not turn with w_o. Twin of `fixed_frame` in glsl/surface.glsl.
 fn fixed_frame(n: Vec3, axis: Vec3) -> Mat3 {
-    let along = axis - axis.dot(n) * n;
-    // The reason for 1e-6 stands in the shader.
-    let x = if along.length_squared() > 1e-6 { along.normalize() } else { any_tangent(n) };
+    let x = tangent_along(axis, n);
     Mat3::from_cols(x, n.cross(x), n)
 }
 
