@@ -3,7 +3,7 @@ use glam::DVec3;
 
 use super::azimuths::View;
 use super::generate::{Neighbour, Row, carried, from_the_middle, scaled};
-use super::kernel::Kernel;
+use super::kernel::{Kernel, all_between};
 use super::lights::{Quadrature, TestLights};
 use super::solve::{Effort, Fit};
 use super::table::FittedTable;
@@ -70,7 +70,7 @@ pub fn draft(brdf: &Brdf, before: &FittedTable, observer: &dyn Observer) -> Resu
         let low = high - 1;
         let t = (row - places[low]) as f64 / (places[high] - places[low]) as f64;
         let [a, b] = [low, high].map(|i| carried(&fitted[i].0, view(places[i]), view(row)));
-        let kernels = a.iter().zip(&b).map(|(a, b)| a.between(b, t)).collect();
+        let kernels = all_between(&a, &b, t);
         let ((_, albedo_a, error_a), (_, albedo_b, error_b)) = (&fitted[low], &fitted[high]);
         (kernels, albedo_a.lerp(*albedo_b, t), error_a + t * (error_b - error_a))
     };

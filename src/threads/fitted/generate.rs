@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::azimuths::{View, azimuth_count};
 use super::cells::cells;
-use super::kernel::{Kernel, scale_rad};
+use super::kernel::{Kernel, all_between, scale_rad};
 use super::lights::{Quadrature, TestLights};
 use super::solve::{Effort, Fit};
 use super::table::FittedTable;
@@ -125,7 +125,7 @@ pub fn generate_for(
                 in_units(&cells(&lobes, settings.count))
             }
             [one] => one.clone(),
-            [a, b, ..] => half_way(a, b),
+            [a, b, ..] => all_between(a, b, 0.5),
         };
         let effort = if neighbours.is_empty() { FIRST } else { NEXT };
         let mut tied = TIED;
@@ -136,7 +136,7 @@ pub fn generate_for(
             fit.solve(&mut kernels, effort, observer)?;
             let error = fit.relative_error(&kernels);
             let is_near = |neighbour: &Vec<Kernel>| {
-                let between = fit.relative_error(&half_way(neighbour, &kernels));
+                let between = fit.relative_error(&all_between(neighbour, &kernels, 0.5));
                 between < MOST_BETWEEN * error.max(fit.relative_error(neighbour))
             };
             if targets.azimuths == 1 || tied >= MOST_TIED || neighbours.iter().all(is_near) {
@@ -192,11 +192,6 @@ pub(super) fn from_the_middle(
     all.push(first);
     all.extend(up?);
     Ok(all)
-}
-
-/// Half way from each kernel of `a` to that of `b`.
-fn half_way(a: &[Kernel], b: &[Kernel]) -> Vec<Kernel> {
-    a.iter().zip(b).map(|(a, b)| a.between(b, 0.5)).collect()
 }
 
 /// The same with `scale` times the weights.

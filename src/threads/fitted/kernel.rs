@@ -38,6 +38,11 @@ impl Kernel {
     }
 }
 
+/// Each kernel of `a` the part `t` of the way to that of `b`.
+pub fn all_between(a: &[Kernel], b: &[Kernel], t: f64) -> Vec<Kernel> {
+    a.iter().zip(b).map(|(a, b)| a.between(b, t)).collect()
+}
+
 /// kappa of the kernel of a whole `level`.
 pub fn kappa_of_level(level: f64) -> f64 {
     // For none at all a width of 0.002 degrees: far narrower than any light or pixel, and its square is no trouble to f64.

@@ -5,7 +5,7 @@ use glam::{DVec3, Vec3};
 use half::f16;
 
 use super::azimuths::fold_azimuth;
-use super::kernel::{Kernel, SHARPEST_LEVEL, WIDEST_LEVEL};
+use super::kernel::{Kernel, SHARPEST_LEVEL, WIDEST_LEVEL, all_between};
 use super::solve::cosine_part;
 use crate::packing::{octahedral_decode, octahedral_encode, pack_snorm_2x16, unpack_snorm_2x16};
 
@@ -90,17 +90,17 @@ impl FittedTable {
         let position = (theta_o / FRAC_PI_2 * self.rows as f64).clamp(0.0, (self.rows - 1) as f64);
         let (low, t) = (position as usize, position.fract());
         let high = (low + 1).min(self.rows - 1);
-        let between = |a: Vec<Kernel>, b: Vec<Kernel>, t: f64| a.iter().zip(&b).map(|(a, b)| a.between(b, t)).collect();
         let at_azimuth = |azimuth: usize| -> Vec<Kernel> {
-            let row = |row: usize| self.row(azimuth * self.rows + row).iter().map(|packed| packed.kernel()).collect();
-            between(row(low), row(high), t)
+            let [low, high] = [low, high].map(|row| self.row(azimuth * self.rows + row));
+            let [low, high] = [low, high].map(|row| row.iter().map(|packed| packed.kernel()).collect::<Vec<_>>());
+            all_between(&low, &high, t)
         };
         if self.azimuths == 1 {
             return at_azimuth(0);
         }
         let (at, is_mirrored) = fold_azimuth(phi_o, self.azimuths);
         let before = (at as usize).min(self.azimuths - 2);
-        let mut kernels: Vec<Kernel> = between(at_azimuth(before), at_azimuth(before + 1), at - before as f64);
+        let mut kernels = all_between(&at_azimuth(before), &at_azimuth(before + 1), at - before as f64);
         if is_mirrored {
             kernels.iter_mut().for_each(|kernel| kernel.direction.y *= -1.0);
         }
