@@ -1,11 +1,13 @@
 // Materials as the GPU holds them. Twin of the layout: src/brdf/record.rs.
 #include "brdf/parameters.glsl"
 
-struct ThreadSet {
+struct ThreadTable {
     uint first;       // where its threads start in the thread buffer
     uint count;
     uint row_count;
-    uint sharp_count; // how many of its threads, the first ones, are sharper than the environment's pyramid in some row
+    uint sharp_count;   // how many of its threads, up to the last one that is, are sharper than the environment's pyramid in some row
+    uint set_count;     // sets of its threads, each of which does alone: thread k is of set k % set_count
+    uint azimuth_count; // of the view, that there are rows for; 1 of an isotropic BRDF
 };
 
 struct Material {
@@ -13,11 +15,9 @@ struct Material {
     uint model;        // position in src/brdf/models.rs
     uint first_slice;  // where its CDFs or its split sum start in the buffer of these
     float lobe_width;  // half_vector_width in src/brdf/lobe.rs, in radians
-    ThreadSet threads;          // of a pixel whose sub-pixels share one sum
-    ThreadSet subpixel_threads; // of each sub-pixel of another pixel
-    uint azimuth_count;         // of the view, that there are rows of threads for; 1 of an isotropic BRDF
-    vec2 long_axis;             // of the lobe, from the tangent; across it the lobe has lobe_width
-    float narrowness;           // the lobe's width across that axis over the one along it: 1 of an isotropic BRDF
+    float narrowness;  // the lobe's width across its long axis over the one along it: 1 of an isotropic BRDF
+    vec2 long_axis;    // of the lobe, from the tangent; across it the lobe has lobe_width
+    ThreadTable threads;
 };
 
 layout(set = 0, binding = 5, std430) readonly buffer Materials {

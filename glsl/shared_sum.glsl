@@ -1,8 +1,9 @@
-// For methods by which the sub-pixels of a pixel that lies on one smooth surface share one sum, at their mean normal. Of another pixel,
-// each covered sub-pixel is a sum of its own, over so many fewer threads. Twin: shade_shared in src/shading/mod.rs.
+// For methods by which the sub-pixels of a pixel that lies on one smooth surface share one sum over all threads, at their mean normal. Of
+// another pixel, each covered sub-pixel is a sum of its own, over one set of the threads: the partition of the paper's section 4.2, for
+// threads that are made such that each set does alone. Twin: shade_shared in src/shading/mod.rs.
 
-// The sum over these threads of the material of weight times environment.
-vec3 estimate(Surface surface, Material material, ThreadSet set);
+// The mean over threads first, first + stride, ... of the material of what each makes of the environment, as if there were no others.
+vec3 estimate(Surface surface, Material material, uint first, uint stride);
 
 // Whether one sum does not do for a pixel within one smooth surface, whose mean is this.
 bool needs_subpixels(Surface surface, Material material);
@@ -45,11 +46,8 @@ vec4 shade_pixel(uvec2 pixel, bool interior) {
                 surface = surface_of_subpixel(place, texel);
             }
             Material material = materials[geometry_material(texel)];
-            ThreadSet set = material.subpixel_threads;
-            if (shares) {
-                set = material.threads;
-            }
-            sum += vec4(estimate(surface, material, set), 1.0);
+            uint set_count = shares ? 1 : material.threads.set_count;
+            sum += vec4(estimate(surface, material, j % set_count, set_count), 1.0);
         }
     } while (++j < parts);
     return sum / float(parts);

@@ -4,7 +4,7 @@ use crate::environment::sources::{CLEAR, clearance};
 use crate::environment::{Environment, Pyramid, VmfPyramid};
 use crate::memo::Keyed;
 use crate::threads::fitted::kernel::FINEST_WIDTH_RAD;
-use crate::threads::{ThreadSets, Threads, WithThreads};
+use crate::threads::{Threads, WithThreads};
 
 /// What a method looks up of an environment, as far as it has to be filtered.
 #[derive(Clone, Default)]
@@ -64,9 +64,8 @@ impl KernelNeeds {
             let lobe_width = (MIN_COS_THETA_D * half_vector_width(brdf)) as f32;
             sources.iter().any(|source| clearance(0.0, source.width_rad() as f32, lobe_width) < CLEAR[1])
         };
-        let is_sharp = |threads: Option<ThreadSets<&Threads>>| {
-            let threads = threads.into_iter().flat_map(ThreadSets::both);
-            threads.filter_map(Threads::fitted).any(|table| table.sharp_count(finest_level) > 0)
+        let is_sharp = |threads: Option<&Threads>| {
+            threads.and_then(Threads::fitted).is_some_and(|table| table.sharp_count(finest_level) > 0)
         };
         Self {
             map: materials.iter().any(|(_, threads)| is_sharp(*threads)),

@@ -6,11 +6,14 @@
 mod cli;
 
 use clap::Parser;
+use cli::say;
 use std::process::ExitCode;
 use threadlight::Error;
 use threadlight::low_level::vulkan::VulkanError;
 
 fn main() -> ExitCode {
+    #[cfg(unix)]
+    outlive_file_limits();
     let arguments = match cli::Arguments::try_parse() {
         Ok(arguments) => arguments,
         Err(error) if is_mistake(&error) => return fail(2, &cli::mistake(&error)),
@@ -21,13 +24,25 @@ fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         // Whoever reads our output has seen enough of it, such as `head`.
         Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
+        // Errors about files name them.
+        Err(error) if error.is::<std::io::Error>() => fail(1, &format!("standard output cannot be written ({error})")),
         Err(error) => fail(exit_code(&error), &format!("{error:#}")),
+    }
+}
+
+/// A file that becomes larger than it may (`ulimit -f`) is an error of the call that writes, as a full disk is. Without a handler the signal
+/// would end the program.
+#[cfg(unix)]
+fn outlive_file_limits() {
+    use signal_hook::{consts::SIGXFSZ, flag};
+    if let Err(cause) = flag::register(SIGXFSZ, std::sync::Arc::<std::sync::atomic::AtomicBool>::default()) {
+        say(format_args!("threadlight: SIGXFSZ has no handler: {cause}"));
     }
 }
 
 /// Says on one line what went wrong.
 fn fail(code: u8, problem: &str) -> ExitCode {
-    eprintln!("threadlight: {}", problem.replace('\n', " "));
+    say(format_args!("threadlight: {}", problem.replace('\n', " ")));
     ExitCode::from(code)
 }
 

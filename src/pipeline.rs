@@ -10,7 +10,6 @@ use crate::steps::{
     CheckDevice, CompileCompute, CompileGeometryCache, UploadBackground, UploadLight, UploadMaterials, UploadMesh,
     light, pipelines,
 };
-use crate::threads::ThreadSets;
 use crate::vulkan::{Device, Frames, PassTime, Shader, compiled};
 use crate::{Error, Result};
 use std::sync::Arc;
@@ -104,8 +103,7 @@ impl DeviceScene {
         pipelines(round, device)?;
         let way_around = round.ask(&CheckDevice(device))?.way_around(device)?;
         let geometry_cache = ask_geometry_cache(device, prepared, round)?;
-        let materials: Vec<_> =
-            prepared.materials.iter().map(|m| (&m.brdf, m.threads.as_ref().map(ThreadSets::as_ref))).collect();
+        let materials: Vec<_> = prepared.materials.iter().map(|m| (&m.brdf, m.threads.as_ref())).collect();
         let evaluates_brdf = method.evaluates_brdf(environment);
         let light = light(round, Some(device), method, environment, &prepared.shaded())?;
         let finest_level = light.blurred.as_ref().map(|blurred| finest_level(&blurred.rest));
@@ -285,3 +283,7 @@ pub(crate) fn median(mut values: Vec<f64>) -> f64 {
     let middle = values.len() / 2;
     if values.len() % 2 == 1 { values[middle] } else { (values[middle - 1] + values[middle]) / 2.0 }
 }
+
+#[cfg(test)]
+#[path = "pipeline_tests.rs"]
+mod tests;

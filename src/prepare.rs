@@ -6,9 +6,9 @@ use crate::memo::{Key, Keyed, Memo, Round, Step};
 use crate::method::Method;
 use crate::passes::{PlacedMesh, Sampling, View};
 use crate::scene::{Camera, MaterialSource, Mesh, Scene, TangentRule};
-use crate::steps::{DraftThreads, FitTargets, FitThreads, LoadEnvironment, LoadMaterial, LoadMesh};
-use crate::threads::fitted::light_count;
-use crate::threads::{ThreadKind, ThreadSets, ThreadSettings, Threads, WithThreads};
+use crate::steps::{DraftThreads, FitThreads, LoadEnvironment, LoadMaterial, LoadMesh};
+use crate::threads::fitted::set_count;
+use crate::threads::{ThreadKind, ThreadSettings, Threads, WithThreads};
 use crate::{Error, Result};
 use glam::{DAffine3, DVec3};
 use std::cell::Cell;
@@ -47,13 +47,13 @@ pub struct PreparedMaterial {
     /// Its BRDF.
     pub brdf: Keyed<Brdf>,
     /// Its threads, for methods that use them.
-    pub threads: Option<ThreadSets<Keyed<Threads>>>,
+    pub threads: Option<Keyed<Threads>>,
 }
 
 impl PreparedMaterial {
     /// Its BRDF and threads.
     pub fn shaded(&self) -> WithThreads<'_> {
-        (&self.brdf, self.threads.as_ref().map(|sets| sets.as_ref().map(|threads| &**threads)))
+        (&self.brdf, self.threads.as_deref())
     }
 }
 
@@ -68,47 +68,17 @@ pub fn ask_threads(
     brdf: &Keyed<Brdf>,
     sampling: Sampling,
     subpixels: u32,
-) -> Result<Option<ThreadSets<Keyed<Threads>>>> {
+) -> Result<Option<Keyed<Threads>>> {
     let Some(settings) = thread_settings(method, brdf, sampling, subpixels) else { return Ok(None) };
-    if let Some(known) = known_threads(round, brdf, settings)? {
-        return Ok(Some(known));
-    }
-    // What both sets are fitted to is made once, and let go. Of other numbers of lights each makes its own, if it has to be made.
-    let on_the_way = round.memo().round(round.observer());
-    let [lights, of_subpixel] = settings.map(|settings| light_count(settings.count)).both();
-    if method.threads() == Some(ThreadKind::Fitted) && lights == of_subpixel {
-        on_the_way.ask(&FitTargets::new(brdf, &settings.pixel))?;
-    }
-    settings.try_map(|settings| round.ask(&FitThreads { brdf, settings })).map(Some)
+    round.ask(&FitThreads { brdf, settings }).map(Some)
 }
-
-/// These threads, if they were made before.
-fn known_threads(
-    round: &Round,
-    brdf: &Keyed<Brdf>,
-    settings: ThreadSets<ThreadSettings>,
-) -> Result<Option<ThreadSets<Keyed<Threads>>>> {
-    let ThreadSets { pixel, subpixel } = settings.try_map(|settings| round.known(&FitThreads { brdf, settings }))?;
-    Ok(pixel.zip(subpixel).map(|(pixel, subpixel)| ThreadSets { pixel, subpixel }))
-}
-
-/// Fewest threads of a sub-pixel of an anisotropic material, if a pixel has as many: fewer leave gaps in a long lobe. Of a metal of
-/// roughness_alpha 0.05 x 0.3, 4 threads err by 0.066 of the radiance, 8 by 0.024, 16 by 0.010.
-const FEWEST_OF_LONG_LOBE: u32 = 8;
 
 /// Which threads `method` shades `brdf` by, if it does.
-fn thread_settings(
-    method: Method,
-    brdf: &Brdf,
-    sampling: Sampling,
-    subpixels: u32,
-) -> Option<ThreadSets<ThreadSettings>> {
+fn thread_settings(method: Method, brdf: &Brdf, sampling: Sampling, subpixels: u32) -> Option<ThreadSettings> {
     let Sampling { count, seed } = sampling;
     let settings = ThreadSettings { kind: method.threads()?, count: count as usize, seed, ..ThreadSettings::default() };
-    let parts = if method.shares_surface() { subpixels * subpixels } else { 1 };
-    let fewest = if parts == 1 || brdf.is_isotropic() { 1 } else { FEWEST_OF_LONG_LOBE.min(count) };
-    let of_subpixel = ThreadSettings { count: (count / parts).max(fewest) as usize, ..settings };
-    Some(ThreadSets { pixel: settings, subpixel: of_subpixel })
+    let sets = if settings.kind == ThreadKind::Fitted { set_count(brdf, settings.count, subpixels) } else { 1 };
+    Some(ThreadSettings { sets, ..settings })
 }
 
 /// Asks `round` for all that `scene` names, and for the threads of its materials.
@@ -151,7 +121,7 @@ pub fn prepare_draft(scene: &Scene, before: &Prepared, round: &Round) -> Result<
     let subpixels = scene.image.subpixels;
     let ask = |method, name: &str, brdf: &Keyed<Brdf>, sampling| {
         let Some(settings) = thread_settings(method, brdf, sampling, subpixels) else { return Ok(None) };
-        if let Some(finished) = known_threads(round, brdf, settings)? {
+        if let Some(finished) = round.known(&FitThreads { brdf, settings })? {
             return Ok(Some(finished));
         }
         // Drafts are made for view angles only.
@@ -165,15 +135,17 @@ pub fn prepare_draft(scene: &Scene, before: &Prepared, round: &Round) -> Result<
         is_draft.set(true);
         // While another material is edited, this one's draft serves on.
         let serves_on = shown.brdf.key == brdf.key;
-        let draft = |before| round.ask(&DraftThreads { brdf, before });
-        if serves_on { Ok(Some(threads.clone())) } else { threads.as_ref().try_map(draft).map(Some) }
+        if serves_on {
+            return Ok(Some(threads.clone()));
+        }
+        round.ask(&DraftThreads { brdf, before: threads }).map(Some)
     };
     let prepared = prepare_by(scene, round, &ask)?;
     Ok(is_draft.get().then_some(prepared))
 }
 
 /// Gives the threads of a material by its name in the scene and its BRDF.
-type AskThreads<'a> = dyn Fn(Method, &str, &Keyed<Brdf>, Sampling) -> Result<Option<ThreadSets<Keyed<Threads>>>> + 'a;
+type AskThreads<'a> = dyn Fn(Method, &str, &Keyed<Brdf>, Sampling) -> Result<Option<Keyed<Threads>>> + 'a;
 
 fn prepare_by(scene: &Scene, round: &Round, ask_threads: &AskThreads) -> Result<Prepared> {
     let method = Method::from_name(&scene.shading.method)?;

@@ -163,3 +163,32 @@ fn live_measures_the_drafts_of_a_dragged_parameter() {
         assert!(number("draft_ms") > 0.0 && number("draft_ms") < number("fit_ms"), "{step}");
     }
 }
+
+#[test]
+fn a_hard_case_is_shaded_as_on_the_cpu() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = bench(&folder, "stress --only angles --json rows.json");
+    assert!(text.contains("normals at all angles to the view") && !text.contains("broken"), "{text}");
+    let rows = json(&folder, "rows.json");
+    let methods: Vec<_> = rows.as_array().unwrap().iter().map(|row| row["method"].as_str().unwrap()).collect();
+    assert_eq!(methods, ["fitted", "paper"]);
+    let fields = ["bright", "case", "covered", "method", "most", "not_finite", "rms", "wrongly_shown"];
+    assert_eq!(keys(&rows[0]), fields);
+    assert!(rows[0]["covered"].as_u64() > Some(1000) && rows[0]["rms"].as_f64() < Some(2e-3), "{rows}");
+}
+
+#[test]
+fn coarser_fractions_err_more() {
+    let folder = tempfile::tempdir().unwrap();
+    bench(&folder, "fractions --materials clay --environments studio --counts 2 --size 24x18 --json rows.json");
+    let rows = json(&folder, "rows.json");
+    let rms = |texel: u64, level: u64| {
+        let row = rows
+            .as_array()
+            .unwrap()
+            .iter()
+            .find(|row| row["bits"] == serde_json::json!({"texel": texel, "level": level}));
+        row.expect("a row")["rms"].as_f64().expect("a number")
+    };
+    assert!(rms(8, 8) < rms(4, 4) && rms(4, 4) < 1e-2, "{rows}");
+}

@@ -61,7 +61,7 @@ fn the_fewest_threads_that_are_within_an_error_are_chosen() {
     let (count, error) = [1, 2, 3].into_iter().zip(errors).find(|(_, error)| *error <= most).unwrap();
     let (prepared, expected) = prepare_within(&scene, most, &gpu.device, &gpu.round()).unwrap();
     let threads = prepared.materials[0].threads.as_ref().unwrap();
-    assert_eq!((prepared.sampling.count, threads.pixel.size()[1]), (count, count as usize), "{errors:?}");
+    assert_eq!((prepared.sampling.count, threads.size()[1]), (count, count as usize), "{errors:?}");
     assert!((expected - error).abs() < 1e-9, "{expected}, not {error}");
     gpu.finish();
 }

@@ -3,11 +3,14 @@ mod common;
 use common::{Validated, sphere};
 use std::path::Path;
 use std::sync::Mutex;
+use threadlight::low_level::brdf::Brdf;
 use threadlight::low_level::memo::Memo;
 use threadlight::low_level::pipeline::{DeviceScene, Wanted};
 use threadlight::low_level::prepare::{key_of, prepare};
 use threadlight::low_level::progress::Observer;
-use threadlight::low_level::scene::{Background, Camera, MaterialSource, ObjectSettings, Scene, Source};
+use threadlight::low_level::scene::{
+    Background, Camera, MaterialSettings, MaterialSource, ObjectSettings, Scene, Source,
+};
 
 fn small() -> Scene {
     sphere(MaterialSource::Builtin("clay".into()), "white", 4, (32, 24))
@@ -44,8 +47,8 @@ fn each_change_makes_what_it_needs_and_nothing_else() {
         ("camera", |scene| scene.camera = Some(Camera::framing(glam::DVec3::ZERO, 2.0, 1.0)), &[]),
         ("no background", |scene| scene.image.background = Background::None, &[]),
         ("place of an object", |scene| scene.objects[0].scale = 2.0, &[]),
-        // Fewer threads are left for a sub-pixel of more.
-        ("sub-pixels", |scene| scene.image.subpixels = 1, &["upload of materials", "shaders"]),
+        // They are made in as many sets.
+        ("sub-pixels", |scene| scene.image.subpixels = 1, &["threads", "upload of materials", "shaders"]),
         ("as many threads as there are", |scene| scene.shading.threads = Some(4), &[]),
         ("threads", |scene| scene.shading.threads = Some(2), &["threads", "upload of materials"]),
         (
@@ -188,6 +191,32 @@ fn two_hundred_changes_do_not_grow_memory() {
     }
     drop(renderer);
     assert_eq!(gpu.memo.outputs_in_memory(), 0);
+    gpu.finish();
+}
+
+#[test]
+fn thirty_materials_take_less_than_200_mb_on_the_device() {
+    let gpu = Validated::new();
+    let mut scene = small();
+    (scene.image.width, scene.image.height) = (640, 480);
+    scene.environment.source = Source::Builtin("studio".into());
+    // The library's last ones: most of its models are among them, those that shaders look up in tables too.
+    let names: Vec<_> = Brdf::builtin_names().collect();
+    let names = &names[names.len() - 30..];
+    scene.materials = names
+        .iter()
+        .map(|&name| MaterialSettings { name: name.into(), source: MaterialSource::Builtin(name.into()) })
+        .collect();
+    let object = |(i, name): (usize, &&str)| ObjectSettings {
+        translate: glam::vec3(2.2 * (i % 6) as f32, 2.2 * (i / 6) as f32, 0.0),
+        ..ObjectSettings::new(Source::Builtin("sphere".into()), name)
+    };
+    scene.objects = names.iter().enumerate().map(object).collect();
+    let (renderer, _) = ask(&gpu, &scene);
+    let rendering = renderer.render(Wanted { display: true, ..Wanted::default() }, 1).unwrap();
+    println!("{:.1} MB", 1e-6 * rendering.device_memory_bytes as f64);
+    assert!((1_000_000..200_000_000).contains(&rendering.device_memory_bytes), "{}", rendering.device_memory_bytes);
+    drop(renderer);
     gpu.finish();
 }
 

@@ -14,7 +14,7 @@ use threadlight::low_level::prepare::Prepared;
 use threadlight::low_level::progress::Observer;
 use threadlight::low_level::scene::{MaterialSource, Scene, Source};
 use threadlight::low_level::steps::FitThreads;
-use threadlight::low_level::threads::{ThreadKind, ThreadSets, ThreadSettings};
+use threadlight::low_level::threads::{ThreadKind, ThreadSettings};
 use threadlight::{Error, Result};
 
 fn grey() -> MaterialSource {
@@ -51,7 +51,7 @@ fn sixteen_threads(gpu: &Validated, prepared: &Prepared) -> Result<ReferencePict
     let mut own = ready(&sphere(grey(), "white", 1, (1, 1)));
     (own.view, own.environment, own.show_environment) = (prepared.view.clone(), prepared.environment.clone(), false);
     own.materials[0].brdf = material.brdf.clone();
-    own.materials[0].threads = Some(ThreadSets { pixel: threads.clone(), subpixel: threads });
+    own.materials[0].threads = Some(threads);
     own.sampling.count = 16;
     own.method = Method::Paper;
     let rendering = gpu.render(&own, Wanted { radiance: true, ..Wanted::default() });

@@ -1,6 +1,9 @@
 //! The viewer in a window of a virtual X server, on the test device, with validation.
 #![cfg(all(feature = "viewer", target_os = "linux"))]
+#[path = "common/display.rs"]
+mod display;
 
+use display::Display;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -8,41 +11,6 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 use threadlight::low_level::output::{PictureFile, read_image};
-
-/// A virtual X server, ended when dropped.
-struct Display {
-    server: Child,
-    name: String,
-}
-
-impl Display {
-    /// None, and a word on why, where there is no Xvfb.
-    fn open() -> Option<Self> {
-        let server = Command::new("Xvfb")
-            .args(["-displayfd", "1", "-screen", "0", "1600x1000x24", "-nolisten", "tcp"])
-            .stdout(Stdio::piped())
-            .stderr(Stdio::null())
-            .spawn();
-        let mut server = match server {
-            Ok(server) => server,
-            Err(cause) => {
-                println!("skipped: Xvfb cannot be run ({cause}); ci/setup installs it");
-                return None;
-            }
-        };
-        let mut number = String::new();
-        BufReader::new(server.stdout.take().expect("piped")).read_line(&mut number).expect("Xvfb names its display");
-        assert!(!number.trim().is_empty(), "Xvfb found no display");
-        Some(Self { server, name: format!(":{}", number.trim()) })
-    }
-}
-
-impl Drop for Display {
-    fn drop(&mut self) {
-        let _ = self.server.kill();
-        let _ = self.server.wait();
-    }
-}
 
 /// Held by each viewer: some are timed, and others would take the processor from them.
 static ALONE: Mutex<()> = Mutex::new(());
@@ -345,6 +313,21 @@ fn a_still_window_costs_nothing() {
     println!("in 3 s: {used} ticks of processor time, {drawn} frames");
     // A tick is a hundredth of a second.
     assert!(used <= 2 && drawn == 0, "{used} ticks, {drawn} frames");
+}
+
+#[test]
+fn a_window_goes_through_any_number_of_sizes() {
+    let Some(viewer) = Viewer::new() else { return };
+    let runs = std::env::var("THREADLIGHT_FAULT_RUNS").ok();
+    let count: u32 = runs.map_or(40, |runs| runs.parse().expect("THREADLIGHT_FAULT_RUNS has to be a number"));
+    let sizes =
+        (0..count).map(|step| format!("{{\"resize\": [{}, {}]}}\n", 160 + step * 67 % 190, 240 + step * 41 % 120));
+    let replay = format!("\"wait\"\n{}{{\"resize\": [160, 250]}}\n\"wait\"\n", sizes.collect::<String>());
+    let arguments =
+        ["--threads", "1", "--material", "clay", "--environment", "white", "--frames", "1", "--stats", "s.json"];
+    viewer.play(&[&SMALL[..], &arguments].concat(), &replay).expect_success();
+    let stats: serde_json::Value = serde_json::from_slice(&std::fs::read(viewer.path("s.json")).unwrap()).unwrap();
+    assert_eq!(stats["size"], serde_json::json!([160, 250]));
 }
 
 #[test]

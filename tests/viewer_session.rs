@@ -29,9 +29,9 @@ fn red(viewer: &Viewer) -> f64 {
     std::f64::consts::PI * brdf.evaluate(DVec3::Z, DVec3::Z).x
 }
 
-/// The threads of each material, of pixels and of sub-pixels.
-fn threads_of(prepared: &Prepared) -> Vec<[Threads; 2]> {
-    let of = |material: &PreparedMaterial| material.threads.clone().unwrap().map(|threads| (*threads).clone()).both();
+/// The threads of each material.
+fn threads_of(prepared: &Prepared) -> Vec<Threads> {
+    let of = |material: &PreparedMaterial| (*material.threads.clone().unwrap()).clone();
     prepared.materials.iter().map(of).collect()
 }
 

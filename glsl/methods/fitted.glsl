@@ -1,4 +1,4 @@
-// Fitted threads: sum over k of w_k (environment blurred by kernel k)(d_k), plus the cosine part's irradiance. Directions, widths and
+// Fitted threads: sum over k of w_k (environment blurred by kernel k)(d_k), plus the irradiance times what they leave of the albedo. Directions, widths and
 // weights were fitted to f(w_i, w_o) (n . w_i), so no BRDF is left to evaluate.
 //
 // Few threads fit tails of lobes worst, and under small bright sources tails matter most. So the blurred environment is without
@@ -25,7 +25,7 @@ struct Lobe {
 // How far `direction` is from the middle of the lobe, in radians: of a long one measured across it, with what is along it shortened by as
 // much as the lobe is long.
 float away_from(Lobe lobe, Surface surface, Material material, vec3 direction) {
-    if (HAS_TANGENTS == 0 || material.azimuth_count == 1) {
+    if (HAS_TANGENTS == 0 || material.threads.azimuth_count == 1) {
         return distance(direction, lobe.mirror);
     }
     // Opposite directions have no half vector; 1e-6 is far below any other sum of two above the horizon.
@@ -133,15 +133,15 @@ struct Rows {
 };
 
 // Rows stand at multiples of 90 degrees / row_count; beyond the last one it holds.
-Rows rows_at(Surface surface, Material material, ThreadSet set) {
-    float row = min(surface.theta_o * (float(set.row_count) / radians(90.0)), float(set.row_count - 1));
-    uint below = set.first + uint(row) * words_a_row(set);
-    uint above = below + (uint(row) + 1 < set.row_count ? words_a_row(set) : 0);
+Rows rows_at(Surface surface, ThreadTable table) {
+    float row = min(surface.theta_o * (float(table.row_count) / radians(90.0)), float(table.row_count - 1));
+    uint below = table.first + uint(row) * words_a_row(table);
+    uint above = below + (uint(row) + 1 < table.row_count ? words_a_row(table) : 0);
     Rows rows = Rows(below, above, fract(row), 0, 0.0, 1.0);
-    if (HAS_TANGENTS != 0 && material.azimuth_count > 1) {
-        vec2 folded = fold_azimuth(surface.phi_o, material.azimuth_count);
-        uint before = min(uint(folded.x), material.azimuth_count - 2);
-        rows.next_azimuth = set.row_count * words_a_row(set);
+    if (HAS_TANGENTS != 0 && table.azimuth_count > 1) {
+        vec2 folded = fold_azimuth(surface.phi_o, table.azimuth_count);
+        uint before = min(uint(folded.x), table.azimuth_count - 2);
+        rows.next_azimuth = table.row_count * words_a_row(table);
         rows.below += before * rows.next_azimuth;
         rows.above += before * rows.next_azimuth;
         rows.towards_next = folded.x - float(before);
@@ -168,44 +168,45 @@ Kernel kernel_at(Rows rows, uint k, Surface surface) {
     return kernel;
 }
 
-vec3 cosine_part_at(Rows rows) {
-    vec3 weight = mix(unpack_cosine_part(rows.below), unpack_cosine_part(rows.above), rows.t);
+vec3 albedo_at(Rows rows) {
+    vec3 albedo = mix(unpack_albedo(rows.below), unpack_albedo(rows.above), rows.t);
     if (HAS_TANGENTS != 0 && rows.next_azimuth != 0) {
         uint next = rows.next_azimuth;
-        vec3 of_next = mix(unpack_cosine_part(rows.below + next), unpack_cosine_part(rows.above + next), rows.t);
-        weight = mix(weight, of_next, rows.towards_next);
+        vec3 of_next = mix(unpack_albedo(rows.below + next), unpack_albedo(rows.above + next), rows.t);
+        albedo = mix(albedo, of_next, rows.towards_next);
     }
-    return weight;
+    return albedo;
 }
 
 // Three loops, not one with three branches: where a driver masks lanes out, each pays for what none of its lanes does. For the same reason
 // tests are at the ends of loops.
-vec3 estimate(Surface surface, Material material, ThreadSet set) {
-    Rows rows = rows_at(surface, material, set);
-    vec3 cosine_part = cosine_part_at(rows);
-    ++lookups;
-    vec3 sum = cosine_part * textureLod(irradiance_map, surface.frame[2], 0.0).rgb;
-    uint k = set.sharp_count;
-    if (k < set.count) {
+vec3 estimate(Surface surface, Material material, uint first, uint stride) {
+    ThreadTable table = material.threads;
+    Rows rows = rows_at(surface, table);
+    vec3 weights = vec3(0.0);
+    vec3 sum = vec3(0.0);
+    uint k = first + (table.sharp_count + stride - 1 - first) / stride * stride;
+    if (k < table.count) {
         do {
             Kernel kernel = kernel_at(rows, k, surface);
+            weights += kernel.weight;
             sum += kernel.weight * blurred_radiance(kernel.direction, kernel.level);
-        } while (++k < set.count);
+        } while ((k += stride) < table.count);
     }
+    AtSources at = AtSources(vec3(0.0), vec3(0.0));
     float of_kernels = 0.0;
     if (HAS_SOURCES != 0) {
         Lobe lobe = lobe_of(surface, material);
-        AtSources at = at_sources(surface, material, lobe);
+        at = at_sources(surface, material, lobe);
         if (HAS_MIRRORED_SOURCES != 0) {
             of_kernels = 1.0 - share_of_brdf(lobe, surface, material, 0.0);
         }
-        // The irradiance map has no sources.
-        sum += mix(at.f_cos, at.cosine * cosine_part / radians(180.0), of_kernels);
     }
-    k = 0;
-    if (HAS_SHARP_KERNELS != 0 && k < set.sharp_count) {
+    k = first;
+    if (HAS_SHARP_KERNELS != 0 && k < table.sharp_count) {
         do {
             Kernel kernel = kernel_at(rows, k, surface);
+            weights += kernel.weight;
             float sharp = sharp_part(kernel.level);
             if (sharp > 0.0) {
                 sum += kernel.weight * sharp * sharp_radiance(kernel.direction, of_kernels);
@@ -213,17 +214,25 @@ vec3 estimate(Surface surface, Material material, ThreadSet set) {
             if (sharp < 1.0) {
                 sum += kernel.weight * (1.0 - sharp) * blurred_radiance(kernel.direction, kernel.level);
             }
-        } while (++k < set.sharp_count);
+        } while ((k += stride) < table.sharp_count);
     }
-    k = 0;
-    if (HAS_MIRRORED_SOURCES != 0 && of_kernels > 0.0 && set.count > 0) {
+    k = first;
+    if (HAS_MIRRORED_SOURCES != 0 && of_kernels > 0.0 && k < table.count) {
         do {
             Kernel kernel = kernel_at(rows, k, surface);
             float blurred = HAS_SHARP_KERNELS != 0 ? 1.0 - sharp_part(kernel.level) : 1.0;
             if (blurred > 0.0) {
                 sum += kernel.weight * blurred * of_kernels * blurred_sources(kernel.direction, kernel.level);
             }
-        } while (++k < set.count);
+        } while ((k += stride) < table.count);
+    }
+    vec3 cosine_part = albedo_at(rows) - float(stride) * weights;
+    ++lookups;
+    vec3 irradiance = textureLod(irradiance_map, surface.frame[2], 0.0).rgb;
+    sum = float(stride) * sum + cosine_part * irradiance;
+    if (HAS_SOURCES != 0) {
+        // The irradiance map has no sources.
+        sum += mix(at.f_cos, at.cosine * cosine_part / radians(180.0), of_kernels);
     }
     return max(sum, vec3(0.0));
 }

@@ -26,7 +26,7 @@ vec3 split_sum_albedo(uint first) {
     return vec3(split_sums[first], split_sums[first + 1], split_sums[first + 2]);
 }
 
-vec3 estimate(Surface surface, Material material, ThreadSet set) {
+vec3 estimate(Surface surface, Material material, uint first, uint stride) {
     float row = min(surface.theta_o * (float(SPLIT_SUM_ROWS) / radians(90.0)), float(SPLIT_SUM_ROWS - 1));
     uint below = material.first_slice + 1 + 6 * uint(row);
     uint above = material.first_slice + 1 + 6 * min(uint(row) + 1, SPLIT_SUM_ROWS - 1);

@@ -1,7 +1,7 @@
 // Fitted threads as the GPU holds them. Twin of the layout: src/threads/fitted/table.rs.
 #include "packing.glsl"
 
-// Azimuth by azimuth of the view, and row by row of theta_o: the weight of the cosine kernel as three floats, then thread by thread three words: direction
+// Azimuth by azimuth of the view, and row by row of theta_o: the albedo as three floats, then thread by thread three words: direction
 // (octahedral, 2 x 16 bits), level and red weight, green and blue weight (half floats).
 layout(set = 0, binding = 7, std430) readonly buffer Threads {
     uint threads[];
@@ -13,8 +13,8 @@ struct Kernel {
     vec3 weight;
 };
 
-uint words_a_row(ThreadSet set) {
-    return 3 * (set.count + 1);
+uint words_a_row(ThreadTable table) {
+    return 3 * (table.count + 1);
 }
 
 // Thread k of the row that starts at `row`.
@@ -25,7 +25,7 @@ Kernel unpack_kernel(uint row, uint k) {
     return Kernel(octahedral_decode(unpackSnorm2x16(threads[at])), level_red.x, vec3(level_red.y, green_blue));
 }
 
-vec3 unpack_cosine_part(uint row) {
+vec3 unpack_albedo(uint row) {
     return vec3(uintBitsToFloat(threads[row]), uintBitsToFloat(threads[row + 1]), uintBitsToFloat(threads[row + 2]));
 }
 

@@ -15,11 +15,12 @@ macro_rules! materials {
 
 materials! {
     "metals": "gold" "silver" "copper" "aluminium" "chrome" "tungsten" "titanium-nitride" "nickel" "sandblasted-aluminium"
-        "ground-chromium" "brushed-aluminium" "brushed-steel";
+        "ground-chromium" "brushed-aluminium" "brushed-steel" "anodised-aluminium" "lacquered-copper";
     "plastics": "red-plastic" "blue-plastic" "white-plastic" "billiard-ball";
-    "paints": "flat-white-paint" "grey-primer" "green-enamel" "red-car-paint" "blue-flake-paint" "varnished-oak";
+    "paints": "flat-white-paint" "grey-primer" "green-enamel" "red-car-paint" "blue-flake-paint" "bronze-flake-paint"
+        "varnished-oak" "lacquered-walnut";
     "fabrics": "linen" "satin" "silk" "blue-velvet" "reflective-tape";
-    "ceramics": "clay" "terracotta" "porcelain";
+    "ceramics": "clay" "terracotta" "wet-terracotta" "celadon" "porcelain";
     "others": "skin" "black-rubber" "eraser" "moon-dust";
 }
 

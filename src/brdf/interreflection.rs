@@ -15,7 +15,7 @@ use glam::{DVec2, DVec3, dvec3};
 use rayon::prelude::*;
 
 use super::coat::{Coat, Interface, at_cosine};
-use super::{Brdf, half_vector_width, lobe_radius};
+use super::{Brdf, Lambert, half_vector_width, lobe_radius};
 
 /// Angles to the normal of light that comes from outside, at cosines (i / (n - 1))^2 there.
 const OPEN: usize = 40;
@@ -54,6 +54,37 @@ impl Interreflection {
     }
 
     pub fn new(base: &Brdf, coat: &Coat, interface: &Interface) -> Self {
+        match base {
+            Brdf::Lambert(Lambert { reflectance }) => Self::over_diffuse(*reflectance, coat, interface),
+            _ => Self::over_any(base, coat, interface),
+        }
+    }
+
+    /// What a diffuse base sends up forgets where it came from. With r the share of it that the coat sends back, all that leaves is 1 / (1 -
+    /// reflectance r) times what leaves at once, and evenly as that does (Saunderson 1942).
+    fn over_diffuse(reflectance: DVec3, coat: &Coat, interface: &Interface) -> Self {
+        const STEPS: usize = 512;
+        let mean = |of: &dyn Fn(f64) -> DVec3| -> DVec3 {
+            (0..STEPS).map(|i| of((i as f64 + 0.5) / STEPS as f64)).sum::<DVec3>() / STEPS as f64
+        };
+        let left = |cos_inside: f64| coat.left_after(cos_inside) * coat.left_after(cos_inside);
+        // The integral of 2 cos dcos: within over what is reflected totally, and over the cosines c = t^2 outside, by 2 c dc / n^2, where T is known.
+        let critical = coat.critical_cos();
+        let trapped = mean(&|t| left(critical * t) * (2.0 * critical * critical * t));
+        let open = mean(&|t| {
+            left(coat.cos_inside(t * t))
+                * ((1.0 - interface.transmittance(t * t)) * 4.0 * t * t * t / (coat.ior * coat.ior))
+        });
+        let back = reflectance * (trapped + open);
+        let factor = (back / (DVec3::ONE - back)).map(f64::sqrt);
+        let lobe = |i: usize| {
+            let cos_outside = Angles::open_cos(i);
+            factor * coat.left_after(coat.cos_inside(cos_outside)) * interface.transmittance(cos_outside)
+        };
+        Self { lobe: (0..OPEN).map(lobe).collect(), haze: vec![DVec3::ZERO; OPEN] }
+    }
+
+    fn over_any(base: &Brdf, coat: &Coat, interface: &Interface) -> Self {
         let angles = Angles::new(coat);
         let width = half_vector_width(base).min(lobe_radius(base));
         let shares: Vec<Shares> = (0..angles.count())
@@ -264,4 +295,35 @@ fn geometric_series(b: &Matrix) -> Matrix {
         power = product(&power, &power);
     }
     sum
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn over_a_diffuse_base_the_closed_form_is_the_sum_over_all_angles() {
+        for (reflectance, ior, alpha, absorption) in
+            [(1.0, 1.5, 0.05, 0.0), (0.6, 2.5, 0.4, 0.0), (0.8, 1.33, 1.0, 1.0)]
+        {
+            let coat = Coat { alpha, ior, thickness_mm: 0.3, absorption: DVec3::splat(absorption) };
+            let interface = coat.interface();
+            let lambert = format!("reflectance = {reflectance}");
+            let base = Brdf::from_parameters("lambert", lambert.parse().unwrap()).unwrap();
+            let [closed, summed] =
+                [Interreflection::new(&base, &coat, &interface), Interreflection::over_any(&base, &coat, &interface)];
+            for cos_theta in [0.05, 0.3, 0.7, 1.0] {
+                let energy = |found: &Interreflection| {
+                    // By what each adds to f of white light, of which the sum counts 0.5 % less.
+                    let haze = found.haze(cos_theta).x * found.haze(0.5).x * PI / reflectance;
+                    found.lobe(cos_theta).x * found.lobe(0.5).x + haze
+                };
+                let (closed, summed) = (energy(&closed), energy(&summed));
+                assert!(
+                    (summed / closed - 1.0).abs() < 0.02,
+                    "{ior} {alpha} at {cos_theta}: {closed}, summed {summed}"
+                );
+            }
+        }
+    }
 }

@@ -37,7 +37,7 @@ pub use lobe::{LobeAxes, MIN_COS_THETA_D, half_vector_width, lobe_axes, lobe_rad
 pub use merl_export::merl_bytes;
 pub use microfacet::{Distribution, fresnel_conductor, fresnel_dielectric};
 pub use parameters::{Domain, Parameter, Parameters, Spacing, as_number, channels, parameter, set_parameter};
-pub use record::{MaterialRecord, ThreadSetRecord};
+pub use record::{MaterialRecord, ThreadTableRecord};
 pub use roughness::{Axes, Roughness};
 pub use seen::SeenBrdf;
 pub use symmetry::Symmetry;

@@ -1,18 +1,22 @@
 //! A material as shaders have it. Twin of the layout: glsl/material.glsl.
 use super::{Brdf, LobeAxes, Tabulated, half_vector_width, lobe_axes};
 
-/// `ThreadSet` in glsl/material.glsl.
+/// `ThreadTable` in glsl/material.glsl.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
-pub struct ThreadSetRecord {
+pub struct ThreadTableRecord {
     /// Where its threads start in the buffer of threads, in elements of that.
     pub first: u32,
     /// Number of its threads.
     pub count: u32,
     /// Number of their view angles.
     pub row_count: u32,
-    /// How many of its threads, the first ones, are sharper than the environment's pyramid in some row.
+    /// How many of its threads, up to the last one that is, are sharper than the environment's pyramid in some row.
     pub sharp_count: u32,
+    /// Number of sets of its threads, each of which does alone: thread k is of set k % `set_count`.
+    pub set_count: u32,
+    /// Azimuths of the view for which there are rows: 1 of an isotropic BRDF.
+    pub azimuth_count: u32,
 }
 
 /// `Material` in glsl/material.glsl.
@@ -27,18 +31,12 @@ pub struct MaterialRecord {
     pub first_slice: u32,
     /// [`half_vector_width`].
     pub lobe_width: f32,
-    /// Its threads.
-    pub threads: ThreadSetRecord,
-    /// Those of a sub-pixel that does not share a sum with the others.
-    pub subpixel_threads: ThreadSetRecord,
-    /// Azimuths of the view for which there are rows of threads: 1 of an isotropic BRDF.
-    pub azimuth_count: u32,
+    /// The lobe's width across its long axis over the one along it: 1 of an isotropic BRDF.
+    pub narrowness: f32,
     /// The direction of the lobe's long axis in the tangent plane: [`LobeAxes::wide_azimuth`](super::LobeAxes).
     pub long_axis: [f32; 2],
-    /// The lobe's width across that axis over the one along it: 1 of an isotropic BRDF.
-    pub narrowness: f32,
-    /// The size of a structure in the buffer is a multiple of 16 bytes.
-    pub padding: u32,
+    /// Its threads.
+    pub threads: ThreadTableRecord,
 }
 
 impl MaterialRecord {
@@ -50,12 +48,9 @@ impl MaterialRecord {
             model: brdf.model_index(),
             first_slice: 0,
             lobe_width: half_vector_width(brdf) as f32,
-            threads: ThreadSetRecord::default(),
-            subpixel_threads: ThreadSetRecord::default(),
-            azimuth_count: 1,
-            long_axis: wide_azimuth.as_vec2().to_array(),
             narrowness: (narrow_rad / wide_rad) as f32,
-            padding: 0,
+            long_axis: wide_azimuth.as_vec2().to_array(),
+            threads: ThreadTableRecord { set_count: 1, azimuth_count: 1, ..ThreadTableRecord::default() },
         }
     }
 

@@ -15,7 +15,7 @@ mod threads;
 mod view;
 
 use clap::{Parser, Subcommand};
-use std::io::IsTerminal;
+use std::io::{IsTerminal, Write};
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
@@ -81,6 +81,11 @@ pub fn mistake(error: &clap::Error) -> String {
     lines.collect::<Vec<_>>().join("; ") + "; see --help"
 }
 
+/// Says something on standard error. Where nobody listens any more, nothing is said, and the work goes on.
+pub fn say(line: std::fmt::Arguments) {
+    let _ = writeln!(std::io::stderr(), "{line}");
+}
+
 /// Sends the library's log to standard error; RUST_LOG overrides the flag.
 pub fn start_logging(verbose: u8) {
     let level = ["warn,winit=error", "threadlight=info", "threadlight=debug"][usize::from(verbose.min(2))];
@@ -88,6 +93,8 @@ pub fn start_logging(verbose: u8) {
     tracing_subscriber::fmt()
         .with_env_filter(filter)
         .with_writer(std::io::stderr)
+        // It would tell of them on standard error, and end the program where that is what fails.
+        .log_internal_errors(false)
         .with_ansi(std::io::stderr().is_terminal())
         .without_time()
         .with_target(false)

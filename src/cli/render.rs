@@ -1,8 +1,8 @@
 //! `threadlight render`: a picture of a scene.
-use super::number;
 use super::progress::TerminalProgress;
 use super::rendered::{ReferenceStats, Rendered, Stats};
 use super::scene_flags::{MachineFlags, SceneFlags};
+use super::{number, say};
 use anyhow::Context;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::value_parser;
@@ -138,7 +138,7 @@ impl Render {
             None => (prepare(scene, &round)?, None),
         };
         if let Some(rms) = expected_rms {
-            eprintln!("{} threads or samples: expected RMS {rms:.1e}", prepared.sampling.count);
+            say(format_args!("{} threads or samples: expected RMS {rms:.1e}", prepared.sampling.count));
         }
         let (rendering, reference) = if prepared.method == Method::Reference {
             let processor = self.reference_on.unwrap_or_default();

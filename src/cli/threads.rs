@@ -1,13 +1,14 @@
 //! `threadlight threads`: makes, writes and draws the sample threads of a material.
 use super::progress::TerminalProgress;
-use super::{cache_folder, nameable, stem};
+use super::{cache_folder, nameable, say, stem};
 use std::path::PathBuf;
 use threadlight::Error;
 use threadlight::low_level::memo::{Asked, Memo, Origin, Step};
 use threadlight::low_level::method::Method;
 use threadlight::low_level::output;
-use threadlight::low_level::scene::MaterialSource;
+use threadlight::low_level::scene::{ImageSettings, MaterialSource};
 use threadlight::low_level::steps::{FitThreads, LoadMaterial};
+use threadlight::low_level::threads::fitted::set_count;
 use threadlight::low_level::threads::{self, ThreadKind, ThreadSettings};
 
 const EXAMPLES: &str = "\
@@ -63,28 +64,33 @@ impl Threads {
             MaterialSource::File(path) => stem(path),
             _ => self.material.clone(),
         };
-        let settings = ThreadSettings { kind, count, seed: self.seed, ..Default::default() };
         let progress = TerminalProgress::new("threads")?;
         let memo = Memo::new(cache_folder(self.no_cache).as_deref());
         let round = memo.round(&progress);
         let brdf = round.ask(&LoadMaterial(&source))?;
+        let sets = match kind {
+            // Those that pictures are rendered by if nothing else is asked for.
+            ThreadKind::Fitted => set_count(&brdf, count, ImageSettings::default().subpixels),
+            ThreadKind::Paper => 1,
+        };
+        let settings = ThreadSettings { kind, count, sets, seed: self.seed, ..Default::default() };
         let threads = round.ask(&FitThreads { brdf: &brdf, settings })?;
         progress.finish();
         let Asked { origin, time, .. } = round.asked(FitThreads::NAME)[0];
         let threads = (*threads).clone().of_material(&name);
         let [rows, count] = threads.size();
         let how = if origin == Origin::Disk { "read from the cache" } else { "made" };
-        eprintln!("{count} threads x {rows} rows {how} in {:.2} s", time.as_secs_f64());
+        say(format_args!("{count} threads x {rows} rows {how} in {:.2} s", time.as_secs_f64()));
         if let threads::Threads::Fitted(table) = &threads {
             let percent = |error: f32| 100.0 * error;
             let [least, most] = [f32::min, f32::max].map(|of| table.relative_error.iter().copied().fold(f32::NAN, of));
             let mean = table.mean_relative_error();
-            eprintln!(
+            say(format_args!(
                 "expected error: {:.2} % of radiance, under lights of all sizes ({:.2} to {:.2} % by row)",
                 percent(mean),
                 percent(least),
                 percent(most)
-            );
+            ));
         }
         if let Some(path) = &self.output {
             threads::write(&threads, path)?;

@@ -21,7 +21,7 @@ pub use ggx_pyramid::{FINEST_ALPHA, ggx_pyramid, level_of_alpha};
 pub use irradiance::irradiance_map;
 pub use light_map::{Alias, LightMap};
 pub use procedural::builtin_names;
-pub use pyramid::Pyramid;
+pub use pyramid::{FractionBits, Pyramid};
 pub use sources::{LightSource, MAX_SOURCES, SmallSources, SourceRecord};
 pub use vmf_pyramid::{BlurKernel, BlurStep, VmfPyramid};
 

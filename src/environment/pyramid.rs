@@ -23,6 +23,30 @@ const DIM: f64 = 1.0 / 64.0;
 /// Of a scale that single precision holds, and its inverse.
 const LEAST_EXPONENT: f64 = -120.0;
 
+/// In how many bits a device has the fractions by which a lookup blends texels and levels: at least 4 (Vulkan's `subTexelPrecisionBits` and
+/// `mipmapPrecisionBits`), as a rule 8.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+pub struct FractionBits {
+    /// Between texels, along each axis.
+    pub texel: u32,
+    /// Between levels.
+    pub level: u32,
+}
+
+impl FractionBits {
+    /// All that there are.
+    pub const ALL: Self = Self { texel: f64::MANTISSA_DIGITS, level: f64::MANTISSA_DIGITS };
+}
+
+/// The nearest of 2^`bits` steps.
+fn rounded(fraction: f64, bits: u32) -> f64 {
+    if bits >= f64::MANTISSA_DIGITS {
+        return fraction;
+    }
+    let steps = f64::from(1_u32 << bits);
+    (fraction * steps).round() / steps
+}
+
 /// A cube map with all its levels, each half the size of the one before, down to one texel a face.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pyramid {
@@ -63,14 +87,19 @@ impl Pyramid {
     /// The CPU twin of a seamless trilinear cube map fetch: bilinear in each of the two nearest levels, across the edges of
     /// faces too (the average of the three texels at a corner), and linear between the levels. `level` is clamped.
     pub fn lookup(&self, direction: Vec3, level: f32) -> Vec3 {
+        self.lookup_by(direction, level, FractionBits::ALL)
+    }
+
+    /// The same by fractions of so many bits.
+    pub fn lookup_by(&self, direction: Vec3, level: f32, bits: FractionBits) -> Vec3 {
         let direction = direction.as_dvec3();
         let level = f64::from(level).clamp(0.0, (self.levels.len() - 1) as f64);
-        let (finer, fraction) = (level as usize, level.fract());
-        let radiance = self.lookup_level(direction, finer);
+        let (finer, fraction) = (level as usize, rounded(level.fract(), bits.level));
+        let radiance = self.lookup_level(direction, finer, bits.texel);
         if fraction == 0.0 {
             return radiance.as_vec3();
         }
-        radiance.lerp(self.lookup_level(direction, finer + 1), fraction).as_vec3()
+        radiance.lerp(self.lookup_level(direction, finer + 1, bits.texel), fraction).as_vec3()
     }
 
     /// The level whose texels around the unit `direction` have `solid_angle` (sr), clamped to those that there are.
@@ -109,8 +138,8 @@ impl Pyramid {
         self.levels[level].par_iter().map(|&[r, g, b]| [r / scale, g / scale, b / scale, 1.0]).collect()
     }
 
-    /// Bilinear in one level.
-    fn lookup_level(&self, direction: DVec3, level: usize) -> DVec3 {
+    /// Bilinear in one level, by fractions of so many bits.
+    fn lookup_level(&self, direction: DVec3, level: usize, bits: u32) -> DVec3 {
         let size = self.size_of(level);
         let (face, s, t) = face_of(direction);
         let (x, y) = (s * size as f64 - 0.5, t * size as f64 - 0.5);
@@ -120,7 +149,8 @@ impl Pyramid {
         // Beyond the corner of the cube there is no texel: the average of the other three stands for it.
         let corner = taps.iter().flatten().sum::<DVec3>() / 3.0;
         let [top_left, top_right, bottom_left, bottom_right] = taps.map(|tap| tap.unwrap_or(corner));
-        top_left.lerp(top_right, x - left).lerp(bottom_left.lerp(bottom_right, x - left), y - top)
+        let [right, down] = [x - left, y - top].map(|fraction| rounded(fraction, bits));
+        top_left.lerp(top_right, right).lerp(bottom_left.lerp(bottom_right, right), down)
     }
 
     /// The texel at whole coordinates that may lie one beyond the face; none beyond its corner.

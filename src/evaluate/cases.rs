@@ -11,7 +11,7 @@ use crate::prepare::{Prepared, PreparedMaterial, ask_threads, prepare};
 use crate::progress::{Observer, OnlyCancels};
 use crate::scene::{Background, MaterialSettings, MaterialSource, Scene, Source};
 use crate::steps::{LoadEnvironment, LoadMaterial};
-use crate::threads::{ThreadSets, Threads};
+use crate::threads::Threads;
 use crate::vulkan::Device;
 
 /// A method with its number of threads, or of samples.
@@ -151,7 +151,7 @@ pub struct Place<'a> {
     pub memo: &'a Memo,
     cases: &'a Cases,
     /// The threads made for the material so far.
-    tables: &'a mut Vec<ThreadSets<Keyed<Threads>>>,
+    tables: &'a mut Vec<Keyed<Threads>>,
     /// The last renderer in the environment: what the next one has in common with it is filtered, uploaded and compiled once.
     renderer: &'a mut Option<DeviceScene>,
     observer: &'a dyn Observer,

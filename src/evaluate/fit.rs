@@ -6,9 +6,9 @@ use crate::error::{Error, Result};
 use crate::memo::Memo;
 use crate::pipeline::median;
 use crate::progress::{Observer, OnlyCancels};
-use crate::scene::MaterialSource;
+use crate::scene::{ImageSettings, MaterialSource};
 use crate::steps::LoadMaterial;
-use crate::threads::fitted::{generate, validation_error};
+use crate::threads::fitted::{generate, set_count, validation_error};
 use crate::threads::{ThreadKind, ThreadSettings};
 
 /// What to fit, and how often.
@@ -48,8 +48,9 @@ pub fn run(fits: &Fits, memo: &Memo, observer: &dyn Observer, found: &mut Vec<Ti
     for (material, source) in &fits.materials {
         let brdf = memo.round(observer).ask(&LoadMaterial(source))?;
         for &threads in &fits.counts {
-            let settings =
-                ThreadSettings { kind: ThreadKind::Fitted, count: threads as usize, ..ThreadSettings::default() };
+            let count = threads as usize;
+            let sets = set_count(&brdf, count, ImageSettings::default().subpixels);
+            let settings = ThreadSettings { kind: ThreadKind::Fitted, count, sets, ..ThreadSettings::default() };
             let mut times_ms = Vec::new();
             let table = loop {
                 let start = Instant::now();

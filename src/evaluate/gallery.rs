@@ -7,6 +7,7 @@ use super::cases::{Cases, Estimator};
 use super::sheet::{Sheet, Tile};
 use super::sweep::Measured;
 use super::tables::in_order;
+use crate::brdf::Brdf;
 use crate::error::{Error, Result};
 use crate::memo::Memo;
 use crate::pipeline::Wanted;
@@ -16,7 +17,7 @@ use crate::vulkan::Device;
 /// A picture and what it is of: good as the name of its file, without extension.
 pub type Named = (String, RgbImage);
 
-/// All materials of `cases`, each with its name, in front of the environment: a sheet for each environment and scene, called
+/// All materials of `cases`, each with its name, in front of the environment, built-in ones by family: a sheet for each environment and scene, called
 /// `materials` if it is the only one. Methods and counts of `cases` are not looked at.
 ///
 /// # Errors
@@ -50,11 +51,34 @@ pub fn material_sheets(
     let sheets = in_order(tiles.iter().map(|(of, _)| of.clone()));
     let sheet = |of: &String| {
         let tiles: Vec<_> = tiles.iter().filter(|(its, _)| its == of).map(|(_, tile)| tile.clone()).collect();
-        let columns = (tiles.len() as f64).sqrt().ceil() as usize;
         let name = if sheets.len() == 1 { "materials".to_owned() } else { format!("materials_{of}") };
-        (name, Sheet::of(tiles, columns).draw())
+        (name, by_family(tiles).draw())
     };
     Ok(sheets.iter().map(sheet).collect())
+}
+
+/// Built-in materials family by family, then the others: rows that begin with the name of the family. If all are of one, a square.
+fn by_family(tiles: Vec<Tile>) -> Sheet {
+    const COLUMNS: usize = 6;
+    let families: Vec<_> = Brdf::builtin_families().collect();
+    let family_of = |tile: &Tile| {
+        let family = families.iter().position(|(_, names)| names.contains(&tile.caption.as_str()));
+        family.unwrap_or(families.len())
+    };
+    let mut groups = vec![Vec::new(); families.len() + 1];
+    let columns = (tiles.len() as f64).sqrt().ceil() as usize;
+    tiles.into_iter().for_each(|tile| groups[family_of(&tile)].push(tile));
+    let labels = families.iter().map(|(family, _)| *family).chain(["files"]);
+    let mut labelled: Vec<_> = labels.zip(groups).filter(|(_, group)| !group.is_empty()).collect();
+    if labelled.len() < 2 {
+        return Sheet::of(labelled.pop().map(|(_, group)| group).unwrap_or_default(), columns);
+    }
+    let rows = labelled.into_iter().flat_map(|(label, group)| {
+        let mut rows = Sheet::of(group, COLUMNS).rows;
+        rows[0].0 = label.to_owned();
+        rows
+    });
+    Sheet { headings: Vec::new(), rows: rows.collect() }
 }
 
 /// For each place in `measured`, whose pictures were kept, a row for each method and a column for each count, with RMS below
@@ -86,4 +110,26 @@ pub fn comparison_sheets(measured: &Measured) -> Vec<Named> {
         (place.join("_"), Sheet { headings, rows }.draw())
     };
     measured.references.iter().map(sheet).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn materials_are_in_rows_of_their_families_and_few_kinds_in_a_square() {
+        let tiles = |names: &[&str]| -> Vec<Tile> {
+            let tile = |name: &&str| Tile { picture: RgbImage::new(4, 3), caption: (*name).to_owned() };
+            names.iter().map(tile).collect()
+        };
+        let metals: Vec<_> = Brdf::builtin_families().find(|(family, _)| *family == "metals").unwrap().1;
+        let all = [&["clay", "own-file"][..], &metals[..7]].concat();
+        let sheet = by_family(tiles(&all));
+        let rows: Vec<_> = sheet.rows.iter().map(|(label, cells)| (label.as_str(), cells.len())).collect();
+        assert_eq!(rows, [("metals", 6), ("", 1), ("ceramics", 1), ("files", 1)]);
+        let square = by_family(tiles(&metals[..4]));
+        assert!(
+            square.rows.len() == 2 && square.rows.iter().all(|(label, cells)| label.is_empty() && cells.len() == 2)
+        );
+    }
 }

@@ -11,9 +11,10 @@
 //! | time of a frame beside its floor, and as things double: table 1 | [`speed`] |
 //! | what threads cost to make, beside what they are worth | [`fit`] |
 //! | what drafts of threads are worth while a parameter is dragged | [`live`] |
+//! | what a device's lookups by coarse fractions cost | [`fractions`] |
 //! | whether hard cases are shaded as on the CPU | [`stress`] |
 //! | what a measured material is in words of a model | [`material_fit`] |
-//! | what a material is by itself, drawn | [`material_plot`] |
+//! | what a material is by itself: curves and image, and these drawn | [`material_curves`], [`material_plot`] |
 //! | pictures side by side: figures 10, 11 and 13 | [`gallery`] |
 //! | how it looks | [`tables`], [`plots`], [`sheet`] |
 //! | all of it on one page | [`report`](mod@report) |
@@ -22,8 +23,10 @@ pub mod cases;
 pub mod difference;
 pub mod expected;
 pub mod fit;
+pub mod fractions;
 pub mod gallery;
 pub mod live;
+pub mod material_curves;
 pub mod material_fit;
 pub mod material_plot;
 pub mod metrics;

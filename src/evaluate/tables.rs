@@ -40,8 +40,10 @@ impl fmt::Display for Table {
             let cells = self.rows.iter().filter_map(|(_, cells)| cells.get(index));
             cells.chain(self.head.get(index)).map(|cell| cell.chars().count() + 2).max().unwrap_or(0).max(10)
         };
+        let labels = self.rows.iter().map(|(label, _)| label.chars().count());
+        let longest = labels.max().unwrap_or(0).max(14);
         let mut line = |label: &str, cells: &[String]| {
-            write!(f, "  {label:<14}")?;
+            write!(f, "  {label:<longest$}")?;
             cells.iter().enumerate().try_for_each(|(index, cell)| write!(f, "{cell:>0$}", width(index)))?;
             writeln!(f)
         };

@@ -1,5 +1,4 @@
 //! Pictures on the disk: PNG for looking, EXR for measuring; written whole or not at all, and read back.
-use std::io::Write;
 use std::path::Path;
 
 use crate::error::{Error, Result};
@@ -7,10 +6,13 @@ use crate::file_format;
 
 mod exr_file;
 mod png_file;
+mod whole_file;
 
 pub(crate) use exr_file::parse_exr;
 pub use exr_file::{ExrHeader, write_exr};
 pub use png_file::write_png;
+pub(crate) use whole_file::make_way;
+pub use whole_file::{check_writable, write_whole};
 
 /// The file formats of a picture, told apart by the extension of the file's name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -89,45 +91,6 @@ pub(crate) fn check_pixels(
         }
     }
     Ok(())
-}
-
-/// Says at once whether a file could be written to `path`, so that a long rendering does not end in an error.
-pub fn check_writable(path: &Path) -> Result<()> {
-    if path.is_dir() {
-        return Err(Error::unwritable(path, "it is a folder"));
-    }
-    temporary_beside(path).map(drop)
-}
-
-/// Writes `bytes` to `path`: into a temporary file in the same folder first, then renamed, so that whoever looks sees
-/// the old file or the whole new one, and a failure leaves nothing behind.
-pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
-    let mut file = temporary_beside(path)?;
-    file.write_all(bytes).map_err(|cause| Error::unwritable(path, cause))?;
-    file.persist(path).map_err(|failed| Error::unwritable(path, failed.error))?;
-    Ok(())
-}
-
-/// Removes an empty folder from where a file of a cache is to be: [`write_whole`] replaces anything else.
-pub(crate) fn make_way(path: &Path) -> Result<()> {
-    match path.symlink_metadata() {
-        Ok(metadata) if metadata.is_dir() => std::fs::remove_dir(path).map_err(|cause| Error::unwritable(path, cause)),
-        _ => Ok(()),
-    }
-}
-
-/// An empty file in the folder of `path`, deleted when dropped.
-fn temporary_beside(path: &Path) -> Result<tempfile::NamedTempFile> {
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".threadlight-");
-    // A temporary file is private (0600) unless told otherwise; the picture is to be as readable as any other file.
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    builder.tempfile_in(folder).map_err(|cause| {
-        // The temporary file's name, which the cause repeats, is of no use to the user.
-        Error::unwritable(path, cause.kind())
-    })
 }
 
 #[cfg(test)]

@@ -2,11 +2,11 @@
 use super::brdf_atlas::BrdfAtlas;
 use super::{CameraRays, Counters, DeviceLight, Tiles, View};
 use crate::Result;
-use crate::brdf::{Brdf, MaterialRecord, Tabulated, ThreadSetRecord, merl};
+use crate::brdf::{Brdf, MaterialRecord, Tabulated, ThreadTableRecord, merl};
 use crate::graph::{BufferDesc, BufferHandle, FrameGraph, ImageDesc, ImageHandle};
 use crate::memo::Keyed;
 use crate::method::Method;
-use crate::threads::{SliceTable, SplitSum, ThreadSets, Threads};
+use crate::threads::{SliceTable, SplitSum, Threads};
 use crate::vulkan::{self, Bound, Buffer, ComputePipeline, Device, Sampler, SamplerKind};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
@@ -32,7 +32,7 @@ pub struct ShadedMaterial<'a> {
     /// What it is.
     pub brdf: &'a Brdf,
     /// Its threads, for methods that have any.
-    pub threads: Option<ThreadSets<&'a Threads>>,
+    pub threads: Option<&'a Threads>,
     /// What shaders look up of a BRDF without a twin, where they evaluate it.
     pub table: Option<&'a Tabulated>,
 }
@@ -60,7 +60,7 @@ impl DeviceMaterials {
         let mut measured = BrdfAtlas::new([merl::PHI_D_BINS, merl::THETA_D_BINS]);
         let mut made = BrdfAtlas::new(Tabulated::NODES);
         let mut models_used = 0;
-        for ShadedMaterial { brdf, threads: thread_sets, table } in materials {
+        for ShadedMaterial { brdf, threads: own_threads, table } in materials {
             let mut record = MaterialRecord::new(brdf);
             if evaluates_brdf {
                 models_used |= 1 << record.model;
@@ -72,15 +72,10 @@ impl DeviceMaterials {
                 }
             }
             if let Some(kind) = method.threads() {
-                let kinds = thread_sets.map(|sets| sets.map(Threads::kind).both());
-                assert_eq!(kinds, Some([kind; 2]), "threads of method {}", method.name());
+                assert_eq!(own_threads.map(Threads::kind), Some(kind), "threads of method {}", method.name());
             }
-            if let Some(ThreadSets { pixel, subpixel }) = thread_sets {
-                record.threads = threads.add(pixel);
-                record.azimuth_count = pixel.fitted().map_or(1, |table| table.azimuths as u32);
-                // Where sub-pixels need no others, they are the same ones.
-                record.subpixel_threads =
-                    if std::ptr::eq(pixel, subpixel) { record.threads } else { threads.add(subpixel) };
+            if let Some(own_threads) = own_threads {
+                record.threads = threads.add(own_threads);
             }
             record.first_slice = slices.len() as u32;
             records.push(record);
@@ -125,12 +120,14 @@ struct ThreadWords {
 }
 
 impl ThreadWords {
-    fn add(&mut self, threads: &Threads) -> ThreadSetRecord {
+    fn add(&mut self, threads: &Threads) -> ThreadTableRecord {
         let (row_count, count) = (threads.size()[0] as u32, threads.device_count() as u32);
         let first = (self.words.len() / threads.device_element_words()) as u32;
         self.words.extend(threads.device_words());
-        let sharp_count = threads.fitted().zip(self.finest_level).map(|(table, level)| table.sharp_count(level));
-        ThreadSetRecord { first, count, row_count, sharp_count: sharp_count.unwrap_or(0) as u32 }
+        let table = threads.fitted();
+        let sharp_count = table.zip(self.finest_level).map_or(0, |(table, level)| table.sharp_count(level) as u32);
+        let [set_count, azimuth_count] = table.map_or([1; 2], |table| [table.sets as u32, table.azimuths as u32]);
+        ThreadTableRecord { first, count, row_count, sharp_count, set_count, azimuth_count }
     }
 }
 

@@ -65,9 +65,9 @@ fn blurred_radiance(twin: &CpuShader, direction: Vec3, level: f32, sources: f32)
     let mut radiance = Vec3::ZERO;
     if sharp < 1.0 {
         let pyramid_level = (level - finest).max(0.0);
-        radiance = (1.0 - sharp) * light.rest.levels.lookup(direction, pyramid_level);
+        radiance = (1.0 - sharp) * light.rest.levels.lookup_by(direction, pyramid_level, twin.fractions);
         if let Some(pyramid) = light.sources.as_ref().filter(|_| sources > 0.0) {
-            radiance += (1.0 - sharp) * sources * pyramid.levels.lookup(direction, pyramid_level);
+            radiance += (1.0 - sharp) * sources * pyramid.levels.lookup_by(direction, pyramid_level, twin.fractions);
         }
     }
     if sharp > 0.0 {
@@ -218,9 +218,9 @@ impl Rows {
         UnpackedKernel { direction: Vec3::new(1.0, self.side, 1.0) * kernel.direction, ..kernel }
     }
 
-    /// Twin of `cosine_part_at`.
-    fn cosine_part(&self, threads: &FittedTable) -> Vec3 {
-        let at = |row: usize| Vec3::from(threads.cosine_part[row]);
+    /// Twin of `albedo_at`.
+    fn albedo(&self, threads: &FittedTable) -> Vec3 {
+        let at = |row: usize| Vec3::from(threads.albedo[row]);
         let here = at(self.below).lerp(at(self.above), self.t);
         let [below, above] = [self.below, self.above].map(|row| at(row + self.next_azimuth));
         here.lerp(below.lerp(above, self.t), self.towards_next)
@@ -246,20 +246,22 @@ pub(super) fn estimate(point: &Point) -> Vec3 {
     let light = blurred_light(point.twin);
     let sources = &point.twin.sources;
     let rows = Rows::at(surface, threads);
-    let cosine_part = rows.cosine_part(threads);
-    let mut sum = Vec3::ZERO;
-    let mut of_kernels = 0.0;
+    let (mut f_cos, mut cosine, mut of_kernels) = (Vec3::ZERO, Vec3::ZERO, 0.0);
     if !sources.is_empty() {
         let lobe = Lobe::of(point);
         of_kernels = 1.0 - lobe.share_of_brdf(sources, 0.0);
-        let (f_cos, cosine) = at_sources(&lobe, sources);
-        sum = f_cos.lerp(cosine * cosine_part / PI, of_kernels);
+        (f_cos, cosine) = at_sources(&lobe, sources);
     }
-    for k in 0..threads.count {
+    let (mut weights, mut sum) = (Vec3::ZERO, Vec3::ZERO);
+    for k in (point.first as usize..threads.count).step_by(point.stride) {
         let kernel = rows.kernel(threads, k);
         let level = level_within_pixel(kernel.level, surface.normal_variance);
+        weights += kernel.weight;
         sum += kernel.weight * blurred_radiance(point.twin, surface.frame * kernel.direction, level, of_kernels);
     }
-    sum += cosine_part * light.irradiance.lookup(surface.frame.z_axis, 0.0);
+    let share = point.stride as f32;
+    let cosine_part = rows.albedo(threads) - share * weights;
+    sum = share * sum + cosine_part * light.irradiance.lookup_by(surface.frame.z_axis, 0.0, point.twin.fractions);
+    sum += f_cos.lerp(cosine * cosine_part / PI, of_kernels);
     sum.max(Vec3::ZERO)
 }

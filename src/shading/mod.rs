@@ -4,7 +4,7 @@
 //! in double precision; everything else follows the shader line by line.
 use crate::Result;
 use crate::brdf::{Brdf, MaterialRecord};
-use crate::environment::{Alias, LightMap, SourceRecord};
+use crate::environment::{Alias, FractionBits, LightMap, SourceRecord};
 use crate::geometry_texel::GeometryTexel;
 use crate::light::Light;
 use crate::memo::Round;
@@ -89,6 +89,16 @@ fn turned(w: Vec3, angle: Vec2) -> Vec3 {
     angle.rotate(w.truncate()).extend(w.z)
 }
 
+/// The texels of `geometry`, a geometry cache, that a pixel of `view` sees, row by row.
+pub fn texels_of_pixel(view: &View, geometry: &[[u32; 2]], pixel: UVec2) -> Vec<UVec2> {
+    let s = view.subpixels;
+    let texel = |j: u32| {
+        let at = pixel * s + UVec2::new(j % s, j / s);
+        UVec2::from(geometry[(at.y * view.width * s + at.x) as usize])
+    };
+    (0..s * s).map(texel).collect()
+}
+
 /// Whether the sub-pixels of a pixel lie on one surface that is smooth to `method`. Twin of glsl/classify.comp.
 pub fn is_interior(method: Method, texels: &[UVec2]) -> bool {
     let Some(first) = texels.first().copied().and_then(GeometryTexel::unpack) else { return false };
@@ -136,6 +146,8 @@ pub struct CpuShader<'a> {
     tables: Vec<Option<Brdf>>,
     /// The small bright sources of the environment.
     sources: Vec<SourceRecord>,
+    /// Those of lookups in cube maps.
+    fractions: FractionBits,
 }
 
 impl<'a> CpuShader<'a> {
@@ -169,7 +181,13 @@ impl<'a> CpuShader<'a> {
             records: materials.iter().map(|material| MaterialRecord::new(&material.brdf)).collect(),
             tables: materials.iter().map(table).collect::<Result<_>>()?,
             sources: environment.small_sources().list.iter().map(|source| source.record(1.0)).collect(),
+            fractions: FractionBits::ALL,
         })
+    }
+
+    /// The same as on a device whose lookups in cube maps blend by fractions of so many bits.
+    pub fn with_fractions(self, fractions: FractionBits) -> Self {
+        Self { fractions, ..self }
     }
 
     /// Linear radiance times coverage, and coverage, of the pixel that sees `texels`: its sub-pixels, row by row.
@@ -207,11 +225,15 @@ impl<'a> CpuShader<'a> {
             point.surface = self.surface_at(position, normal_sum(texels).normalize(), tangent_sum(texels));
             point.surface.normal_variance = normal_variance(texels);
             if !fitted::needs_subpixels(&point) {
-                point.is_pixel = true;
                 return point.estimate().extend(1.0);
             }
         }
-        let points = texels.iter().enumerate().filter_map(|(j, texel)| self.subpixel(pixel, j, *texel));
+        let points = texels.iter().enumerate().filter_map(|(j, texel)| {
+            let mut point = self.subpixel(pixel, j, *texel)?;
+            let sets = point.threads().and_then(Threads::fitted).map_or(1, |table| table.sets);
+            (point.first, point.stride) = ((j % sets) as u32, sets);
+            Some(point)
+        });
         points.map(|point| point.estimate().extend(1.0)).sum::<Vec4>() / texels.len() as f32
     }
 
@@ -240,7 +262,7 @@ impl<'a> CpuShader<'a> {
         let position = (subpixel.as_vec2() + 0.5) / size.as_vec2();
         let surface = self.surface_at(position, normal, tangent.unwrap_or_default());
         let axis = self.to_environment(view.camera_rays().right());
-        Some(Point { twin: self, surface, axis, material, subpixel, first: 0, stride: 1, is_pixel: false })
+        Some(Point { twin: self, surface, axis, material, subpixel, first: 0, stride: 1 })
     }
 }
 
@@ -255,8 +277,6 @@ struct Point<'a> {
     /// Threads or samples `first`, `first + stride`, ...
     first: u32,
     stride: usize,
-    /// Whether it stands for all sub-pixels.
-    is_pixel: bool,
 }
 
 impl Point<'_> {
@@ -270,8 +290,7 @@ impl Point<'_> {
 
     /// The threads by which it is shaded, for methods that have any.
     fn threads(&self) -> Option<&Threads> {
-        let sets = self.material().threads.as_ref()?;
-        Some(if self.is_pixel { &sets.pixel } else { &sets.subpixel })
+        self.material().threads.as_deref()
     }
 
     fn record(&self) -> &MaterialRecord {
@@ -300,7 +319,7 @@ impl Point<'_> {
     /// The pyramid's mean radiance over `solid_angle` (sr) around `direction`.
     fn filtered_radiance(&self, direction: Vec3, solid_angle: f32) -> Vec3 {
         let pyramid = self.twin.light.box_filtered.as_ref().expect("the method looks the pyramid up");
-        pyramid.lookup(direction, pyramid.level_of(solid_angle, direction))
+        pyramid.lookup_by(direction, pyramid.level_of(solid_angle, direction), self.twin.fractions)
     }
 
     /// Radiance and density of the map. Twin of `environment_texel`.

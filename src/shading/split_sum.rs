@@ -18,5 +18,7 @@ pub(super) fn estimate(point: &Point) -> Vec3 {
     let w_o = surface.view_direction();
     let mirror = surface.frame * Vec3::new(-w_o.x, -w_o.y, w_o.z);
     let level = level_of_alpha(split_sum.roughness_alpha as f32);
-    diffuse * light.irradiance.lookup(surface.frame.z_axis, 0.0) + specular * light.by_ggx.lookup(mirror, level)
+    let bits = point.twin.fractions;
+    diffuse * light.irradiance.lookup_by(surface.frame.z_axis, 0.0, bits)
+        + specular * light.by_ggx.lookup_by(mirror, level, bits)
 }

@@ -3,8 +3,8 @@ use crate::Result;
 use crate::brdf::Brdf;
 use crate::error::Error;
 use crate::memo::{Key, Keyed, Memo, Round, Step, Stored};
-use crate::threads::fitted::{Targets, draft, generate_for, light_count};
-use crate::threads::{FORMAT_VERSION, ThreadKind, ThreadSettings, Threads, generate, read, write};
+use crate::threads::fitted::draft;
+use crate::threads::{FORMAT_VERSION, ThreadSettings, Threads, generate, read, write};
 
 /// Makes the threads of `brdf`. They are kept on disk as the `.threads` files that users write.
 pub struct FitThreads<'a> {
@@ -19,20 +19,14 @@ impl Step for FitThreads<'_> {
     const NAME: &'static str = "threads";
 
     fn key(&self, _: &Memo) -> Result<Key> {
-        let ThreadSettings { kind, count, rows, seed } = self.settings;
+        let ThreadSettings { kind, count, rows, seed, sets } = self.settings;
         let key = Key::builder(kind.name()).key(self.brdf.key).number(FORMAT_VERSION);
-        Ok(key.number(count as u64).number(rows as u64).number(seed).build())
+        Ok(key.number(count as u64).number(rows as u64).number(seed).number(sets as u64).build())
     }
 
     fn make(&self, round: &Round) -> Result<Threads> {
         let Self { brdf, settings } = self;
-        Ok(match settings.kind {
-            ThreadKind::Fitted => {
-                let targets = round.ask(&FitTargets::new(brdf, settings))?;
-                Threads::Fitted(generate_for(brdf, &targets, settings, round.observer())?)
-            }
-            ThreadKind::Paper => generate(brdf, settings, round.observer())?,
-        })
+        generate(brdf, settings, round.observer())
     }
 
     fn stored(&self) -> Option<Stored<'_, Threads>> {
@@ -45,33 +39,6 @@ impl Step for FitThreads<'_> {
             }),
             write: Box::new(|path, threads| write(threads, path)),
         })
-    }
-}
-
-/// Makes what fitted threads of `brdf` are fitted to.
-pub struct FitTargets<'a> {
-    brdf: &'a Keyed<Brdf>,
-    rows: usize,
-    lights: usize,
-}
-
-impl<'a> FitTargets<'a> {
-    /// For these threads, and all others that have as many lights.
-    pub fn new(brdf: &'a Keyed<Brdf>, settings: &ThreadSettings) -> Self {
-        Self { brdf, rows: settings.rows, lights: light_count(settings.count) }
-    }
-}
-
-impl Step for FitTargets<'_> {
-    type Output = Targets;
-    const NAME: &'static str = "threads";
-
-    fn key(&self, _: &Memo) -> Result<Key> {
-        Ok(Key::builder("targets").key(self.brdf.key).number(self.rows as u64).number(self.lights as u64).build())
-    }
-
-    fn make(&self, round: &Round) -> Result<Targets> {
-        Targets::new(self.brdf, self.rows, self.lights, round.observer())
     }
 }
 
@@ -105,8 +72,9 @@ mod tests {
     use crate::memo::Origin;
     use crate::scene::MaterialSource;
     use crate::steps::LoadMaterial;
+    use crate::threads::ThreadKind;
 
-    const SETTINGS: ThreadSettings = ThreadSettings { kind: ThreadKind::Paper, count: 4, rows: 3, seed: 1 };
+    const SETTINGS: ThreadSettings = ThreadSettings { kind: ThreadKind::Paper, count: 4, rows: 3, seed: 1, sets: 1 };
 
     fn ask(material: &str, settings: ThreadSettings, folder: &std::path::Path) -> (Threads, Origin) {
         let memo = Memo::new(Some(folder));

@@ -9,6 +9,6 @@ mod upload;
 pub use check::CheckDevice;
 pub use compile::{CompileCompute, CompileGeometryCache, pipelines};
 pub use filter::{Blur, BoxFilter, blurred_light, light};
-pub use fit::{DraftThreads, FitTargets, FitThreads};
+pub use fit::{DraftThreads, FitThreads};
 pub use load::{LoadEnvironment, LoadMaterial, LoadMesh, Tabulate};
 pub use upload::{UploadBackground, UploadLight, UploadMaterials, UploadMesh};

@@ -9,7 +9,7 @@ use crate::memo::{Key, Keyed, Memo, Round, Step};
 use crate::method::Method;
 use crate::passes::{BackgroundMap, DeviceLight, DeviceMaterials, DeviceMesh, ShadedMaterial, WayAround};
 use crate::scene::Mesh;
-use crate::threads::{ThreadSets, Threads};
+use crate::threads::Threads;
 use crate::vulkan::Device;
 use std::sync::Arc;
 
@@ -37,7 +37,7 @@ impl Step for UploadMesh<'_> {
 }
 
 /// A material as shading needs it: its BRDF, and its threads for methods that have any.
-pub type Shaded<'a> = (&'a Keyed<Brdf>, Option<ThreadSets<&'a Keyed<Threads>>>);
+pub type Shaded<'a> = (&'a Keyed<Brdf>, Option<&'a Keyed<Threads>>);
 
 /// Uploads what a method looks up of materials.
 pub struct UploadMaterials<'a> {
@@ -59,15 +59,18 @@ impl Step for UploadMaterials<'_> {
 
     fn key(&self, _: &Memo) -> Result<Key> {
         let key = on(self.device, self.method.name()).number(u64::from(self.evaluates_brdf));
-        let keys = self.materials.iter().flat_map(|(brdf, threads)| {
-            let threads = threads.iter().copied().flat_map(ThreadSets::both);
-            std::iter::once(brdf.key).chain(threads.map(|threads| threads.key))
-        });
+        let keys = self
+            .materials
+            .iter()
+            .flat_map(|(brdf, threads)| std::iter::once(brdf.key).chain(threads.map(|threads| threads.key)));
         let key = key.keys(keys);
         // Of the light, only how many threads are sharper than it.
         let sharp = self.finest_level.map(|level| {
-            let threads = self.materials.iter().filter_map(|(_, threads)| *threads).flat_map(ThreadSets::both);
-            threads.filter_map(|table| table.fitted()).map(|table| table.sharp_count(level) as u64).collect::<Vec<_>>()
+            let threads = self.materials.iter().filter_map(|(_, threads)| *threads);
+            threads
+                .filter_map(|threads| threads.fitted())
+                .map(|table| table.sharp_count(level) as u64)
+                .collect::<Vec<_>>()
         });
         Ok(sharp.into_iter().flatten().fold(key, |key, count| key.number(count)).build())
     }
@@ -79,7 +82,7 @@ impl Step for UploadMaterials<'_> {
         let tables = tables.collect::<Result<Vec<_>>>()?;
         let materials = self.materials.iter().zip(&tables).map(|((brdf, threads), table)| ShadedMaterial {
             brdf,
-            threads: threads.map(|sets| sets.map(|threads| &**threads)),
+            threads: threads.map(|threads| &**threads),
             table: table.as_deref(),
         });
         DeviceMaterials::new(self.device, self.method, materials, self.evaluates_brdf, self.finest_level)

@@ -5,25 +5,27 @@
 //! | bytes | content |
 //! |---|---|
 //! | 8 | magic `THREADS\0` |
-//! | 4 | u32 format version, now 8 |
+//! | 4 | u32 format version, now 9 |
 //! | 4 | u32 length H of the header |
-//! | H | header, JSON: `method` ("fitted" or "paper"), `material`, `count`, `rows`, `seed`, and `azimuths` if there is more than one |
+//! | H | header, JSON: `method` ("fitted" or "paper"), `material`, `count`, `rows`, `seed`, and `azimuths` and `sets` if there is more than one |
 //! | ... | the rows, then the threads, see below |
 //! | 32 | BLAKE3 digest of everything before |
 //!
 //! Row r is for the view angle theta_o = r 90 deg / rows, in the frame whose z is the normal and in which w_o = (sin theta_o, 0,
 //! cos theta_o). Colours are linear Rec. 709. Thread k of row r is the (r count + k)-th. Of an anisotropic BRDF there are as many rows for
 //! each of 10, 19 or 37 azimuths of w_o from the tangent, every 10 degrees; then those of the second azimuth follow those of the first.
+//! Of fitted threads in several sets thread k is of set k % sets: each set does alone, with as many times the weights as there are sets.
 //!
 //! | method | a row | a thread |
 //! |---|---|---|
 //! | `paper` | albedo, 3 f32 | theta, phi (radians), p (1/sr), 3 f32 |
-//! | `fitted` | weight of the irradiance over pi, 3 f32; expected relative error, f32 | 3 words, below |
+//! | `fitted` | albedo, 3 f32; expected relative error, f32 | 3 words, below |
 //!
 //! The words of a fitted thread: its direction, octahedral, x and y as 16-bit signed normalised numbers, x in the low half; level and
 //! red weight as half floats, level in the low half; green and blue weight as half floats, green in the low half. The level says
 //! by which von Mises-Fisher kernel the environment is to be blurred: of width 2^level / 256 radians if it is whole, by none at
-//! level -1, and otherwise by the linear blend of the two kernels of whole levels beside it.
+//! level -1, and otherwise by the linear blend of the two kernels of whole levels beside it. What the weights of all threads leave of the albedo is the
+//! weight of the irradiance over pi.
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
@@ -35,7 +37,7 @@ use crate::file_format;
 use crate::output::write_whole;
 
 /// Version of the file format and of the threads in it: to be raised when either changes, since caches depend on it.
-pub const FORMAT_VERSION: u32 = 8;
+pub const FORMAT_VERSION: u32 = 9;
 
 const MAGIC: &[u8; 8] = b"THREADS\0";
 const DIGEST_BYTES: usize = blake3::OUT_LEN;
@@ -49,14 +51,16 @@ struct Header {
     seed: u64,
     #[serde(default = "one", skip_serializing_if = "is_one")]
     azimuths: usize,
+    #[serde(default = "one", skip_serializing_if = "is_one")]
+    sets: usize,
 }
 
 fn one() -> usize {
     1
 }
 
-fn is_one(azimuths: &usize) -> bool {
-    *azimuths == 1
+fn is_one(number: &usize) -> bool {
+    *number == 1
 }
 
 /// Writes `threads` to `path`, whole or not at all.
@@ -80,11 +84,11 @@ pub fn parse(path: &Path, bytes: &[u8]) -> Result<Threads> {
 fn encode(threads: &Threads) -> Vec<u8> {
     let [rows, count] = threads.size();
     let method = threads.kind().name().to_owned();
-    let (material, seed, azimuths) = match threads {
-        Threads::Fitted(table) => (table.material.clone(), 0, table.azimuths),
-        Threads::Paper(table) => (table.material.clone(), table.seed, 1),
+    let (material, seed, azimuths, sets) = match threads {
+        Threads::Fitted(table) => (table.material.clone(), 0, table.azimuths, table.sets),
+        Threads::Paper(table) => (table.material.clone(), table.seed, 1, 1),
     };
-    let header = serde_json::to_vec(&Header { method, material, count, rows, seed, azimuths });
+    let header = serde_json::to_vec(&Header { method, material, count, rows, seed, azimuths, sets });
     let header = header.expect("a header of strings and numbers is always JSON");
     let mut bytes = MAGIC.to_vec();
     bytes.extend(FORMAT_VERSION.to_le_bytes());
@@ -115,7 +119,7 @@ fn decode(bytes: &[u8]) -> Result<Threads, String> {
     let (&length, rest) = rest.split_first_chunk().ok_or("is cut short")?;
     let (header, payload) = rest.split_at_checked(u32::from_le_bytes(length) as usize).ok_or("is cut short")?;
     let header: Header = serde_json::from_slice(header).map_err(|error| format!("has a bad header ({error})"))?;
-    let Header { method, material, count, rows, seed, azimuths } = header;
+    let Header { method, material, count, rows, seed, azimuths, sets } = header;
     let kind = [ThreadKind::Fitted, ThreadKind::Paper].into_iter().find(|kind| kind.name() == method);
     let kind = kind.ok_or_else(|| format!("holds threads of the unknown method {method:?}"))?;
     let words_a_row = match kind {
@@ -125,7 +129,8 @@ fn decode(bytes: &[u8]) -> Result<Threads, String> {
     let per_row = count.checked_mul(3).and_then(|words| words.checked_add(words_a_row));
     let all_rows = rows.checked_mul(azimuths);
     let expected = per_row.and_then(|words| words.checked_mul(all_rows?)?.checked_mul(4));
-    let is_possible = azimuths == 1 || kind == ThreadKind::Fitted && [10, 19, 37].contains(&azimuths);
+    let is_possible = (azimuths, sets) == (1, 1)
+        || kind == ThreadKind::Fitted && [1, 10, 19, 37].contains(&azimuths) && (1..=count).contains(&sets);
     if count == 0 || rows == 0 || !is_possible || expected != Some(payload.len()) {
         return Err("has a header that does not fit its content".into());
     }
@@ -134,7 +139,7 @@ fn decode(bytes: &[u8]) -> Result<Threads, String> {
     Ok(match kind {
         ThreadKind::Fitted => {
             let table = FittedTable::from_file_words(of_rows, of_threads)?;
-            Threads::Fitted(FittedTable { rows, azimuths, count, material, ..table })
+            Threads::Fitted(FittedTable { rows, azimuths, count, sets, material, ..table })
         }
         ThreadKind::Paper => {
             let table = ThreadTable::from_file_words(of_rows, of_threads)?;
@@ -158,8 +163,9 @@ mod tests {
             rows: 2,
             azimuths: 1,
             count: 1,
+            sets: 1,
             material: "b".into(),
-            cosine_part: vec![[0.1, 0.2, -0.01]; 2],
+            albedo: vec![[0.1, 0.2, 0.4]; 2],
             relative_error: vec![1e-3; 2],
             kernels: vec![PackedKernel([0x1234_5678, 0x3800_4000, 0x3400_3000]); 2],
         })

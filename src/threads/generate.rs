@@ -133,7 +133,7 @@ mod tests {
     use crate::threads::{MAX_COUNT, ThreadKind, test_materials};
 
     fn small(count: usize, rows: usize) -> ThreadSettings {
-        ThreadSettings { kind: ThreadKind::Paper, count, rows, seed: 7 }
+        ThreadSettings { kind: ThreadKind::Paper, count, rows, seed: 7, sets: 1 }
     }
 
     #[test]

@@ -26,7 +26,6 @@ pub mod forces;
 mod generate;
 pub mod peaks;
 mod plot;
-mod sets;
 pub mod slice;
 pub mod slice_table;
 pub mod smoothing;
@@ -38,7 +37,9 @@ pub(crate) mod test_materials;
 pub use file::{FORMAT_VERSION, parse, read, write};
 pub use fitted::FittedTable;
 pub use plot::plot;
-pub use sets::{ThreadSets, WithThreads};
+
+/// A BRDF, and the threads by which it is shaded, for methods that have any.
+pub type WithThreads<'a> = (&'a Brdf, Option<&'a Threads>);
 pub use slice_table::SliceTable;
 pub use split_sum::SplitSum;
 pub use table::{Sample, ThreadTable};
@@ -202,11 +203,13 @@ pub struct ThreadSettings {
     pub rows: usize,
     /// Where the first row's points start.
     pub seed: u64,
+    /// How many sets fitted threads are made in, each of which does alone: thread k is of set k % `sets`. The paper's need none.
+    pub sets: usize,
 }
 
 impl Default for ThreadSettings {
     fn default() -> Self {
-        Self { kind: ThreadKind::default(), count: ThreadKind::default().default_count(), rows: 90, seed: 0 }
+        Self { kind: ThreadKind::default(), count: ThreadKind::default().default_count(), rows: 90, seed: 0, sets: 1 }
     }
 }
 
@@ -217,6 +220,10 @@ impl ThreadSettings {
         if !(1..=most).contains(&self.count) {
             let problem = format!("{} is not possible for method \"{}\"", self.count, self.kind.name());
             return Err(Error::input("threads", problem, format!("use a number from 1 to {most}")));
+        }
+        if !(1..=self.count).contains(&self.sets) {
+            let problem = format!("{} are not possible for {} threads", self.sets, self.count);
+            return Err(Error::input("sets", problem, "use at least 1, and no more than threads"));
         }
         if self.rows == 0 {
             return Err(Error::input("rows", "0 is not possible", "use at least 1; the paper uses 90"));

@@ -9,6 +9,7 @@ use super::latest_job::LatestJob;
 use super::loaded::Loaded;
 use super::measured::Measured;
 use super::orbit::{Bounds, Orbit, environment_turn_deg};
+use super::plots::Plotter;
 use super::session::Session;
 use crate::memo::{Key, Memo};
 use crate::passes::Area;
@@ -43,6 +44,8 @@ pub struct Viewer {
     pub turntable: bool,
     /// What the picture is compared with.
     pub comparer: Comparer,
+    /// Plots of the material.
+    pub plotter: Plotter,
     /// Where the cursor is in the window, in pixels; none while it is elsewhere.
     pub cursor: Option<[f64; 2]>,
     pub(super) loaded: Option<Loaded>,
@@ -77,7 +80,7 @@ impl Viewer {
     /// A viewer of `scene`, which begins to load. `wake` is called when there is something new to be drawn.
     pub fn new(scene: Scene, device: &Arc<Device>, memo: Memo, wake: impl Fn() + Send + Sync + 'static) -> Self {
         let wake = Arc::new(wake);
-        let wake_too = wake.clone();
+        let (wake_too, wake_for_plots) = (wake.clone(), wake.clone());
         #[cfg(feature = "hot-reload")]
         let wake_for_shaders = wake.clone();
         let area = Area { left: 0, top: 0, width: scene.image.width, height: scene.image.height };
@@ -89,6 +92,7 @@ impl Viewer {
             turntable: false,
             loaded: None,
             comparer: Comparer::new(move || wake_too()),
+            plotter: Plotter::new(move || wake_for_plots()),
             cursor: None,
             loading: LatestJob::new("loading", move || wake()),
             wanted: None,

@@ -46,7 +46,7 @@ impl Viewer {
 
     /// Whether anything is made in the background.
     pub fn is_busy(&self) -> bool {
-        self.is_loading() || self.comparer.is_busy()
+        self.is_loading() || self.comparer.is_busy() || self.plotter.is_busy()
     }
 
     /// Asks for what is wanted, if that is another than what was asked for last: for a draft of it first, where that can be.

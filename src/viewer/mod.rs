@@ -11,6 +11,7 @@
 //! | another picture of the same view, and the difference | [`comparison`] | |
 //! | when that is made anew | [`comparer`] | |
 //! | the threads of what is under the cursor | [`threads_seen`] | egui |
+//! | plots of the material | [`plots`] | threads |
 //! | what frames have shown of themselves | [`measured`] | pure |
 //! | how long inputs wait to be seen | [`latency`] | pure |
 //! | what inputs do | [`interaction`] | |
@@ -34,12 +35,15 @@ mod making;
 pub mod measured;
 pub mod orbit;
 mod panel;
+pub mod plots;
 pub mod presenter;
 pub mod session;
 #[cfg(feature = "hot-reload")]
 mod shader_watch;
 pub mod threads_seen;
 mod window;
+#[cfg(test)]
+mod window_tests;
 
 use crate::scene::Scene;
 use crate::vulkan::PresentMode;
@@ -86,14 +90,31 @@ pub struct Ended {
 /// Opens a window and runs until it is closed.
 ///
 /// # Errors
-/// No window system, no device that presents to it, a scene that cannot be loaded.
+/// No window system, no device that presents to it, a scene that cannot be loaded; a device that fails: then the scene is kept if it was
+/// edited, and the log says where.
 pub fn run(settings: ViewerSettings) -> Result<Ended> {
-    let event_loop = EventLoop::<window::Wake>::with_user_event().build()?;
+    let folder = settings.cache.clone().unwrap_or_else(std::env::temp_dir);
+    let mut event_loop = EventLoop::<window::Wake>::with_user_event();
+    // Tests run on threads of their own.
+    #[cfg(all(test, target_os = "linux"))]
+    winit::platform::x11::EventLoopBuilderExtX11::with_any_thread(&mut event_loop, true);
+    let event_loop = event_loop.build()?;
     let mut app = window::App::new(settings, event_loop.create_proxy());
     event_loop.run_app(&mut app)?;
-    let window::App { result, messages, stats, .. } = app;
+    let window::App { result, messages, stats, edited, .. } = app;
+    if let (Err(Error::Vulkan(_)), Some(scene)) = (&result, edited) {
+        keep(&scene, &folder.join("edited.toml"));
+    }
     result?;
     Ok(Ended { messages: messages.map(|messages| messages.all()).unwrap_or_default(), stats })
+}
+
+/// Keeps a `scene` whose viewer fails.
+fn keep(scene: &Scene, path: &std::path::Path) {
+    match scene.save(path) {
+        Ok(()) => tracing::warn!("the scene as it was edited is kept: threadlight view {}", path.display()),
+        Err(error) => tracing::warn!("the scene as it was edited is lost: {error}"),
+    }
 }
 
 /// What the window system refuses.

@@ -221,7 +221,7 @@ mod tests {
     fn samples_are_those_that_shading_uses_and_share_all_of_the_light() {
         for method in ["fitted", "paper"] {
             let prepared = sphere(method);
-            let threads = &prepared.materials[0].threads.as_ref().unwrap().pixel;
+            let threads = &prepared.materials[0].threads.as_ref().unwrap();
             for row in [0, 30, 89] {
                 let seen = threads.seen_from(row as f64 / 90.0 * FRAC_PI_2 + 1e-12, 0.0);
                 assert!((seen.iter().map(|(_, share)| share).sum::<f64>() - 1.0).abs() < 1e-6);
@@ -245,7 +245,7 @@ mod tests {
     #[test]
     fn insets_draw_without_a_window() {
         let prepared = sphere("fitted");
-        let threads = &prepared.materials[0].threads.as_ref().unwrap().pixel;
+        let threads = &prepared.materials[0].threads.as_ref().unwrap();
         let surface = Surface::under(&prepared, &prepared.view, 400.0, 240.0);
         let shapes = |surface: Option<&Surface>| {
             let context = egui::Context::default();

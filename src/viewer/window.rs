@@ -8,6 +8,7 @@ use super::{ViewerSettings, failed};
 use crate::memo::Memo;
 use crate::output;
 use crate::passes::Area;
+use crate::scene::Scene;
 use crate::vulkan::{Device, Instance, Messages, Surface, UiFrame};
 use crate::{Error, Result};
 use egui::{TexturesDelta, ViewportId};
@@ -43,6 +44,8 @@ pub struct App {
     pub messages: Option<Messages>,
     /// How long inputs waited, if that was to be recorded.
     pub stats: Option<Stats>,
+    /// The scene as it was at the end, if it is another than at the beginning.
+    pub edited: Option<Scene>,
 }
 
 /// An open window.
@@ -82,7 +85,7 @@ struct Script {
 impl App {
     /// An app that will open its window when winit says so.
     pub fn new(settings: ViewerSettings, proxy: EventLoopProxy<Wake>) -> Self {
-        Self { settings, proxy, open: None, result: Ok(()), messages: None, stats: None }
+        Self { settings, proxy, open: None, result: Ok(()), messages: None, stats: None, edited: None }
     }
 
     fn open(&mut self, event_loop: &ActiveEventLoop) -> Result<Open> {
@@ -443,6 +446,11 @@ impl ApplicationHandler<Wake> for App {
     fn exiting(&mut self, _: &ActiveEventLoop) {
         // All that Vulkan made goes while the window is still there.
         let Some(open) = self.open.take() else { return };
+        let wanted = open.viewer.session.wanted();
+        let mut opened = self.settings.scene.clone();
+        // The window has its size of the window system.
+        (opened.image.width, opened.image.height) = (wanted.image.width, wanted.image.height);
+        self.edited = (*wanted != opened).then(|| wanted.clone());
         if self.result.is_ok() {
             match open.viewer.stats() {
                 Ok(stats) => self.stats = stats,

@@ -47,10 +47,23 @@ pub struct Device {
     // Counts submissions: the n-th signals the value n when it has finished.
     timeline: vk::Semaphore,
     submitted: AtomicU64,
+    /// Bytes that may be handed out.
+    memory_limit: u64,
     // `None` only while the device is being dropped: the allocator has to go first.
     allocator: Mutex<Option<Allocator>>,
     deletions: Deletions,
     pub(super) instance: Arc<Instance>,
+}
+
+/// The environment variable that says how much device memory may be taken.
+const MEMORY_LIMIT: &str = "THREADLIGHT_DEVICE_MEMORY_MIB";
+
+/// What that allows, in bytes: all if it is not set.
+fn memory_limit() -> Result<u64> {
+    let Some(text) = std::env::var_os(MEMORY_LIMIT).filter(|text| !text.is_empty()) else { return Ok(u64::MAX) };
+    let mib: Option<u64> = text.to_str().and_then(|text| text.parse().ok());
+    let bytes = mib.and_then(|mib| mib.checked_mul(1 << 20));
+    bytes.ok_or_else(|| VulkanError::unfit(MEMORY_LIMIT, format!("{text:?} is no number of MiB")))
 }
 
 /// What every device has of its own from the start.
@@ -123,6 +136,7 @@ impl Device {
     }
 
     fn open(instance: &Arc<Instance>, chosen: Candidate) -> Result<Arc<Self>> {
+        let memory_limit = memory_limit()?;
         let name = &chosen.description.name;
         let priorities = [1.0];
         let queues = [vk::DeviceQueueCreateInfo::default()
@@ -169,6 +183,7 @@ impl Device {
             queue: Mutex::new(queue),
             timeline,
             submitted: AtomicU64::new(0),
+            memory_limit,
             allocator: Mutex::new(Some(allocator)),
             deletions: Deletions::default(),
             instance: instance.clone(),
@@ -218,6 +233,15 @@ impl Device {
     /// Bytes of device memory handed out to buffers and images at this moment.
     pub fn allocated_bytes(&self) -> u64 {
         lock(&self.allocator).as_ref().map_or(0, |allocator| allocator.generate_report().total_allocated_bytes)
+    }
+
+    /// Why `bytes` more may not be handed out, if they may not.
+    pub(super) fn check_memory_limit(&self, bytes: u64) -> std::result::Result<(), String> {
+        if self.memory_limit == u64::MAX || self.allocated_bytes().saturating_add(bytes) <= self.memory_limit {
+            return Ok(());
+        }
+        let mib = self.memory_limit >> 20;
+        Err(format!("it would take {bytes} bytes, and {MEMORY_LIMIT} allows {mib} MiB in all"))
     }
 
     /// Hands `commands` to the queue; the returned value is reached when they have finished.

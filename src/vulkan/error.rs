@@ -47,7 +47,7 @@ pub enum VulkanError {
         feature: String,
     },
     /// A Vulkan call failed.
-    #[error("{call} failed for {object}: {result}")]
+    #[error("{call} failed for {object}: {result}{}", remedy(*result))]
     Call {
         /// The Vulkan function.
         call: &'static str,
@@ -95,11 +95,32 @@ impl VulkanError {
     }
 }
 
-/// Makes the Vulkan call of this `name`, and attaches that and the object's name to what it returns. Tests make it fail instead.
+/// What can be done about it, where something can.
+fn remedy(result: vk::Result) -> &'static str {
+    match result {
+        vk::Result::ERROR_DEVICE_LOST => {
+            "; the driver has given the device up: try again, with a smaller --size if it happens again, or another --device"
+        }
+        vk::Result::ERROR_OUT_OF_DEVICE_MEMORY | vk::Result::ERROR_OUT_OF_HOST_MEMORY => {
+            "; a smaller --size or fewer --subpixels needs less"
+        }
+        _ => "",
+    }
+}
+
+/// Makes the Vulkan call of this `name`, and attaches that and the object's name to what it returns.
 pub(super) fn call<T>(name: &'static str, object: &str, make: impl FnOnce() -> ash::prelude::VkResult<T>) -> Result<T> {
+    bare_call(name, make).during(name, object)
+}
+
+/// Makes the Vulkan call of this `name`. Tests make it fail instead.
+pub(super) fn bare_call<T>(
+    #[cfg_attr(not(test), allow(unused_variables))] name: &'static str,
+    make: impl FnOnce() -> ash::prelude::VkResult<T>,
+) -> ash::prelude::VkResult<T> {
     #[cfg(test)]
-    super::faults::before(name).during(name, object)?;
-    make().during(name, object)
+    super::faults::before(name)?;
+    make()
 }
 
 /// Attaches the call and the object's name to a bare `vk::Result`.

@@ -2,34 +2,49 @@
 use ash::vk;
 use std::cell::{Cell, RefCell};
 
+/// What is to fail.
+#[derive(Clone, Copy)]
+pub(crate) struct Fault {
+    /// Only calls of this name count; all if there is none.
+    pub of: Option<&'static str>,
+    /// Which of them, counted from 0.
+    pub index: usize,
+    /// What it returns.
+    pub result: vk::Result,
+    /// Whether all after it return that too, as those of a lost device do.
+    pub lasts: bool,
+}
+
 thread_local! {
     /// Names of the calls that this thread has made.
     static MADE: RefCell<Vec<&'static str>> = const { RefCell::new(Vec::new()) };
-    /// Which of them fails.
-    static FAILING: Cell<Option<usize>> = const { Cell::new(None) };
+    /// Which of them fails, and how many were counted.
+    static FAULT: Cell<Option<(Fault, usize)>> = const { Cell::new(None) };
 }
 
 /// Called before each call: an error for the one that is to fail.
 pub(super) fn before(name: &'static str) -> ash::prelude::VkResult<()> {
-    let index = MADE.with_borrow_mut(|made| {
-        made.push(name);
-        made.len() - 1
-    });
-    if FAILING.get() == Some(index) { Err(vk::Result::ERROR_OUT_OF_DEVICE_MEMORY) } else { Ok(()) }
+    MADE.with_borrow_mut(|made| made.push(name));
+    let Some((fault, counted)) = FAULT.get().filter(|(fault, _)| fault.of.is_none_or(|of| of == name)) else {
+        return Ok(());
+    };
+    FAULT.set(Some((fault, counted + 1)));
+    let fails = counted == fault.index || (fault.lasts && counted > fault.index);
+    if fails { Err(fault.result) } else { Ok(()) }
 }
 
-/// The calls that `act` makes on this thread, of which the one at index `failing` fails.
-fn with_fault<T>(failing: Option<usize>, act: impl FnOnce() -> T) -> (T, Vec<&'static str>) {
+/// What comes of `act` with a `fault` of this thread, and the calls that it made.
+pub(crate) fn with_fault<T>(fault: Option<Fault>, act: impl FnOnce() -> T) -> (T, Vec<&'static str>) {
     MADE.take();
-    FAILING.set(failing);
+    FAULT.set(fault.map(|fault| (fault, 0)));
     let result = act();
-    FAILING.set(None);
+    FAULT.set(None);
     (result, MADE.take())
 }
 
 mod tests {
     use super::super::*;
-    use super::with_fault;
+    use super::{Fault, with_fault};
     use std::sync::Arc;
 
     fn open(messages: &mut Messages) -> Result<Arc<Device>, VulkanError> {
@@ -71,7 +86,9 @@ mod tests {
         }
         for (failing, name) in calls.iter().enumerate() {
             let mut messages = Messages::default();
-            let (result, _) = with_fault(Some(failing), || use_everything(&mut messages));
+            let result = ash::vk::Result::ERROR_OUT_OF_DEVICE_MEMORY;
+            let fault = Fault { of: None, index: failing, result, lasts: false };
+            let (result, _) = with_fault(Some(fault), || use_everything(&mut messages));
             let error = result.expect_err("a call fails").to_string();
             assert!(error.contains(name), "{failing}, {name}: {error}");
             assert_eq!(messages.all(), Vec::<String>::new(), "call {failing}, {name}");

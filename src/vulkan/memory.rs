@@ -1,7 +1,7 @@
 //! Device memory, and the buffers in it.
 use super::deletion::Garbage;
 use super::device::Device;
-use super::error::{Result, VulkanError, call};
+use super::error::{Result, VulkanError, bare_call, call};
 use super::identity::Identity;
 use ash::vk;
 use gpu_allocator::MemoryLocation;
@@ -42,8 +42,8 @@ impl Memory {
         let allocation_scheme = AllocationScheme::GpuAllocatorManaged;
         let description = AllocationCreateDesc { name, requirements, location, linear, allocation_scheme };
         let failed = |cause: String| VulkanError::Memory { object: name.to_owned(), cause };
-        #[cfg(test)]
-        super::faults::before("vkAllocateMemory").map_err(|result| failed(format!("vkAllocateMemory: {result}")))?;
+        bare_call("vkAllocateMemory", || Ok(())).map_err(|result| failed(format!("vkAllocateMemory: {result}")))?;
+        device.check_memory_limit(requirements.size).map_err(failed)?;
         let allocation = device
             .with_allocator(|allocator| allocator.allocate(&description))
             .ok_or_else(|| failed("the device is closing".to_owned()))?

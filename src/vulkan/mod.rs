@@ -25,7 +25,7 @@ mod deletion;
 mod device;
 mod error;
 #[cfg(test)]
-mod faults;
+pub(crate) mod faults;
 mod frames;
 #[cfg(feature = "hot-reload")]
 mod glslc;

@@ -4,7 +4,7 @@
 //! an sRGB format would encode them a second time. The colour space is the one that every window system has, in which
 //! it shows the bytes as they are.
 use super::device::{Device, Semaphores};
-use super::error::{During, Result, VulkanError};
+use super::error::{During, Result, VulkanError, bare_call, call};
 use super::frames::Frames;
 use super::image::{Image, ImageShape};
 use super::surface::Surface;
@@ -141,7 +141,9 @@ impl Swapchain {
             frames.wait_for_place()?;
             let free = self.free[self.next];
             // SAFETY: the semaphore is unsignalled and nothing waits for it, as said above.
-            match unsafe { self.functions.acquire_next_image(current.raw, PATIENCE_NS, free, vk::Fence::null()) } {
+            let acquire =
+                || unsafe { self.functions.acquire_next_image(current.raw, PATIENCE_NS, free, vk::Fence::null()) };
+            match bare_call("vkAcquireNextImageKHR", acquire) {
                 Ok((index, suboptimal)) => {
                     // It can be drawn and shown; the one after it will fit again.
                     current.stale = suboptimal;
@@ -169,8 +171,8 @@ impl Swapchain {
         let (swapchains, indices) = ([current.raw], [turn.index]);
         let info = vk::PresentInfoKHR::default().wait_semaphores(&wait).swapchains(&swapchains).image_indices(&indices);
         // SAFETY: the queue is held exclusively; the image was acquired for this turn and is in the layout for presenting.
-        let result = self.device.with_queue(|queue| unsafe { self.functions.queue_present(queue, &info) });
-        match result {
+        let present = || self.device.with_queue(|queue| unsafe { self.functions.queue_present(queue, &info) });
+        match bare_call("vkQueuePresentKHR", present) {
             Ok(suboptimal) => {
                 current.stale |= suboptimal;
                 Ok(Presented::Yes)
@@ -269,7 +271,7 @@ impl Swapchain {
             .clipped(true)
             .old_swapchain(old.as_ref().map_or(vk::SwapchainKHR::null(), |old| old.raw));
         // SAFETY: the surface is alive; the old swapchain is destroyed after this, and not used before.
-        let raw = unsafe { self.functions.create_swapchain(&info, None) };
+        let raw = bare_call("vkCreateSwapchainKHR", || unsafe { self.functions.create_swapchain(&info, None) });
         if let Some(old) = old {
             self.destroy(old);
         }
@@ -289,8 +291,9 @@ impl Swapchain {
     fn capabilities(&self) -> Result<vk::SurfaceCapabilitiesKHR> {
         let Surface { raw, functions, .. } = &self.surface;
         // SAFETY: the device is of the surface's instance, as was checked when this was made.
-        unsafe { functions.get_physical_device_surface_capabilities(self.device.physical, *raw) }
-            .during("vkGetPhysicalDeviceSurfaceCapabilitiesKHR", "window")
+        call("vkGetPhysicalDeviceSurfaceCapabilitiesKHR", "window", || unsafe {
+            functions.get_physical_device_surface_capabilities(self.device.physical, *raw)
+        })
     }
 
     /// An error where the window cannot be given display values as they are.

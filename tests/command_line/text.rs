@@ -147,6 +147,31 @@ fn a_material_is_exported_and_plotted() {
 }
 
 #[test]
+fn a_model_is_fitted_to_a_measured_file_and_what_is_written_is_a_material() {
+    let folder = workplace();
+    let lambert = "model = 'lambert'\nreflectance = [0.8, 0.5, 0.2]\n";
+    fs::write(folder.path().join("l.toml"), lambert).unwrap();
+    threadlight(&folder, "materials export l.toml -o l.binary").assert().success();
+    let said = printed(&mut threadlight(&folder, "materials fit l.binary --model lambert -o fitted.toml"));
+    assert!(said.starts_with("lambert ") && said.contains("of that of black"), "{said}");
+    let (_, own, _) = evaluated(&folder, "l.binary", "20 50 70\n");
+    let (code, fitted, _) = evaluated(&folder, "fitted.toml", "20 50 70\n");
+    assert_eq!((code, fitted.len()), (Some(0), 3));
+    for (a, b) in own.iter().zip(&fitted) {
+        assert!((a / b - 1.0).abs() < 1e-3, "{a} {b}");
+    }
+    for (arguments, complaint) in [
+        ("l.binary --model velvet -o v.toml", "possible values"),
+        ("l.binary --model lambert -o v.binary", "end its name in .toml"),
+        ("absent.binary --model lambert -o v.toml", "absent.binary"),
+    ] {
+        let refused = threadlight(&folder, &format!("materials fit {arguments}")).assert().code(2);
+        let stderr = String::from_utf8_lossy(&refused.get_output().stderr).into_owned();
+        assert!(stderr.contains(complaint) && !folder.path().join("v.toml").exists(), "{arguments}: {stderr}");
+    }
+}
+
+#[test]
 fn every_subcommand_has_help() {
     let folder = workplace();
     let help = printed(&mut threadlight(&folder, "--help"));

@@ -7,6 +7,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 mod mutation;
+mod outside;
 mod readers;
 
 use std::collections::HashSet;
@@ -128,30 +129,33 @@ fn fuzz(reader: &Reader) {
 }
 
 macro_rules! readers {
-    ($($(#[$condition:meta])? $name:ident,)+) => {
+    ($($(#[$condition:meta])? $module:ident::$name:ident,)+) => {
         $($(#[$condition])?
         #[test]
         fn $name() {
-            fuzz(&readers::$name());
+            fuzz(&$module::$name());
         })+
     };
 }
 readers! {
-    merl_table,
-    rgl_file,
-    mit_file,
-    utia_file,
-    material,
-    mesh,
-    hdr_environment,
-    exr_environment,
-    scene,
-    threads,
-    pyramid,
-    kept_reference,
-    device_verdict,
+    readers::merl_table,
+    readers::rgl_file,
+    readers::mit_file,
+    readers::utia_file,
+    readers::material,
+    readers::mesh,
+    readers::hdr_environment,
+    readers::exr_environment,
+    readers::scene,
+    readers::threads,
+    readers::pyramid,
+    readers::kept_reference,
+    readers::device_verdict,
     #[cfg(feature = "viewer")]
-    replay,
-    png_picture,
-    measurements,
+    readers::replay,
+    readers::png_picture,
+    readers::measurements,
+    outside::evaluated_angles,
+    outside::evaluated_directions,
+    outside::pipeline_cache,
 }

@@ -348,11 +348,12 @@ pub fn threads() -> Reader {
             let fitted = |rows, azimuths| FittedTable {
                 rows,
                 azimuths,
-                count: 1,
+                count: 2,
+                sets: 2,
                 material: material.clone(),
-                cosine_part: vec![[0.1, 0.2, -0.01]; rows * azimuths],
+                albedo: vec![[0.1, 0.2, 0.4]; rows * azimuths],
                 relative_error: vec![1e-3; rows * azimuths],
-                kernels: vec![PackedKernel([0x1234_5678, 0x3800_4000, 0x3400_3000]); rows * azimuths],
+                kernels: vec![PackedKernel([0x1234_5678, 0x3800_4000, 0x3400_3000]); 2 * rows * azimuths],
             };
             let (isotropic, anisotropic) = (Threads::Fitted(fitted(2, 1)), Threads::Fitted(fitted(1, 10)));
             let file = |threads| written("x.threads", |path| threads::write(&threads, path).expect("a file"));
@@ -360,6 +361,7 @@ pub fn threads() -> Reader {
         },
         words: &[
             "\"rows\":",
+            "\"sets\":",
             "\"count\":",
             "\"method\":\"fitted\"",
             "18446744073709551615",

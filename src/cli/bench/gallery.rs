@@ -21,12 +21,13 @@ Without --materials, all built-in ones are shown; without --methods, fitted, pap
 
 Examples:
   threadlight bench gallery --plot gallery
+  threadlight bench gallery --materials-only --threads 32 --plot gallery
   threadlight bench gallery --materials gold,nickel.binary --compare nickel.binary --environments lebombo.hdr --plot gallery
   threadlight bench gallery --scene dragon.obj --size 320x240 --methods paper,filtered --counts 16,64 --plot gallery
 
 PNG pictures are written into the folder that --plot names:
-  materials.png                         all materials, by the first of the methods (the paper's figure 13); with several
-                                        environments or scenes, materials_ENVIRONMENT_SCENE.png
+  materials.png                         all materials by family, by the first of the methods (the paper's figure 13); with
+                                        several environments or scenes, materials_ENVIRONMENT_SCENE.png
   MATERIAL_ENVIRONMENT_SCENE.png        a material of --compare by methods and counts, with RMS, and the reference as the last
                                         row (the paper's figures 10 and 11)
 
@@ -41,6 +42,9 @@ pub struct BenchGallery {
     /// Materials to compare methods on, named as those of --materials.
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "gold")]
     compare: Vec<String>,
+    /// Draw all materials, and compare no methods.
+    #[arg(long)]
+    materials_only: bool,
     /// Threads or samples of the pictures of all materials, 1 to 1024.
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = value_parser!(u32).range(1..=MAX_COUNT as i64))]
     threads: u32,
@@ -80,6 +84,10 @@ impl BenchGallery {
         let device = self.cases.open_device()?;
         let progress = TerminalProgress::of("materials", "pictures")?;
         let mut sheets = gallery::material_sheets(&materials, estimator, &device, &memo, &progress)?;
+        if self.materials_only {
+            progress.finish();
+            return Ok(write_pictures(&sheets, folder)?);
+        }
         progress.begin("methods");
         let mut measured = Measured::default();
         self.truth.sweep(QUICK_TOLERANCE, &sweep, &device, &memo, &progress, &mut measured)?;

@@ -2,6 +2,7 @@
 mod arguments;
 mod error;
 mod fit;
+mod fractions;
 mod gallery;
 mod live;
 mod report;
@@ -22,6 +23,7 @@ enum What {
     Error(Box<error::BenchError>),
     Speed(Box<speed::BenchSpeed>),
     Fit(fit::BenchFit),
+    Fractions(fractions::BenchFractions),
     Live(Box<live::BenchLive>),
     Stress(stress::BenchStress),
     Gallery(Box<gallery::BenchGallery>),
@@ -34,6 +36,7 @@ impl Bench {
             What::Error(bench) => bench.run(),
             What::Speed(bench) => bench.run(),
             What::Fit(bench) => bench.run(),
+            What::Fractions(bench) => bench.run(),
             What::Live(bench) => bench.run(),
             What::Stress(bench) => bench.run(),
             What::Gallery(bench) => bench.run(),

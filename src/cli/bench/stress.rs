@@ -5,7 +5,7 @@ use crate::cli::scene_flags::MachineFlags;
 use std::io::Write;
 use std::path::PathBuf;
 use threadlight::Error;
-use threadlight::low_level::evaluate::stress::{self, Stressed};
+use threadlight::low_level::evaluate::stress::{self, Extent, Stressed};
 use threadlight::low_level::evaluate::tables;
 use threadlight::low_level::memo::Memo;
 use threadlight::low_level::output;
@@ -15,15 +15,18 @@ const EXAMPLES: &str = "\
 Examples:
   threadlight bench stress
   threadlight bench stress --device swiftshader --json stress.json
+  threadlight bench stress --all --only table
 
-Materials, light and views at the ends of what they may be, by fitted threads and by the paper's: 8 of them, 64 x 48 pixels.
-Each pixel is compared with the CPU's form of the method, given the same surface. The exit code is 1 where a pixel is NaN or
-infinite, or the RMS is above its bound.
+Materials, surfaces, light, views and pictures at the ends of what they may be, by fitted threads and by the paper's: 8 of them,
+64 x 48 pixels. With --all also what takes long, by all methods, and all once more under light so bright that pyramids are in
+single precision. Each pixel is compared with the CPU's form of the method, given the same surface. The exit code is 1 where a
+pixel is NaN or infinite, its display value is not that of its radiance, or the RMS is above its bound.
 
 The JSON is a list of rows with these fields, in this order:
-  case, method            what was shaded
+  case, method, bright    what was shaded, and whether the light is that bright
   covered                 pixels that see a surface
   not_finite              pixels that are NaN or infinite
+  wrongly_shown           pixels whose display value is off by more than a step of 8 bits
   rms, most               of the other ones, relative to the largest of their radiance, the picture's
                           mean, and a millionth of the light's maximum";
 
@@ -33,6 +36,12 @@ The JSON is a list of rows with these fields, in this order:
 pub struct BenchStress {
     #[command(flatten)]
     machine: MachineFlags,
+    /// All cases, by all methods, with pyramids in both of their formats: takes many minutes on a CPU.
+    #[arg(long)]
+    all: bool,
+    /// Only the cases whose names have this in them.
+    #[arg(long, value_name = "TEXT")]
+    only: Option<String>,
     /// Write all measurements as JSON.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
@@ -47,7 +56,8 @@ impl BenchStress {
         drop(instance);
         let progress = TerminalProgress::of("bench stress", "cases")?;
         let mut found = Vec::new();
-        let result = stress::run(&device, &Memo::new(self.machine.cache().as_deref()), &progress, &mut found);
+        let extent = Extent { all: self.all, only: self.only };
+        let result = stress::run(&extent, &device, &Memo::new(self.machine.cache().as_deref()), &progress, &mut found);
         drop(device);
         progress.finish();
         if !found.is_empty() {

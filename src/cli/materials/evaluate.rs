@@ -1,8 +1,7 @@
 //! `threadlight materials evaluate`: values of a BRDF at directions that are read from standard input.
 use super::Named;
-use anyhow::Context;
 use glam::{DVec3, dvec3};
-use std::io::{BufRead, Write};
+use std::io::{BufRead, Read, Write};
 use threadlight::{Error, Result};
 
 const EXAMPLES: &str = "\
@@ -30,16 +29,38 @@ impl Evaluate {
         let brdf = self.named.load()?;
         let parse = if self.directions { of_vectors } else { of_angles };
         let mut out = std::io::BufWriter::new(std::io::stdout().lock());
-        for (number, line) in std::io::stdin().lock().lines().enumerate() {
-            let line = line.context("standard input cannot be read")?;
+        let mut input = std::io::stdin().lock();
+        for number in 1.. {
+            let Some(line) = next_line(&mut input).map_err(|error| within_line(error, number))? else { break };
             if line.trim().is_empty() || line.trim_start().starts_with('#') {
                 continue;
             }
-            let (w_i, w_o) = parse(&line).map_err(|error| error.within(format!("line {}", number + 1)))?;
+            let (w_i, w_o) = parse(&line).map_err(|error| within_line(error, number))?;
             let f = brdf.evaluate(w_i, w_o);
             writeln!(out, "{} {} {}", f.x, f.y, f.z)?;
         }
         Ok(out.flush()?)
+    }
+}
+
+/// Longest line, in bytes: what is read may have no end.
+const MAX_LINE: u64 = 1 << 12;
+
+fn within_line(error: Error, number: usize) -> Error {
+    error.within(format!("standard input, line {number}"))
+}
+
+/// The next line of `input`, if there is one.
+fn next_line(input: &mut impl BufRead) -> Result<Option<String>> {
+    let unusable = |problem: String| Error::input("the line", problem, "give numbers as text");
+    let mut bytes = Vec::new();
+    let read = input.take(MAX_LINE).read_until(b'\n', &mut bytes);
+    match read.map_err(|cause| unusable(format!("cannot be read ({cause})")))? as u64 {
+        0 => Ok(None),
+        MAX_LINE if bytes.last() != Some(&b'\n') => Err(unusable(format!("has more than {MAX_LINE} bytes"))),
+        _ => {
+            String::from_utf8(bytes).map(Some).map_err(|cause| unusable(format!("is no text ({})", cause.utf8_error())))
+        }
     }
 }
 

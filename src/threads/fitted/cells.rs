@@ -1,14 +1,44 @@
 //! Where a fit starts: the mass of the slice's lobes divided into cells, and each cell's moments.
-use glam::DVec3;
+use std::f64::consts::TAU;
 
-use super::kernel::{FINEST_WIDTH_RAD, Kernel, SHARPEST_LEVEL, WIDEST_LEVEL};
+use glam::{DVec2, DVec3};
+
+use super::kernel::{FINEST_WIDTH_RAD, Kernel, SHARPEST_LEVEL, WIDEST_LEVEL, scale_rad};
 use crate::threads::slice::Slice;
+
+/// Sets of fewer kernels than this start from the same cells: dealt out, single cells leave kernels where no step brings them to the others.
+const FEWEST_DEALT: usize = 4;
+
+/// How far such sets start apart, in widths of their kernels: where they are the same, no step would part them.
+const APART: f64 = 0.25;
+
+/// The start of `count` kernels in so many sets, of which kernel k is of set k % `sets`.
+pub fn in_sets(lobes: &Slice, count: usize, sets: usize) -> Vec<Kernel> {
+    if sets == 1 {
+        return cells(lobes, count);
+    }
+    if count / sets >= FEWEST_DEALT {
+        // As wide as its own cell and those that other sets have in its place.
+        let wider = 0.5 * (sets as f64).log2();
+        let wide = |cell: Kernel| Kernel { level: (cell.level + wider).min(WIDEST_LEVEL), ..cell };
+        return cells(lobes, count).into_iter().map(wide).collect();
+    }
+    let cells = cells(lobes, count.div_ceil(sets));
+    let moved = |k: usize| {
+        let (cell, set) = (cells[k / sets], k % sets);
+        let (x, y) = cell.direction.any_orthonormal_pair();
+        let towards = APART * scale_rad(cell.level) * DVec2::from_angle(TAU * set as f64 / sets as f64);
+        let direction = (cell.direction + towards.x * x + towards.y * y).normalize();
+        Kernel { direction, weight: cell.weight / sets as f64, ..cell }
+    };
+    (0..count).map(moved).collect()
+}
 
 /// Kernels at the centroids of `count` cells of `lobes`, as wide as their second moments say, with the mass of the cell.
 /// What lobes stand on is left to the cosine kernel: started there, most kernels stay there, and a few cannot make out a lobe's core.
 ///
 /// Lloyd's relaxation (1982) of points of equal mass.
-pub fn cells(lobes: &Slice, count: usize) -> Vec<Kernel> {
+fn cells(lobes: &Slice, count: usize) -> Vec<Kernel> {
     const POINTS_A_CELL: usize = 60;
     const ROUNDS: usize = 20;
     let total = (count * POINTS_A_CELL).max(600);

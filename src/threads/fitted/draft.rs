@@ -36,7 +36,7 @@ const LIGHTS_A_THREAD: usize = 16;
 /// # Errors
 /// Cancelled by `observer`.
 pub fn draft(brdf: &Brdf, before: &FittedTable, observer: &dyn Observer) -> Result<FittedTable> {
-    let (rows, count) = (before.rows, before.count);
+    let FittedTable { rows, count, sets, .. } = *before;
     let mut places: Vec<usize> = (0..rows).step_by(ROW_STEP).collect();
     if !places.contains(&(rows - 1)) {
         places.push(rows - 1);
@@ -56,7 +56,7 @@ pub fn draft(brdf: &Brdf, before: &FittedTable, observer: &dyn Observer) -> Resu
             None => (start.clone(), FIRST_TIED, FIRST),
         };
         let mut kernels = start;
-        let fit = Fit::new(&lights, albedo / lights.unit).tied(&tied_to, strength);
+        let fit = Fit::new(&lights, albedo / lights.unit).in_sets(sets).tied(&tied_to, strength);
         fit.solve(&mut kernels, effort, observer)?;
         let error = fit.relative_error(&kernels);
         Ok((scaled(&kernels, lights.unit), albedo, error))
@@ -74,14 +74,13 @@ pub fn draft(brdf: &Brdf, before: &FittedTable, observer: &dyn Observer) -> Resu
         let ((_, albedo_a, error_a), (_, albedo_b, error_b)) = (&fitted[low], &fitted[high]);
         (kernels, albedo_a.lerp(*albedo_b, t), error_a + t * (error_b - error_a))
     };
-    Ok(FittedTable::pack(&(0..rows).map(row).collect::<Vec<_>>(), 1))
+    Ok(FittedTable::pack(&(0..rows).map(row).collect::<Vec<_>>(), 1, sets))
 }
 
 /// The kernels of `row` of `table` with weights for this albedo: another colour, or none, has them at once.
 fn in_proportion(table: &FittedTable, row: usize, albedo: DVec3) -> Vec<Kernel> {
     let kernels: Vec<_> = table.row(row).iter().map(|packed| packed.kernel()).collect();
-    let cosine_part = DVec3::from_array(table.cosine_part[row].map(f64::from));
-    let before = kernels.iter().map(|kernel| kernel.weight).sum::<DVec3>() + cosine_part;
+    let before = DVec3::from_array(table.albedo[row].map(f64::from));
     let factor = DVec3::select(before.cmpgt(DVec3::ZERO), albedo / before, DVec3::ZERO);
     kernels.into_iter().map(|kernel| Kernel { weight: factor * kernel.weight, ..kernel }).collect()
 }

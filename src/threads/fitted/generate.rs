@@ -5,7 +5,7 @@ use glam::{DVec2, DVec3, dvec3};
 use rayon::prelude::*;
 
 use super::azimuths::{View, azimuth_count};
-use super::cells::cells;
+use super::cells::in_sets;
 use super::kernel::{Kernel, all_between, scale_rad};
 use super::lights::{Quadrature, TestLights};
 use super::solve::{Effort, Fit};
@@ -52,7 +52,7 @@ pub(super) type Row = (Vec<Kernel>, DVec3, f64);
 pub(super) type Neighbour<'a> = Option<(usize, &'a Row)>;
 
 /// What threads of a BRDF are fitted to: lights, and what it makes of them, in each row.
-pub struct Targets {
+struct Targets {
     /// How many azimuths there are rows of.
     azimuths: usize,
     /// The lights and the albedo.
@@ -60,7 +60,7 @@ pub struct Targets {
 }
 
 /// How many lights there are in a row for so many threads.
-pub fn light_count(threads: usize) -> usize {
+fn light_count(threads: usize) -> usize {
     FEWEST_LIGHTS + LIGHTS_A_THREAD * threads.max(FEWEST_THREADS)
 }
 
@@ -69,7 +69,7 @@ impl Targets {
     ///
     /// # Errors
     /// Cancelled by `observer` (noticed within a row).
-    pub fn new(brdf: &Brdf, rows: usize, lights: usize, observer: &dyn Observer) -> Result<Self> {
+    fn new(brdf: &Brdf, rows: usize, lights: usize, observer: &dyn Observer) -> Result<Self> {
         let azimuths = azimuth_count(brdf);
         let target = |index: usize| -> Result<(TestLights, DVec3)> {
             observer.check()?;
@@ -96,20 +96,6 @@ impl Targets {
 pub fn generate(brdf: &Brdf, settings: &ThreadSettings, observer: &dyn Observer) -> Result<FittedTable> {
     settings.check()?;
     let targets = Targets::new(brdf, settings.rows, light_count(settings.count), observer)?;
-    generate_for(brdf, &targets, settings, observer)
-}
-
-/// [`generate`] for `targets` of `brdf` that are at hand: [`light_count`] lights in each of the rows of `settings`.
-///
-/// # Errors
-/// Those of [`generate`].
-pub fn generate_for(
-    brdf: &Brdf,
-    targets: &Targets,
-    settings: &ThreadSettings,
-    observer: &dyn Observer,
-) -> Result<FittedTable> {
-    settings.check()?;
     let rows = settings.rows;
     let done = AtomicUsize::new(0);
     // Row `index` of all azimuths, from what its neighbours' kernels are there: those of the view angle before and of the azimuth before.
@@ -122,7 +108,7 @@ pub fn generate_for(
             [] => {
                 let View { theta_o, phi_o } = View::of_row(index, rows);
                 let [_, lobes] = Slice::with_lobes(&SeenBrdf::from_azimuth(brdf, phi_o), theta_o, Resolution::FULL);
-                in_units(&cells(&lobes, settings.count))
+                in_units(&in_sets(&lobes, settings.count, settings.sets))
             }
             [one] => one.clone(),
             [a, b, ..] => all_between(a, b, 0.5),
@@ -131,7 +117,7 @@ pub fn generate_for(
         let mut tied = TIED;
         let (kernels, error) = loop {
             let mut kernels = start.clone();
-            let fit = Fit::new(lights, *albedo / lights.unit);
+            let fit = Fit::new(lights, *albedo / lights.unit).in_sets(settings.sets);
             let fit = if neighbours.is_empty() { fit } else { fit.tied(&start, tied) };
             fit.solve(&mut kernels, effort, observer)?;
             let error = fit.relative_error(&kernels);
@@ -165,7 +151,7 @@ pub fn generate_for(
         // Where kernels are is kept, for drafts to start from.
         fitted.iter_mut().for_each(|(kernels, ..)| *kernels = scaled(kernels, 0.0));
     }
-    Ok(FittedTable::pack(&fitted, targets.azimuths))
+    Ok(FittedTable::pack(&fitted, targets.azimuths, settings.sets))
 }
 
 /// `fit` of each of `count` rows: of the middle one, then of the others one after the other outwards, each with the number of its neighbour

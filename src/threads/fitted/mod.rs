@@ -8,6 +8,7 @@
 //! | how kernels answer them | [`answers`] |
 //! | the fit of one row | [`solve`] |
 //! | of all rows | [`generate()`] |
+//! | sets of them, for sub-pixels | [`set_count`] |
 //! | azimuths of the view, for anisotropic BRDFs | [`azimuths`] |
 //! | of an edited BRDF, at once and coarsely | [`draft()`] |
 //! | what a fit leaves, under other lights | [`validation_error`] |
@@ -19,6 +20,7 @@ mod draft;
 mod generate;
 pub mod kernel;
 pub mod lights;
+mod sets;
 pub mod solve;
 mod table;
 #[cfg(test)]
@@ -27,7 +29,8 @@ mod validate;
 
 pub use azimuths::azimuth_count;
 pub use draft::draft;
-pub use generate::{Targets, generate, generate_for, light_count};
+pub use generate::generate;
+pub use sets::set_count;
 pub use table::{FittedTable, PackedKernel, UnpackedKernel};
 pub use validate::validation_error;
 

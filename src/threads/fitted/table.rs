@@ -6,7 +6,6 @@ use half::f16;
 
 use super::azimuths::fold_azimuth;
 use super::kernel::{Kernel, SHARPEST_LEVEL, WIDEST_LEVEL, all_between};
-use super::solve::cosine_part;
 use crate::packing::{octahedral_decode, octahedral_encode, pack_snorm_2x16, unpack_snorm_2x16};
 
 /// A kernel in three words: direction (octahedral, 2 x 16 bits), level and red weight, green and blue weight (half floats).
@@ -69,10 +68,12 @@ pub struct FittedTable {
     pub azimuths: usize,
     /// Number of threads.
     pub count: usize,
+    /// Number of sets of them, each of which does alone, with as many times the weights: thread k is of set k % `sets`.
+    pub sets: usize,
     /// Name of the material, for people.
     pub material: String,
-    /// What the cosine kernel is weighted by in each row, azimuth by azimuth: with the threads' weights it sums to the albedo, as stored.
-    pub cosine_part: Vec<[f32; 3]>,
+    /// In each row, azimuth by azimuth. What the threads' weights leave of it is the cosine kernel's.
+    pub albedo: Vec<[f32; 3]>,
     /// Expected error of each row, relative to the radiance under lights of all sizes.
     pub relative_error: Vec<f32>,
     /// Row by row: thread k of row r of azimuth a is `kernels[(a * rows + r) * count + k]`.
@@ -118,46 +119,58 @@ impl FittedTable {
         if weights > 0.0 { (squares / weights).sqrt() } else { self.relative_error.first().copied().unwrap_or(0.0) }
     }
 
-    /// The threads that have weight in some row, with the sharpest level that they have in any; the sharpest first. A diffuse material has
-    /// none.
+    /// The threads in the order of the device, with the sharpest level that each has in any row. In each set those that have weight in some row
+    /// are first, and of these the sharpest; what follows the last that has weight in any set is left out. A diffuse material has none.
     fn used(&self) -> Vec<(usize, f32)> {
-        let kernels = |thread| self.kernels.iter().skip(thread).step_by(self.count).map(|kernel| kernel.unpack());
-        let has_weight = |&thread: &usize| kernels(thread).any(|kernel| kernel.weight.max_element() > 0.0);
-        let sharpest = |thread| kernels(thread).map(|kernel| kernel.level).fold(f32::INFINITY, f32::min);
-        let mut used: Vec<_> = (0..self.count).filter(has_weight).map(|thread| (thread, sharpest(thread))).collect();
-        used.sort_by(|(_, a), (_, b)| a.total_cmp(b));
+        let of_thread = |thread: usize| {
+            let kernels = self.kernels.iter().skip(thread).step_by(self.count).map(|kernel| kernel.unpack());
+            let [mut has_weight, mut sharpest] = [0.0, f32::INFINITY];
+            for kernel in kernels {
+                has_weight = kernel.weight.max_element().max(has_weight);
+                sharpest = kernel.level.min(sharpest);
+            }
+            (thread, if has_weight > 0.0 { sharpest } else { f32::INFINITY })
+        };
+        let of_set = |set: usize| {
+            let mut threads: Vec<_> = (set..self.count).step_by(self.sets).map(of_thread).collect();
+            threads.sort_by(|(_, a), (_, b)| a.total_cmp(b));
+            threads
+        };
+        let sets: Vec<_> = (0..self.sets).map(of_set).collect();
+        let mut used: Vec<_> = (0..self.count).map(|place| sets[place % self.sets][place / self.sets]).collect();
+        used.truncate(used.iter().rposition(|(_, sharpest)| sharpest.is_finite()).map_or(0, |last| last + 1));
         used
     }
 
-    /// How many threads there are on the device: those that have weight in some row.
+    /// How many threads there are on the device: up to the last one that has weight in some row.
     pub fn used_count(&self) -> usize {
         self.used().len()
     }
 
-    /// How many of them are sharper than `level` in some row: the first ones.
+    /// How many of them, up to the last one that is, are sharper than `level` in some row.
     pub fn sharp_count(&self, level: f32) -> usize {
-        self.used().into_iter().filter(|&(_, sharpest)| sharpest < level).count()
+        self.used().iter().rposition(|&(_, sharpest)| sharpest < level).map_or(0, |last| last + 1)
     }
 
     /// Words of an element of the shader's buffer: its array is of words.
     pub(in super::super) const DEVICE_ELEMENT_WORDS: usize = 1;
 
-    /// The buffer of the shader. Row by row: the cosine part, then the kernels that are used, those of threads that are sharp anywhere first.
+    /// The buffer of the shader. Row by row: the albedo, then the kernels that are used, those of threads that are sharp anywhere first.
     pub fn device_words(&self) -> Vec<u32> {
         let used = &self.used();
-        let row = |(row, cosine_part): (usize, &[f32; 3])| {
+        let row = |(row, albedo): (usize, &[f32; 3])| {
             let kernels = used.iter().map(move |&(thread, _)| self.row(row)[thread].0);
-            std::iter::once(cosine_part.map(f32::to_bits)).chain(kernels)
+            std::iter::once(albedo.map(f32::to_bits)).chain(kernels)
         };
-        self.cosine_part.iter().enumerate().flat_map(row).flatten().collect()
+        self.albedo.iter().enumerate().flat_map(row).flatten().collect()
     }
 
     /// Words of a row in a file, besides its threads.
     pub(in super::super) const FILE_ROW_WORDS: usize = 4;
 
-    /// The words of a file: cosine part and relative error of each row, then the kernels.
+    /// The words of a file: albedo and relative error of each row, then the kernels.
     pub(in super::super) fn file_words(&self) -> Vec<u32> {
-        let rows = self.cosine_part.iter().zip(&self.relative_error);
+        let rows = self.albedo.iter().zip(&self.relative_error);
         let rows = rows.flat_map(|([red, green, blue], error)| [*red, *green, *blue, *error]).map(f32::to_bits);
         rows.chain(self.kernels.iter().flat_map(|kernel| kernel.0)).collect()
     }
@@ -166,31 +179,27 @@ impl FittedTable {
     pub(in super::super) fn from_file_words(of_rows: &[u32], of_threads: &[u32]) -> Result<Self, String> {
         let (of_rows, kernels) = (of_rows.as_chunks::<4>().0, of_threads.as_chunks().0);
         let kernels: Vec<_> = kernels.iter().copied().map(PackedKernel).collect();
-        let cosine_part: Vec<[f32; 3]> = of_rows.iter().map(|&[r, g, b, _]| [r, g, b].map(f32::from_bits)).collect();
+        let albedo: Vec<[f32; 3]> = of_rows.iter().map(|&[r, g, b, _]| [r, g, b].map(f32::from_bits)).collect();
         let relative_error: Vec<f32> = of_rows.iter().map(|&[.., error]| f32::from_bits(error)).collect();
-        if !cosine_part.iter().flatten().chain(&relative_error).all(|value| value.is_finite()) {
+        if !albedo.iter().flatten().chain(&relative_error).all(|value| value.is_finite()) {
             return Err("holds a row that is not of finite numbers".into());
         }
         if !kernels.iter().all(|kernel| kernel.is_usable()) {
             return Err("holds a thread whose level or weight is none".into());
         }
-        Ok(Self { rows: 0, azimuths: 0, count: 0, material: String::new(), cosine_part, relative_error, kernels })
+        Ok(Self { rows: 0, azimuths: 0, count: 0, sets: 0, material: String::new(), albedo, relative_error, kernels })
     }
 
     /// Packs rows of kernels, with the albedo and the relative error of each; as many rows for each of `azimuths`.
-    pub(super) fn pack(rows: &[(Vec<Kernel>, DVec3, f64)], azimuths: usize) -> Self {
+    pub(super) fn pack(rows: &[(Vec<Kernel>, DVec3, f64)], azimuths: usize, sets: usize) -> Self {
         let kernels: Vec<_> = rows.iter().flat_map(|(kernels, ..)| kernels.iter().map(PackedKernel::new)).collect();
-        let count = rows.first().map_or(0, |(kernels, ..)| kernels.len());
-        // From the weights as they were rounded, so that a white furnace does not see it.
-        let cosine = rows.iter().zip(kernels.chunks(count.max(1))).map(|((.., albedo, _), packed)| {
-            cosine_part(&packed.iter().map(|kernel| kernel.kernel()).collect::<Vec<_>>(), *albedo).as_vec3().to_array()
-        });
         Self {
             rows: rows.len() / azimuths,
             azimuths,
-            count,
+            count: rows.first().map_or(0, |(kernels, ..)| kernels.len()),
+            sets,
             material: String::new(),
-            cosine_part: cosine.collect(),
+            albedo: rows.iter().map(|(_, albedo, _)| albedo.as_vec3().to_array()).collect(),
             relative_error: rows.iter().map(|&(.., error)| error as f32).collect(),
             kernels,
         }

@@ -12,7 +12,7 @@ use crate::threads::slice::{Slice, fibonacci_lattice};
 use crate::threads::{ThreadKind, ThreadSettings, Threads, read, test_materials, theta_o, write};
 
 fn small(count: usize, rows: usize) -> ThreadSettings {
-    ThreadSettings { kind: ThreadKind::Fitted, count, rows, seed: 0 }
+    ThreadSettings { kind: ThreadKind::Fitted, count, rows, ..ThreadSettings::default() }
 }
 
 fn black() -> Brdf {
@@ -28,7 +28,7 @@ fn check(name: &str, table: &FittedTable) {
         assert!((SHARPEST_LEVEL as f32..=WIDEST_LEVEL as f32).contains(&kernel.level), "{name}: {kernel:?}");
         assert!(kernel.weight.is_finite() && kernel.weight.min_element() >= 0.0, "{name}: {kernel:?}");
     }
-    assert!(table.cosine_part.as_flattened().iter().all(|value| value.is_finite()), "{name}");
+    assert!(table.albedo.as_flattened().iter().all(|value| value.is_finite()), "{name}");
     assert!(table.relative_error.iter().all(|error| error.is_finite() && *error >= 0.0), "{name}");
 }
 
@@ -81,17 +81,18 @@ fn tables_are_equal_to_the_bit_on_any_number_of_cores() {
 }
 
 #[test]
-fn weights_are_not_negative_and_sum_to_the_albedo() {
+fn weights_are_not_negative_and_within_the_albedo() {
     for (name, brdf) in test_materials::all() {
         for settings in [small(1, 1), small(7, 6)] {
             let table = generate(&brdf, &settings, &()).unwrap();
             check(name, &table);
-            for (row, cosine_part) in table.cosine_part.iter().enumerate() {
+            for (row, stored) in table.albedo.iter().enumerate() {
                 let albedo = Slice::new(&SeenBrdf::from_all_around(&brdf), theta_o(row, table.rows)).albedo();
+                let stored = glam::Vec3::from(*stored).as_dvec3();
+                assert!((stored - albedo).abs().cmple(1e-6 * albedo).all(), "{name}, row {row}: {stored} {albedo}");
+                // The cosine part is what is left of it: if less than nothing, then by what rounding and the lights' few points make.
                 let weights: DVec3 = table.row(row).iter().map(|packed| packed.unpack().weight.as_dvec3()).sum();
-                let sum = weights + glam::Vec3::from(*cosine_part).as_dvec3();
-                // The cosine part makes up for how weights were rounded and is itself a single float.
-                assert!((sum - albedo).abs().cmple(1e-6 * albedo).all(), "{name}, row {row}: {sum} {albedo}");
+                assert!(weights.cmple(1.05 * albedo).all(), "{name}, row {row}: {weights} {albedo}");
             }
         }
     }
@@ -128,11 +129,40 @@ fn more_threads_leave_less_error() {
     }
 }
 
+/// The threads of `set` alone.
+fn alone(table: &FittedTable, set: usize) -> FittedTable {
+    let of_set = |packed: &PackedKernel| {
+        let kernel = packed.kernel();
+        PackedKernel::new(&Kernel { weight: table.sets as f64 * kernel.weight, ..kernel })
+    };
+    FittedTable {
+        count: table.count / table.sets,
+        sets: 1,
+        kernels: table.kernels.iter().skip(set).step_by(table.sets).map(of_set).collect(),
+        ..table.clone()
+    }
+}
+
+#[test]
+fn each_set_of_threads_does_alone_and_all_do_better() {
+    for (name, brdf) in test_materials::all().into_iter().filter(|(name, _)| *name != "lambert") {
+        let error = |table: &FittedTable| validation_error(table, &brdf);
+        let table = generate(&brdf, &ThreadSettings { sets: 4, ..small(16, 30) }, &()).unwrap();
+        let [few, many] = [4, 16].map(|count| error(&generate(&brdf, &small(count, 30), &()).unwrap()));
+        let each: Vec<_> = (0..4).map(|set| error(&alone(&table, set))).collect();
+        let all = error(&table);
+        println!("{name}: {few:.4} with 4 threads, {each:.4?} with sets of 4, {all:.4} with all 16, {many:.4} if free");
+        // Of a lobe of 0.3 degrees, which 4 threads answer as 16 do, one set has 2.5 times the error of the others.
+        assert!(each.iter().all(|&each| each < 3.0 * few), "{name}: {few} {each:?}");
+        assert!(all < few && all < each.iter().sum::<f64>() / 4.0, "{name}: {all} {few} {each:?}");
+    }
+}
+
 #[test]
 fn materials_that_reflect_nothing_or_as_mirrors_have_finite_tables() {
     let table = generate(&black(), &small(4, 5), &()).unwrap();
     check("black", &table);
-    assert!(table.cosine_part.as_flattened().iter().all(|value| *value == 0.0));
+    assert!(table.albedo.as_flattened().iter().all(|value| *value == 0.0));
     assert!(table.kernels.iter().all(|kernel| kernel.unpack().weight == glam::Vec3::ZERO));
     // 90 rows: the last is at 89 degrees, where the lobe is cut by the horizon.
     check("narrow", &generate(test_materials::narrow(), &small(2, 90), &()).unwrap());
@@ -209,10 +239,7 @@ fn drafts_follow_an_edited_parameter_with_up_to_three_times_the_error() {
         [&drafted, &generate(&gold(0.29), &settings, &()).unwrap()].map(|table| validation_error(table, &gold(0.29)));
     println!("after 40 drafts {found:.5}, finished {finished:.5}");
     assert!(found < 3.0 * finished, "{found} {finished}");
-    let furnace = |row: usize| {
-        let weights: DVec3 = drafted.row(row).iter().map(|packed| packed.unpack().weight.as_dvec3()).sum();
-        weights + glam::Vec3::from(drafted.cosine_part[row]).as_dvec3()
-    };
+    let furnace = |row: usize| glam::Vec3::from(drafted.albedo[row]).as_dvec3();
     for row in [0, 32, 60, 85] {
         let albedo = gold(0.29).albedo(theta_o(row, drafted.rows));
         assert!(((furnace(row) - albedo) / albedo).abs().max_element() < 4e-3, "{row}: {} {albedo}", furnace(row));

@@ -5,7 +5,7 @@ use crate::scene::{MaterialSettings, MaterialSource};
 use crate::viewer::change::Change;
 use crate::viewer::input::Input;
 use crate::viewer::interaction::Viewer;
-use egui::{SliderClamping, Ui};
+use egui::{RichText, SliderClamping, Ui};
 
 #[derive(Default)]
 pub struct State {
@@ -69,7 +69,9 @@ fn parameters_of(settings: &MaterialSettings) -> Option<Vec<(Parameter, toml::Va
 fn row(ui: &mut Ui, material: &str, parameter: &Parameter, value: &toml::Value, inputs: &mut Vec<Input>) {
     let Parameter { key, help, domain, .. } = parameter;
     let set = |value: toml::Value| Change::Parameter { material: material.to_owned(), key: key.to_owned(), value };
-    ui.label(key).on_hover_text(*help);
+    // Names of inner tables are long, and rows that are wider than the panel would cut all groups off.
+    let name = RichText::new(key);
+    ui.label(if key.contains('.') { name.small() } else { name }).on_hover_text(*help);
     match domain {
         Domain::Number(range, spacing) => {
             let mut number = as_number(value);
@@ -90,7 +92,7 @@ fn row(ui: &mut Ui, material: &str, parameter: &Parameter, value: &toml::Value, 
                 for channel in 0..3 {
                     let drag =
                         egui::DragValue::new(&mut rgb[channel]).range(range.clone()).speed(0.005).max_decimals(3);
-                    let response = ui.add_sized([44.0, 18.0], drag).on_hover_text(*help);
+                    let response = ui.add_sized([40.0, 18.0], drag).on_hover_text(*help);
                     on_change(&response, inputs, || set(array(rgb)));
                 }
                 if *range == (0.0..=1.0) {

@@ -4,6 +4,7 @@ mod display;
 mod light;
 mod material;
 mod object;
+mod plots;
 mod save;
 mod shading;
 mod statistics;
@@ -21,6 +22,7 @@ pub const WIDTH: f32 = 300.0;
 #[derive(Default)]
 pub struct Panel {
     material: material::State,
+    plots: plots::State,
     light: light::State,
     object: object::State,
     save: save::State,
@@ -38,6 +40,7 @@ impl Panel {
             ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
                 ui.spacing_mut().slider_width = 120.0;
                 self.material.show(ui, viewer, &mut inputs);
+                self.plots.show(ui, viewer);
                 self.light.show(ui, viewer, &mut inputs);
                 self.object.show(ui, viewer, &mut inputs);
                 shading::show(ui, viewer, &mut inputs);

@@ -34,7 +34,7 @@ impl State {
                 }
                 None => ui.weak("move the cursor over an object"),
             };
-            let threads = material.threads.as_ref().map(|sets| &*sets.pixel);
+            let threads = material.threads.as_deref();
             match threads {
                 Some(threads) => threads_seen::draw_hemisphere(ui, threads, surface.as_ref()),
                 None => drop(ui.weak("this method has no threads")),

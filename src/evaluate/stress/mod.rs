@@ -1,0 +1,238 @@
+//! Hard cases: whether what a device shades is finite, and what the CPU's form of the same method shades: `threadlight bench stress`.
+//!
+//! Materials, surfaces, light, views and pictures at the ends of what they may be: `cases.rs`. The device is compared with the CPU given the
+//! same surfaces, so that what is found is of shading alone.
+mod cases;
+
+use std::sync::Arc;
+
+use glam::{UVec2, Vec4};
+use rayon::prelude::*;
+use serde::Serialize;
+
+use self::cases::Case;
+use super::metrics::Display;
+use super::tables::{Section, Table};
+use crate::environment::{Environment, RepairCounts};
+use crate::error::{Error, Result};
+use crate::memo::{Held, Key, Keyed, Memo};
+use crate::method::Method;
+use crate::pipeline::{DeviceScene, Wanted};
+use crate::prepare::prepare;
+use crate::progress::Observer;
+use crate::shading::{CpuShader, texels_of_pixel};
+use crate::vulkan::Device;
+
+/// What differences may be: RMS over the covered pixels, each relative to the largest of its radiance, the picture's mean, and a millionth
+/// of the light's maximum, in which all rounds.
+pub const MOST_RMS: f64 = 2e-3;
+/// The same of the methods that draw samples. Of their pixels the worst twentieth is left out: a sample on the other side of an edge, of a
+/// cell or of a choice makes another pixel.
+pub const MOST_RMS_DRAWN: f64 = 3e-3;
+/// Light is made as bright as this where pyramids are to be in single precision: half floats, scaled, go to 4e6.
+const BRIGHT: f64 = 1e9;
+
+/// Which cases.
+#[derive(Clone, Debug, Default)]
+pub struct Extent {
+    /// All of them, by all methods, with pyramids in both formats; else those that take little time, by the methods that have threads.
+    pub all: bool,
+    /// Only those that have this in their names.
+    pub only: Option<String>,
+}
+
+/// What became of a case.
+#[derive(Clone, Debug, Serialize)]
+pub struct Stressed {
+    /// What is hard.
+    pub case: String,
+    /// By which method.
+    pub method: &'static str,
+    /// Whether light is so bright that pyramids are in single precision, not in half floats.
+    pub bright: bool,
+    /// Pixels that see a surface.
+    pub covered: usize,
+    /// Pixels with a value that is NaN or infinite.
+    pub not_finite: usize,
+    /// Pixels within a surface whose display value is off by more than a step of 8 bits.
+    pub wrongly_shown: usize,
+    /// Of the finite ones, as [`MOST_RMS`] has it, or [`MOST_RMS_DRAWN`].
+    pub rms: f64,
+    /// The largest such difference of a pixel.
+    pub most: f64,
+}
+
+impl Stressed {
+    /// Whether a bound is broken.
+    pub fn is_broken(&self) -> bool {
+        let most = if draws(self.method) { MOST_RMS_DRAWN } else { MOST_RMS };
+        self.not_finite > 0 || self.wrongly_shown > 0 || self.rms.is_nan() || self.rms > most
+    }
+}
+
+/// Whether the method of that name draws samples, which differ where a choice is close.
+fn draws(method: &str) -> bool {
+    Method::from_name(method).is_ok_and(|method| method.threads().is_none() && !method.lookups().split_sums)
+}
+
+/// Runs cases on `device`; `found` has what was seen until an error or an interruption.
+///
+/// # Errors
+/// Whatever Vulkan refuses, a folder for files that cannot be made; cancelled.
+pub fn run(
+    extent: &Extent,
+    device: &Arc<Device>,
+    memo: &Memo,
+    observer: &dyn Observer,
+    found: &mut Vec<Stressed>,
+) -> Result<()> {
+    let folder = tempfile::tempdir().map_err(|cause| Error::unwritable(std::env::temp_dir(), cause))?;
+    let is_asked = |case: &Case| {
+        (extent.all || !case.is_slow) && extent.only.as_ref().is_none_or(|only| case.name.contains(only.as_str()))
+    };
+    let cases: Vec<Case> = cases::cases(folder.path()).into_iter().filter(is_asked).collect();
+    let methods = || Method::ALL.iter().filter(|method| method.runs_on_gpu());
+    let methods: Vec<Method> = methods().filter(|method| extent.all || method.threads().is_some()).copied().collect();
+    let formats: &[bool] = if extent.all { &[false, true] } else { &[false] };
+    let total = cases.len() * methods.len() * formats.len();
+    let mut done = 0;
+    for case in &cases {
+        let file = case.write_file()?;
+        // What the methods have in common is made once.
+        let mut held = Held::default();
+        for &method in &methods {
+            for &bright in formats {
+                observer.check()?;
+                found.extend(stress(device, memo, case, method, bright, &mut held)?);
+                done += 1;
+                observer.progress(done, total);
+            }
+        }
+        file.map_or(Ok(()), std::fs::remove_file).map_err(|cause| Error::unwritable(folder.path(), cause))?;
+    }
+    Ok(())
+}
+
+/// What becomes of a case by `method`; none where its light cannot be made bright, or the method refuses the material.
+fn stress(
+    device: &Arc<Device>,
+    memo: &Memo,
+    case: &Case,
+    method: Method,
+    bright: bool,
+    held: &mut Held,
+) -> Result<Option<Stressed>> {
+    let mut scene = case.scene.clone();
+    scene.shading.method = method.name().to_owned();
+    let most = method.max_count(scene.image.subpixels);
+    scene.shading.threads = scene.shading.threads.map(|count| count.min(most));
+    let round = memo.round(&());
+    let mut prepared = prepare(&scene, &round)?;
+    let light = case.light.as_ref().map_or_else(|| (*prepared.environment).clone(), |light| light());
+    let light = if bright { brightened(&light) } else { Some(light) };
+    let Some(light) = light else { return Ok(None) };
+    prepared.environment = Keyed::new(Key::of_digest(light.fingerprint()), light);
+    let wanted = Wanted { radiance: true, display: true, geometry: true };
+    let rendering = DeviceScene::new(device, &prepared, &round)?.render(wanted, 1)?;
+    let twin = CpuShader::new(&prepared, &round)?;
+    *held = round.held();
+    let width = prepared.view.width;
+    let expected = |pixel: usize| {
+        let pixel = UVec2::new(pixel as u32 % width, pixel as u32 / width);
+        twin.shade(pixel, &texels_of_pixel(&prepared.view, &rendering.geometry, pixel))
+    };
+    let expected: Vec<Vec4> = (0..rendering.radiance.len()).into_par_iter().map(expected).collect();
+    let least = 1e-6 * prepared.view.intensity * prepared.environment.max_radiance();
+    let display = Display::of(&prepared.view);
+    let is_wrong = |(radiance, shown): &(&[f32; 4], &[u8])| {
+        let off = |channel: usize| 255.0 * display.value(radiance[channel].into()) - f64::from(shown[channel]);
+        radiance[3] == 1.0 && (0..3).any(|channel| off(channel).abs() > 1.0)
+    };
+    let wrongly_shown = rendering.radiance.iter().zip(rendering.display.chunks_exact(4)).filter(is_wrong).count();
+    Ok(Some(Stressed {
+        bright,
+        wrongly_shown,
+        ..compare(&case.name, method.name(), &rendering.radiance, &expected, least)
+    }))
+}
+
+/// The same light, of which the brightest is about [`BRIGHT`]; none where that is not brighter.
+fn brightened(light: &Environment) -> Option<Environment> {
+    let factor = (BRIGHT / light.max_radiance()).log2().ceil().exp2();
+    if !factor.is_finite() || factor < 1.0 {
+        return None;
+    }
+    let texels = light.texels.iter().map(|texel| texel.map(|value| (f64::from(value) * factor) as f32)).collect();
+    let name = format!("{}, bright", light.name);
+    Some(Environment::new(name, light.width, light.height, texels, RepairCounts::default()))
+}
+
+/// What was `found` beside what was `expected`: radiance times coverage, and coverage. `least` is a radiance that is as good as none.
+fn compare(case: &str, method: &'static str, found: &[[f32; 4]], expected: &[Vec4], least: f64) -> Stressed {
+    let pairs = found.iter().map(|found| Vec4::from(*found)).zip(expected.iter().copied());
+    let pairs: Vec<_> = pairs.filter(|(found, expected)| found.w.max(expected.w) > 0.0 || !found.is_finite()).collect();
+    let largest = |of: Vec4| f64::from(of.truncate().max_element());
+    let mean = pairs.iter().map(|(_, expected)| largest(*expected)).sum::<f64>() / pairs.len().max(1) as f64;
+    let mut differences = Vec::new();
+    for (found, expected) in pairs.iter().filter(|(found, _)| found.is_finite()) {
+        let scale = largest(*expected).max(mean).max(least);
+        let difference = (found.as_dvec4() - expected.as_dvec4()).truncate().abs().max_element();
+        // Where all is black, black is expected.
+        differences.push(if difference == 0.0 { 0.0 } else { difference / scale });
+    }
+    let not_finite = pairs.len() - differences.len();
+    differences.sort_by(f64::total_cmp);
+    let most = differences.last().copied().unwrap_or_default();
+    if draws(method) {
+        differences.truncate(differences.len() - differences.len() / 20);
+    }
+    let squares: f64 = differences.iter().map(|difference| difference * difference).sum();
+    let rms = (squares / differences.len().max(1) as f64).sqrt();
+    let covered = pairs.len();
+    Stressed { case: case.to_owned(), method, bright: false, covered, not_finite, wrongly_shown: 0, rms, most }
+}
+
+/// The table that `bench stress` prints.
+pub fn tables(found: &[Stressed]) -> Section {
+    let of_method = |method: &'static str, bright: bool| {
+        let row = |case: &Stressed| {
+            let verdict = if case.is_broken() { "broken" } else { "" };
+            let counts = [case.covered, case.not_finite, case.wrongly_shown].map(|count| count.to_string());
+            let differences = [case.rms, case.most].map(|difference| format!("{difference:.1e}"));
+            (case.case.clone(), [&counts[..], &differences, &[verdict.to_owned()]].concat())
+        };
+        let head = ["pixels", "not finite", "wrongly shown", "RMS", "most", ""].map(str::to_owned).to_vec();
+        let is_of = |case: &&Stressed| (case.method, case.bright) == (method, bright);
+        let rows: Vec<_> = found.iter().filter(is_of).map(row).collect();
+        let title = if bright { format!("{method}, bright") } else { method.to_owned() };
+        (!rows.is_empty()).then_some(Table { title, head, rows })
+    };
+    let title = format!(
+        "Device and CPU, relative to radiance; {MOST_RMS:.0e} RMS is allowed, {MOST_RMS_DRAWN:.0e} where samples are drawn:"
+    );
+    let tables = Method::ALL.iter().flat_map(|method| [false, true].map(|bright| of_method(method.name(), bright)));
+    Section { title, tables: tables.flatten().collect() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_not_finite_or_not_as_expected_breaks_a_bound() {
+        let expected = vec![Vec4::new(1.0, 0.5, 0.2, 1.0); 100];
+        let right: Vec<[f32; 4]> = expected.iter().map(|pixel| pixel.to_array()).collect();
+        assert!(!compare("right", "fitted", &right, &expected, 0.0).is_broken());
+        for (pixel, value) in [(3, f32::NAN), (4, f32::INFINITY), (5, 1.1)] {
+            let mut found = right.clone();
+            found[pixel][0] = value;
+            let stressed = compare("planted", "fitted", &found, &expected, 0.0);
+            assert!(stressed.is_broken(), "{stressed:?}");
+            assert_eq!(stressed.not_finite, usize::from(!value.is_finite()));
+        }
+        // Black on black is right, light on black is not.
+        let (black, dark) = (vec![Vec4::W; 4], [[0.0, 0.0, 0.0, 1.0]; 4]);
+        assert!(!compare("black", "fitted", &dark, &black, 0.0).is_broken());
+        assert!(compare("black", "fitted", &[[1e-9, 0.0, 0.0, 1.0]; 4], &black, 0.0).is_broken());
+    }
+}

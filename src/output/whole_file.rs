@@ -1,0 +1,157 @@
+//! Files that are written whole or not at all, and what is swept up after writers that were killed.
+use std::fs::OpenOptions;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use tempfile::NamedTempFile;
+
+use crate::error::{Error, Result};
+
+/// How names of temporary files begin; letters and digits follow.
+const PREFIX: &str = ".threadlight-";
+/// How many of them.
+const LETTERS: usize = 6;
+/// A writer that lives has written to its temporary file within this time: the bytes are all there when it begins.
+const MOST_AGE: Duration = Duration::from_secs(60);
+
+/// Says at once whether a file could be written to `path`, so that a long rendering does not end in an error.
+pub fn check_writable(path: &Path) -> Result<()> {
+    match target(path) {
+        _ if path.is_dir() => Err(Error::unwritable(path, "it is a folder")),
+        // A pipe may have no reader yet.
+        Target::Stream => Ok(()),
+        Target::File(file) => temporary_beside(path, &file).map(drop),
+    }
+}
+
+/// Writes `bytes` to `path`: into a temporary file in the same folder first, then renamed, so that whoever looks sees
+/// the old file or the whole new one, and a failure leaves nothing behind. Devices and pipes are written to as they are.
+pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
+    let failed = |cause: std::io::Error| Error::unwritable(path, cause);
+    match target(path) {
+        Target::Stream => OpenOptions::new().write(true).open(path).and_then(|mut stream| stream.write_all(bytes)),
+        Target::File(file) => {
+            let mut temporary = temporary_beside(path, &file)?;
+            temporary.write_all(bytes).and_then(|()| temporary.persist(&file).map(drop).map_err(|failed| failed.error))
+        }
+    }
+    .map_err(failed)
+}
+
+/// Removes what is no file from where a file of a cache is to be: an empty folder, a pipe, a link.
+pub(crate) fn make_way(path: &Path) -> Result<()> {
+    let removed = match path.symlink_metadata() {
+        Ok(metadata) if metadata.is_dir() => std::fs::remove_dir(path),
+        Ok(metadata) if !metadata.is_file() => std::fs::remove_file(path),
+        _ => Ok(()),
+    };
+    removed.map_err(|cause| Error::unwritable(path, cause))
+}
+
+/// What a path leads to.
+enum Target {
+    /// A file, or nothing yet; links are followed, so that they stay.
+    File(PathBuf),
+    /// A device or a pipe, such as /dev/stdout: nothing that a file may be put in the place of.
+    Stream,
+}
+
+fn target(path: &Path) -> Target {
+    match path.metadata() {
+        Ok(metadata) if !metadata.is_file() && !metadata.is_dir() => Target::Stream,
+        Ok(_) => Target::File(path.canonicalize().unwrap_or_else(|_| path.to_owned())),
+        Err(_) => Target::File(path.to_owned()),
+    }
+}
+
+/// An empty file in the folder of `file`, deleted when dropped. Errors name `path`.
+fn temporary_beside(path: &Path, file: &Path) -> Result<NamedTempFile> {
+    let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(PREFIX).rand_bytes(LETTERS);
+    // A temporary file is private (0600) unless told otherwise; the picture is to be as readable as any other file.
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    let temporary = builder.tempfile_in(folder).map_err(|cause| {
+        // The temporary file's name, which the cause repeats, is of no use to the user.
+        Error::unwritable(path, cause.kind())
+    })?;
+    sweep(folder, &temporary);
+    Ok(temporary)
+}
+
+/// Removes the temporary files of writers that were killed. The new one tells the time: a folder may be on another machine, with a clock
+/// of its own. What cannot be removed is left.
+fn sweep(folder: &Path, new: &NamedTempFile) {
+    let Some(now) = new.as_file().metadata().ok().and_then(|metadata| metadata.modified().ok()) else { return };
+    for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+        let is_temporary = |name: &str| name.strip_prefix(PREFIX).is_some_and(|rest| rest.len() == LETTERS);
+        if !entry.file_name().to_str().is_some_and(is_temporary) {
+            continue;
+        }
+        let Ok(metadata) = entry.metadata() else { continue };
+        let age = metadata.modified().ok().and_then(|modified| now.duration_since(modified).ok());
+        if metadata.is_file() && age.is_some_and(|age| age > MOST_AGE) {
+            let _ = std::fs::remove_file(entry.path());
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs::File;
+
+    fn names(folder: &Path) -> Vec<String> {
+        let entries = std::fs::read_dir(folder).unwrap();
+        let mut names: Vec<_> = entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn what_a_killed_writer_left_is_swept_up_by_a_later_one() {
+        let folder = tempfile::tempdir().unwrap();
+        let old = [".threadlight-abc123", ".threadlight-x", "threadlight-abc123", ".threadlight-abc124"];
+        for name in old {
+            let file = File::create(folder.path().join(name)).unwrap();
+            // The last one may be a living writer's.
+            if name != old[3] {
+                file.set_modified(std::time::SystemTime::now() - 2 * MOST_AGE).unwrap();
+            }
+        }
+        write_whole(&folder.path().join("new"), b"new").unwrap();
+        assert_eq!(names(folder.path()), [".threadlight-abc124", ".threadlight-x", "new", "threadlight-abc123"]);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_stays_and_what_it_points_to_is_written() {
+        let folder = tempfile::tempdir().unwrap();
+        let (link, file) = (folder.path().join("link"), folder.path().join("below/file"));
+        std::fs::create_dir(folder.path().join("below")).unwrap();
+        std::fs::write(&file, "old").unwrap();
+        std::os::unix::fs::symlink("below/file", &link).unwrap();
+        write_whole(&link, b"new").unwrap();
+        assert!(link.is_symlink() && std::fs::read(&file).unwrap() == b"new");
+        assert_eq!(names(&folder.path().join("below")), ["file"]);
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_device_stays_a_device_and_says_that_it_is_full() {
+        for path in ["/dev/null", "/dev/full"].map(Path::new) {
+            check_writable(path).unwrap();
+            let written = write_whole(path, b"new");
+            assert!(!path.is_file());
+            match path.ends_with("null") {
+                true => written.unwrap(),
+                false => {
+                    let error = written.unwrap_err().to_string();
+                    assert!(error.contains("/dev/full") && error.contains("No space left"), "{error}");
+                }
+            }
+        }
+    }
+}

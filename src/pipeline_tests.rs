@@ -1,0 +1,57 @@
+//! Pictures that are not finished, since the device is lost or out of memory on the way.
+use super::*;
+use crate::memo::Memo;
+use crate::prepare::prepare;
+use crate::scene::{Scene, Source};
+use crate::vulkan::Instance;
+use crate::vulkan::faults::{Fault, with_fault};
+use ash::vk::Result as Call;
+use std::time::{Duration, Instant};
+
+/// Opens a device and renders a small picture, with what fails and the calls that were made; all is closed again.
+fn render(prepared: &Prepared, fault: Option<Fault>) -> (Result<usize>, Vec<&'static str>) {
+    let instance = Instance::new(true).expect("an instance");
+    let messages = instance.messages();
+    let asked = std::env::var("THREADLIGHT_TEST_DEVICE").ok();
+    let device = Device::new(&instance, asked.as_deref()).expect("a device");
+    drop(instance);
+    let memo = Memo::default();
+    let rendered = with_fault(fault, || {
+        let wanted = Wanted { radiance: true, display: true, geometry: true };
+        Ok(DeviceScene::new(&device, prepared, &memo.round(&()))?.render(wanted, 1)?.radiance.len())
+    });
+    assert_eq!(Arc::strong_count(&device), 1, "something still holds the device");
+    drop(device);
+    assert_eq!(messages.all(), Vec::<String>::new());
+    rendered
+}
+
+#[test]
+fn wherever_the_device_fails_it_is_said_and_nothing_is_left() {
+    let mut scene = Scene::default();
+    (scene.image.width, scene.image.height) = (8, 6);
+    scene.environment.source = Source::Builtin("white".to_owned());
+    scene.shading.method = "cosine".to_owned();
+    let prepared = prepare(&scene, &Memo::default().round(&())).expect("a scene that can be prepared");
+    let (pixels, calls) = render(&prepared, None);
+    assert_eq!(pixels.expect("a picture"), 48);
+    // What a driver says of a lost device, and of a full one.
+    for (result, names) in [
+        (Call::ERROR_DEVICE_LOST, &["vkQueueSubmit2", "vkWaitSemaphores", "vkGetQueryPoolResults"][..]),
+        (Call::ERROR_OUT_OF_DEVICE_MEMORY, &["vkAllocateMemory"]),
+    ] {
+        let places = calls.iter().enumerate().filter(|(_, call)| names.contains(call));
+        let places: Vec<_> = places.map(|(index, call)| (index, *call)).collect();
+        println!("{result}: {} places of {} calls", places.len(), calls.len());
+        assert!(places.len() > 5);
+        // Every third: each opens a device with validation.
+        for (index, name) in places.into_iter().step_by(3) {
+            let start = Instant::now();
+            let fault = Fault { of: None, index, result, lasts: result == Call::ERROR_DEVICE_LOST };
+            let error = render(&prepared, Some(fault)).0.expect_err("a call fails").to_string();
+            let remedy = if fault.lasts { "try again" } else { "a smaller --size" };
+            assert!(error.contains(name) && error.contains(remedy), "{index}, {name}: {error}");
+            assert!(start.elapsed() < Duration::from_secs(60), "{index}, {name}: {:?}", start.elapsed());
+        }
+    }
+}
