@@ -6,7 +6,7 @@ use crate::output::{self, ExrHeader, Format};
 use crate::pipeline::{DeviceScene, Rendering, Wanted};
 use crate::prepare::prepare;
 use crate::progress::Observer;
-use crate::scene::{Background, MaterialSource, Scene, Source, mesh};
+use crate::scene::{Background, ImageSettings, MaterialSource, Scene, Source, mesh};
 use crate::steps::{FitThreads, LoadMaterial};
 use crate::threads::{ThreadSettings, Threads};
 use crate::vulkan::{Device, Instance};
@@ -106,7 +106,7 @@ impl Renderer {
         })
     }
 
-    /// The threads of a material: a built-in, a file, or a [`Custom`](crate::Custom) BRDF.
+    /// The threads that pictures of a material have by default: a built-in, a file, or a [`Custom`](crate::Custom) BRDF.
     ///
     /// ```
     /// # let renderer = threadlight::Renderer::new()?;
@@ -120,9 +120,9 @@ impl Renderer {
     pub fn threads(&self, material: impl Into<MaterialSource>, count: usize) -> Result<Threads> {
         let round = self.memo.round(&());
         let brdf = round.ask(&LoadMaterial(&material.into()))?;
-        let threads =
-            round.ask(&FitThreads { brdf: &brdf, settings: ThreadSettings { count, ..Default::default() } })?;
-        Ok((*threads).clone())
+        let settings = ThreadSettings { count, ..Default::default() };
+        let settings = settings.for_picture(&brdf, ImageSettings::default().subpixels);
+        Ok((*round.ask(&FitThreads { brdf: &brdf, settings })?).clone())
     }
 }
 

@@ -1,5 +1,5 @@
-// Fitted threads: sum over k of w_k (environment blurred by kernel k)(d_k), plus the irradiance times what they leave of the albedo. Directions, widths and
-// weights were fitted to f(w_i, w_o) (n . w_i), so no BRDF is left to evaluate.
+// Fitted threads: sum over k of w_k (environment blurred by kernel k)(d_k), plus the irradiance times what they leave of the
+// albedo. Directions, widths and weights were fitted to f(w_i, w_o) (n . w_i), so no BRDF is left to evaluate.
 //
 // Few threads fit tails of lobes worst, and under small bright sources tails matter most. So the blurred environment is without
 // these, and they are shaded by the BRDF itself.

@@ -8,7 +8,7 @@ use crate::pipeline::median;
 use crate::progress::{Observer, OnlyCancels};
 use crate::scene::{ImageSettings, MaterialSource};
 use crate::steps::LoadMaterial;
-use crate::threads::fitted::{generate, set_count, validation_error};
+use crate::threads::fitted::{generate, validation_error};
 use crate::threads::{ThreadKind, ThreadSettings};
 
 /// What to fit, and how often.
@@ -49,8 +49,8 @@ pub fn run(fits: &Fits, memo: &Memo, observer: &dyn Observer, found: &mut Vec<Ti
         let brdf = memo.round(observer).ask(&LoadMaterial(source))?;
         for &threads in &fits.counts {
             let count = threads as usize;
-            let sets = set_count(&brdf, count, ImageSettings::default().subpixels);
-            let settings = ThreadSettings { kind: ThreadKind::Fitted, count, sets, ..ThreadSettings::default() };
+            let settings = ThreadSettings { kind: ThreadKind::Fitted, count, ..ThreadSettings::default() };
+            let settings = settings.for_picture(&brdf, ImageSettings::default().subpixels);
             let mut times_ms = Vec::new();
             let table = loop {
                 let start = Instant::now();
