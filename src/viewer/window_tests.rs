@@ -110,7 +110,8 @@ fn what_was_edited_is_kept_when_the_device_is_lost() {
 fn the_device_is_lost() {
     let error = play().map(drop).expect_err("a device that is lost").to_string();
     assert!(error.contains("device") && error.contains("try again") && !error.contains('\n'), "{error}");
-    let scene = Scene::load(Path::new("cache/edited.toml")).expect("a scene");
+    let kept = Scene::load(Path::new("cache/edited.toml"));
+    let scene = kept.unwrap_or_else(|unread| panic!("{unread}, after {error}"));
     assert!(scene.materials[0].name == "clay" && scene.image.exposure < 1.0, "{scene:?}");
     assert!(!Path::new("end.toml").exists());
 }
