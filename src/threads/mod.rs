@@ -125,7 +125,7 @@ impl Threads {
     /// Where `thread` looks in `row`, unit, in the shading frame.
     pub fn direction(&self, row: usize, thread: usize) -> DVec3 {
         match self {
-            Self::Fitted(table) => table.row(row)[thread].unpack().direction.as_dvec3(),
+            Self::Fitted(table) => table.row(row)[thread].unpack().direction().as_dvec3(),
             Self::Paper(table) => table.row(row)[thread].direction(),
         }
     }
