@@ -44,6 +44,7 @@ layout(push_constant) uniform Push {
     float radiance_scale;   // radiance of a texel of value 1
     uint sample_count;      // threads, or samples, of a pixel
     uvec2 seed;             // low and high half
+    float finest_level;     // the level of a kernel that is level 0 of the blurred environment
 } push;
 
 #include "material.glsl"

@@ -6,14 +6,8 @@ layout(set = 0, binding = 4) uniform samplerCube environment_pyramid;
 layout(set = 0, binding = 13) uniform samplerCube irradiance_map;
 layout(set = 0, binding = 15) uniform samplerCube source_pyramid;
 
-// Width of the kernel of level 0, in radians, and its faces: FINEST_WIDTH_RAD in src/threads/fitted/kernel.rs.
+// Width of the kernel of level 0, in radians: FINEST_WIDTH_RAD in src/threads/fitted/kernel.rs.
 const float FINEST_WIDTH_RAD = 1.0 / 256.0;
-const float FINEST_FACE_SIZE = 1024.0;
-
-// The level that is level 0 of a pyramid with faces of this size.
-float finest_level(float face_size) {
-    return log2(FINEST_FACE_SIZE / face_size);
-}
 
 // Exactly, for -63 <= n <= 63.
 float power_of_4(int n) {
@@ -36,11 +30,15 @@ float level_of_variance(float variance) {
     return float(whole) + (variance * power_of_4(-whole) - 1.0) / 3.0;
 }
 
-// The level of a kernel that is blurred by normals of this variance along each axis, in rad^2: mirrored directions turn
-// twice as far, and variances add up.
-float level_within_pixel(float level, float normal_variance) {
-    float added = 4.0 * normal_variance / (FINEST_WIDTH_RAD * FINEST_WIDTH_RAD);
-    return added > 0.0 ? level_of_variance(variance_of_level(level) + added) : level;
+// What normals of this variance along each axis, in rad^2, add to the variance of a kernel, over that of level 0: mirrored directions
+// turn twice as far.
+float variance_of_pixel(float normal_variance) {
+    return 4.0 * normal_variance / (FINEST_WIDTH_RAD * FINEST_WIDTH_RAD);
+}
+
+// The level of a kernel with so much more variance.
+float level_within_pixel(float level, float added_variance) {
+    return level_of_variance(variance_of_level(level) + added_variance);
 }
 
 // The environment as it is, with so much of its sources. `d` need not be a unit vector, as for cube maps.
@@ -61,17 +59,16 @@ vec3 sharp_radiance(vec3 d, float sources) {
 // How much of a kernel of `level` is the environment as it is: of one sharper than the pyramid, that blends with the finest level to the
 // variance of the kernel.
 float sharp_part(float level) {
-    float finest = finest_level(push.face_size);
-    return level < finest ? 1.0 - variance_of_level(level) / variance_of_level(finest) : 0.0;
+    return level < push.finest_level ? 1.0 - variance_of_level(level) / variance_of_level(push.finest_level) : 0.0;
 }
 
 // The environment without its sources, and these alone, blurred by the kernel of `level` or the finest that there is.
 vec3 blurred_radiance(vec3 d, float level) {
     ++lookups;
-    return textureLod(environment_pyramid, d, max(level - finest_level(push.face_size), 0.0)).rgb;
+    return textureLod(environment_pyramid, d, max(level - push.finest_level, 0.0)).rgb;
 }
 
 vec3 blurred_sources(vec3 d, float level) {
     ++lookups;
-    return textureLod(source_pyramid, d, max(level - finest_level(push.face_size), 0.0)).rgb;
+    return textureLod(source_pyramid, d, max(level - push.finest_level, 0.0)).rgb;
 }

@@ -130,6 +130,7 @@ struct Rows {
     uint next_azimuth;
     float towards_next;
     float side; // 1, or -1 where the view is the mirror image of one that there are rows for
+    float added_variance; // of the kernels, by the pixel's normals
 };
 
 // Rows stand at multiples of 90 degrees / row_count; beyond the last one it holds.
@@ -137,7 +138,7 @@ Rows rows_at(Surface surface, ThreadTable table) {
     float row = min(surface.theta_o * (float(table.row_count) / radians(90.0)), float(table.row_count - 1));
     uint below = table.first + uint(row) * words_a_row(table);
     uint above = below + (uint(row) + 1 < table.row_count ? words_a_row(table) : 0);
-    Rows rows = Rows(below, above, fract(row), 0, 0.0, 1.0);
+    Rows rows = Rows(below, above, fract(row), 0, 0.0, 1.0, variance_of_pixel(surface.normal_variance));
     if (HAS_TANGENTS != 0 && table.azimuth_count > 1) {
         vec2 folded = fold_azimuth(surface.phi_o, table.azimuth_count);
         uint before = min(uint(folded.x), table.azimuth_count - 2);
@@ -155,7 +156,7 @@ Kernel between(Kernel a, Kernel b, float t) {
 }
 
 // Thread k, in the shading frame, blurred by the normals of the pixel.
-Kernel kernel_at(Rows rows, uint k, Surface surface) {
+Kernel kernel_at(Rows rows, uint k) {
     Kernel kernel = between(unpack_kernel(rows.below, k), unpack_kernel(rows.above, k), rows.t);
     if (HAS_TANGENTS != 0 && rows.next_azimuth != 0) {
         uint next = rows.next_azimuth;
@@ -163,7 +164,7 @@ Kernel kernel_at(Rows rows, uint k, Surface surface) {
         kernel = between(kernel, of_next, rows.towards_next);
         kernel.place.y *= rows.side;
     }
-    kernel.level = level_within_pixel(kernel.level, surface.normal_variance);
+    kernel.level = level_within_pixel(kernel.level, rows.added_variance);
     return kernel;
 }
 
@@ -192,7 +193,7 @@ vec3 estimate(Surface surface, Material material, uint first, uint stride) {
     uint k = first + (table.sharp_count + stride - 1 - first) / stride * stride;
     if (k < table.count) {
         do {
-            Kernel kernel = kernel_at(rows, k, surface);
+            Kernel kernel = kernel_at(rows, k);
             weights += kernel.weight;
             sum += kernel.weight * blurred_radiance(looks_towards(kernel, surface), kernel.level);
         } while ((k += stride) < table.count);
@@ -209,7 +210,7 @@ vec3 estimate(Surface surface, Material material, uint first, uint stride) {
     k = first;
     if (HAS_SHARP_KERNELS != 0 && k < table.sharp_count) {
         do {
-            Kernel kernel = kernel_at(rows, k, surface);
+            Kernel kernel = kernel_at(rows, k);
             weights += kernel.weight;
             float sharp = sharp_part(kernel.level);
             if (sharp > 0.0) {
@@ -223,7 +224,7 @@ vec3 estimate(Surface surface, Material material, uint first, uint stride) {
     k = first;
     if (HAS_MIRRORED_SOURCES != 0 && of_kernels > 0.0 && k < table.count) {
         do {
-            Kernel kernel = kernel_at(rows, k, surface);
+            Kernel kernel = kernel_at(rows, k);
             float blurred = HAS_SHARP_KERNELS != 0 ? 1.0 - sharp_part(kernel.level) : 1.0;
             if (blurred > 0.0) {
                 sum += kernel.weight * blurred * of_kernels * blurred_sources(looks_towards(kernel, surface), kernel.level);

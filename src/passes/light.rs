@@ -3,7 +3,7 @@ use super::background::check_map_size;
 use super::cube_borders::{WayAround, draw_with_cube_map};
 use crate::Result;
 use crate::environment::{Environment, LightMap, Pyramid};
-use crate::light::{BlurredLight, Light, PrefilteredLight};
+use crate::light::{BlurredLight, Light, PrefilteredLight, finest_level};
 use crate::method::Method;
 use crate::vulkan::{self, Bound, Buffer, Device, ImageKind, ImageShape, Sampler, SamplerKind};
 use ash::vk;
@@ -18,6 +18,8 @@ pub struct DeviceLight {
     sources: Option<Buffer>,
     map: Option<vulkan::Image>,
     aliases: Option<Buffer>,
+    /// Level 0 of the blurred environment on the scale of kernels; 0 if there is none.
+    pub(super) finest_level: f32,
 }
 
 /// A pyramid on the device.
@@ -76,6 +78,7 @@ impl DeviceLight {
         way_around: Option<WayAround>,
     ) -> Result<()> {
         let nothing = Pyramid { face_size: 1, levels: vec![vec![[0.0; 3]; 6]] };
+        self.finest_level = finest_level(&blurred.rest);
         let pyramid = &blurred.rest.levels;
         let source_pyramid = blurred.sources.as_ref().map_or(&nothing, |pyramid| &pyramid.levels);
         // One scale for all that is added up.

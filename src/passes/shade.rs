@@ -164,6 +164,7 @@ struct Push {
     radiance_scale: f32,
     sample_count: u32,
     seed: [u32; 2],
+    finest_level: f32,
 }
 
 impl Push {
@@ -177,6 +178,7 @@ impl Push {
             radiance_scale: view.intensity as f32 * light.radiance_scale(),
             sample_count: sampling.count,
             seed: [sampling.seed as u32, (sampling.seed >> 32) as u32],
+            finest_level: light.finest_level,
         }
     }
 }

@@ -7,17 +7,12 @@ use super::{CpuShader, Point, Surface, turned};
 use crate::brdf::MIN_COS_THETA_D;
 use crate::environment::sources::{CLEAR, clearance};
 use crate::environment::{LightMap, SourceRecord};
-use crate::light::BlurredLight;
+use crate::light::{BlurredLight, finest_level};
 use crate::packing::stereographic_decode;
 use crate::threads::Threads;
 use crate::threads::fitted::azimuths::fold_azimuth;
 use crate::threads::fitted::kernel::FINEST_WIDTH_RAD;
 use crate::threads::fitted::{FittedTable, UnpackedKernel};
-
-/// Twin of `finest_level` in glsl/vmf_pyramid.glsl.
-fn finest_level(face_size: usize) -> f32 {
-    (1024.0 / face_size as f32).log2()
-}
 
 /// Twin of `power_of_4` in glsl/vmf_pyramid.glsl.
 fn power_of_4(n: i32) -> f32 {
@@ -39,10 +34,14 @@ fn level_of_variance(variance: f32) -> f32 {
     whole as f32 + (variance * power_of_4(-whole) - 1.0) / 3.0
 }
 
+/// Twin of `variance_of_pixel` in glsl/vmf_pyramid.glsl.
+fn variance_of_pixel(normal_variance: f32) -> f32 {
+    4.0 * normal_variance / (FINEST_WIDTH_RAD * FINEST_WIDTH_RAD) as f32
+}
+
 /// Twin of `level_within_pixel` in glsl/vmf_pyramid.glsl.
-fn level_within_pixel(level: f32, normal_variance: f32) -> f32 {
-    let added = 4.0 * normal_variance / (FINEST_WIDTH_RAD * FINEST_WIDTH_RAD) as f32;
-    if added > 0.0 { level_of_variance(variance_of_level(level) + added) } else { level }
+fn level_within_pixel(level: f32, added_variance: f32) -> f32 {
+    level_of_variance(variance_of_level(level) + added_variance)
 }
 
 /// Twin of `sharp_radiance` in glsl/vmf_pyramid.glsl.
@@ -61,7 +60,7 @@ fn blurred_light<'a>(twin: &'a CpuShader) -> &'a BlurredLight {
 /// Twin of `blurred_radiance` in glsl/vmf_pyramid.glsl.
 fn blurred_radiance(twin: &CpuShader, direction: Vec3, level: f32, sources: f32) -> Vec3 {
     let light = blurred_light(twin);
-    let finest = finest_level(light.rest.levels.face_size);
+    let finest = finest_level(&light.rest);
     let sharp = if level < finest { 1.0 - variance_of_level(level) / variance_of_level(finest) } else { 0.0 };
     let mut radiance = Vec3::ZERO;
     if sharp < 1.0 {
@@ -256,7 +255,7 @@ pub(super) fn estimate(point: &Point) -> Vec3 {
     let (mut weights, mut sum) = (Vec3::ZERO, Vec3::ZERO);
     for k in (point.first as usize..threads.count).step_by(point.stride) {
         let kernel = rows.kernel(threads, k);
-        let level = level_within_pixel(kernel.level, surface.normal_variance);
+        let level = level_within_pixel(kernel.level, variance_of_pixel(surface.normal_variance));
         let direction = surface.frame * stereographic_decode(kernel.place);
         weights += kernel.weight;
         sum += kernel.weight * blurred_radiance(point.twin, direction, level, of_kernels);
