@@ -56,10 +56,13 @@ vec3 sharp_radiance(vec3 d, float sources) {
     return sum;
 }
 
-// How much of a kernel of `level` is the environment as it is: of one sharper than the pyramid, that blends with the finest level to the
-// variance of the kernel.
+// From this part of the variance of the finest level on, a kernel is taken for that level. It is one to two pixels of the environment wide, so
+// little is lost; and nearly all lobes but mirrors have no use then for the environment as it is, which costs several lookups.
+const float AS_SHARP = 0.625;
+
+// How much of a kernel of `level` is the environment as it is, the rest being the finest level.
 float sharp_part(float level) {
-    return level < push.finest_level ? 1.0 - variance_of_level(level) / variance_of_level(push.finest_level) : 0.0;
+    return max(1.0 - variance_of_level(level) / (AS_SHARP * variance_of_level(push.finest_level)), 0.0);
 }
 
 // The environment without its sources, and these alone, blurred by the kernel of `level` or the finest that there is.

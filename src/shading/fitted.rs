@@ -11,28 +11,8 @@ use crate::light::{BlurredLight, finest_level};
 use crate::packing::stereographic_decode;
 use crate::threads::Threads;
 use crate::threads::fitted::azimuths::fold_azimuth;
-use crate::threads::fitted::kernel::FINEST_WIDTH_RAD;
+use crate::threads::fitted::kernel::{FINEST_WIDTH_RAD, level_of_variance, sharp_part, variance_of_level};
 use crate::threads::fitted::{FittedTable, UnpackedKernel};
-
-/// Twin of `power_of_4` in glsl/vmf_pyramid.glsl.
-fn power_of_4(n: i32) -> f32 {
-    f32::from_bits(((127 + 2 * n) as u32) << 23)
-}
-
-/// Twin of `variance_of_level` in glsl/vmf_pyramid.glsl.
-fn variance_of_level(level: f32) -> f32 {
-    let whole = level.floor();
-    if level < 0.0 { level + 1.0 } else { power_of_4(whole as i32) * (1.0 + 3.0 * (level - whole)) }
-}
-
-/// Twin of `level_of_variance` in glsl/vmf_pyramid.glsl.
-fn level_of_variance(variance: f32) -> f32 {
-    if variance < 1.0 {
-        return variance - 1.0;
-    }
-    let whole = (((variance.to_bits() >> 23) as i32) - 127) >> 1;
-    whole as f32 + (variance * power_of_4(-whole) - 1.0) / 3.0
-}
 
 /// Twin of `variance_of_pixel` in glsl/vmf_pyramid.glsl.
 fn variance_of_pixel(normal_variance: f32) -> f32 {
@@ -61,7 +41,7 @@ fn blurred_light<'a>(twin: &'a CpuShader) -> &'a BlurredLight {
 fn blurred_radiance(twin: &CpuShader, direction: Vec3, level: f32, sources: f32) -> Vec3 {
     let light = blurred_light(twin);
     let finest = finest_level(&light.rest);
-    let sharp = if level < finest { 1.0 - variance_of_level(level) / variance_of_level(finest) } else { 0.0 };
+    let sharp = sharp_part(level, finest);
     let mut radiance = Vec3::ZERO;
     if sharp < 1.0 {
         let pyramid_level = (level - finest).max(0.0);

@@ -51,6 +51,33 @@ pub fn kappa_of_level(level: f64) -> f64 {
     if level < 0.0 { SHARP_KAPPA } else { (FINEST_WIDTH_RAD * level.exp2()).powi(-2) }
 }
 
+/// 4^n. Twin of `power_of_4` in glsl/vmf_pyramid.glsl.
+fn power_of_4(n: i32) -> f32 {
+    f32::from_bits(((127 + 2 * n) as u32) << 23)
+}
+
+/// Variance along each axis of the kernel of `level`, over that of level 0. Twin of `variance_of_level` in glsl/vmf_pyramid.glsl.
+pub fn variance_of_level(level: f32) -> f32 {
+    let whole = level.floor();
+    if level < 0.0 { level + 1.0 } else { power_of_4(whole as i32) * (1.0 + 3.0 * (level - whole)) }
+}
+
+/// The level of a kernel of this variance. Twin of `level_of_variance` in glsl/vmf_pyramid.glsl.
+pub fn level_of_variance(variance: f32) -> f32 {
+    if variance < 1.0 {
+        return variance - 1.0;
+    }
+    let whole = (((variance.to_bits() >> 23) as i32) - 127) >> 1;
+    whole as f32 + (variance * power_of_4(-whole) - 1.0) / 3.0
+}
+
+/// How much of a kernel of `level` is the environment as it is, where a pyramid begins at level `finest`: see `sharp_part` in
+/// glsl/vmf_pyramid.glsl, whose twin it is.
+pub fn sharp_part(level: f32, finest: f32) -> f32 {
+    const AS_SHARP: f32 = 0.625;
+    (1.0 - variance_of_level(level) / (AS_SHARP * variance_of_level(finest))).max(0.0)
+}
+
 /// A length on the scale of a kernel of `level`: its width; for those sharper than level 0, as if widths went on halving.
 pub fn scale_rad(level: f64) -> f64 {
     FINEST_WIDTH_RAD * level.exp2()

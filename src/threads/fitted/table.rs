@@ -5,7 +5,7 @@ use glam::{DVec3, Vec2, Vec3};
 use half::f16;
 
 use super::azimuths::fold_azimuth;
-use super::kernel::{Kernel, SHARPEST_LEVEL, WIDEST_LEVEL, all_between};
+use super::kernel::{Kernel, SHARPEST_LEVEL, WIDEST_LEVEL, all_between, sharp_part};
 use crate::packing::{
     STEREOGRAPHIC_EXTENT, pack_snorm_2x16, stereographic_decode, stereographic_encode, unpack_snorm_2x16,
 };
@@ -160,9 +160,10 @@ impl FittedTable {
         self.used().len()
     }
 
-    /// How many of them, up to the last one that is, are sharper than `level` in some row.
+    /// How many of them, up to the last one that does, look up the environment as it is in some row, where its pyramid begins at `level`.
     pub fn sharp_count(&self, level: f32) -> usize {
-        self.used().iter().rposition(|&(_, sharpest)| sharpest < level).map_or(0, |last| last + 1)
+        let is_sharp = |&(_, sharpest): &(usize, f32)| sharpest.is_finite() && sharp_part(sharpest, level) > 0.0;
+        self.used().iter().rposition(is_sharp).map_or(0, |last| last + 1)
     }
 
     /// Words of an element of the shader's buffer: its array is of words.
