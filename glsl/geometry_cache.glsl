@@ -10,6 +10,8 @@ layout(push_constant) uniform Object {
     vec4 forward;           // w: near plane
     // The axis that tangents go by, in object space; w: how, as below.
     vec4 tangent_axis;
+    // Cosine and sine of the material's rotation, by which tangents are turned.
+    vec2 tangent_turn;
     uint material;
 } object;
 

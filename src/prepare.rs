@@ -4,7 +4,7 @@ use crate::environment::Environment;
 use crate::geometry_texel::MAX_MATERIALS;
 use crate::memo::{Key, Keyed, Memo, Round, Step};
 use crate::method::Method;
-use crate::passes::{PlacedMesh, Sampling, View};
+use crate::passes::{PlacedMesh, PlacedTangent, Sampling, View};
 use crate::scene::{Camera, MaterialSource, Mesh, Scene, TangentRule};
 use crate::steps::{DraftThreads, FitThreads, LoadEnvironment, LoadMaterial, LoadMesh};
 use crate::threads::fitted::set_count;
@@ -44,13 +44,32 @@ pub type NamedMesh = (String, Keyed<Mesh>);
 pub struct PreparedMaterial {
     /// Name in the scene.
     pub name: String,
-    /// Its BRDF.
+    /// Its BRDF as the scene has it, against the tangent of a surface.
+    pub turned_brdf: Keyed<Brdf>,
+    /// The same in its own axes, by which it is shaded: [`in_own_axes`].
     pub brdf: Keyed<Brdf>,
+    /// By how many degrees these are turned: see [`PlacedTangent::turn_deg`].
+    pub rotation_deg: f64,
     /// Its threads, for methods that use them.
     pub threads: Option<Keyed<Threads>>,
 }
 
+/// `brdf` in its own axes, and its rotation in degrees: [`Brdf::without_rotation`].
+pub fn in_own_axes(brdf: &Keyed<Brdf>) -> (Keyed<Brdf>, f64) {
+    match brdf.without_rotation() {
+        // Known by what it is, so it is the same for all rotations.
+        Some((own, rotation_deg)) => (Keyed::new(Key::of_digest(own.fingerprint()), own), rotation_deg),
+        None => (brdf.clone(), 0.0),
+    }
+}
+
 impl PreparedMaterial {
+    /// A material of this name and BRDF, as the scene has it; threads are yet to come.
+    pub fn new(name: String, turned_brdf: Keyed<Brdf>) -> Self {
+        let (brdf, rotation_deg) = in_own_axes(&turned_brdf);
+        Self { name, turned_brdf, brdf, rotation_deg, threads: None }
+    }
+
     /// Its BRDF and threads.
     pub fn shaded(&self) -> WithThreads<'_> {
         (&self.brdf, self.threads.as_deref())
@@ -167,8 +186,9 @@ fn prepare_by(scene: &Scene, round: &Round, ask_threads: &AskThreads) -> Result<
             MaterialSource::Model { .. } => error.within(format!("material \"{name}\"")),
             _ => error,
         })?;
-        let threads = ask_threads(method, name, &brdf, sampling)?;
-        materials.push(PreparedMaterial { name: name.to_owned(), brdf, threads });
+        let material = PreparedMaterial::new(name.to_owned(), brdf);
+        let threads = ask_threads(method, name, &material.brdf, sampling)?;
+        materials.push(PreparedMaterial { threads, ..material });
     }
     let mut prepared = Prepared {
         scene: scene.clone(),
@@ -290,7 +310,10 @@ impl Prepared {
                     "an object of \"{name}\", which is anisotropic, has no `tangent`: it is brushed around its y axis"
                 );
             }
-            object.tangent = needs_tangent.then(|| settings.tangent.unwrap_or(TangentRule::DEFAULT));
+            object.tangent = needs_tangent.then(|| PlacedTangent {
+                rule: settings.tangent.unwrap_or(TangentRule::DEFAULT),
+                turn_deg: self.materials[material].rotation_deg,
+            });
         }
     }
 

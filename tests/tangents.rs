@@ -72,6 +72,34 @@ fn tangents_go_around_an_axis_or_along_it_on_the_turned_object() {
 }
 
 #[test]
+fn a_rotated_material_is_the_same_one_on_a_turned_tangent() {
+    let gpu = Validated::new();
+    let of = |rotation_deg: f64, rule: TangentRule| {
+        let mut scene =
+            scene(brushed(&format!("alpha_x = 0.05; alpha_y = 0.3; rotation_deg = {rotation_deg}")), "fitted", 1);
+        scene.objects[0].tangent = Some(rule);
+        scene.image.subpixels = 1;
+        let prepared = ready(&scene);
+        (gpu.render(&prepared, EVERYTHING), prepared)
+    };
+    let (unturned, prepared) = of(0.0, TangentRule::Around(Vec3::Y));
+    // Counter-clockwise seen from outside.
+    let (turned, _) = of(30.0, TangentRule::Around(Vec3::Y));
+    for ((pixel, before, _), (_, after, _)) in seen(&prepared, &unturned).into_iter().zip(seen(&prepared, &turned)) {
+        let (n, tangent) = (before.normal, before.tangent.expect("a tangent"));
+        let (sin, cos) = 30f32.to_radians().sin_cos();
+        let away = after.tangent.expect("a tangent").distance(cos * tangent + sin * n.cross(tangent));
+        assert!(away < 2e-4, "at {pixel}: {after:?} after {before:?}");
+    }
+    // On a sphere, circles around an axis cross what is along it.
+    let (crossed, _) = of(90.0, TangentRule::Around(Vec3::Y));
+    let (along, _) = of(0.0, TangentRule::Along(Vec3::Y));
+    assert!(rms(&unturned, &along) > 0.05, "{}", rms(&unturned, &along));
+    assert!(rms(&crossed, &along) < 1e-3, "{}", rms(&crossed, &along));
+    gpu.finish();
+}
+
+#[test]
 fn the_shader_agrees_with_its_cpu_twin_on_long_lobes() {
     let gpu = Validated::new();
     let folder = tempfile::tempdir().unwrap();

@@ -6,6 +6,7 @@ use threadlight::Error;
 use threadlight::low_level::memo::{Asked, Memo, Origin, Step};
 use threadlight::low_level::method::Method;
 use threadlight::low_level::output;
+use threadlight::low_level::prepare::in_own_axes;
 use threadlight::low_level::scene::{ImageSettings, MaterialSource};
 use threadlight::low_level::steps::{FitThreads, LoadMaterial};
 use threadlight::low_level::threads::fitted::set_count;
@@ -67,7 +68,7 @@ impl Threads {
         let progress = TerminalProgress::new("threads")?;
         let memo = Memo::new(cache_folder(self.no_cache).as_deref());
         let round = memo.round(&progress);
-        let brdf = round.ask(&LoadMaterial(&source))?;
+        let (brdf, _) = in_own_axes(&round.ask(&LoadMaterial(&source))?);
         let sets = match kind {
             // Those that pictures are rendered by if nothing else is asked for.
             ThreadKind::Fitted => set_count(&brdf, count, ImageSettings::default().subpixels),

@@ -7,7 +7,7 @@ use crate::scene::{Mesh, TangentRule};
 use crate::vulkan::{Device, GraphicsPipeline, GraphicsState, PipelineCache, Triangles, VertexAttribute, compiled};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
-use glam::{DAffine3, DVec3, Vec3};
+use glam::{DAffine3, DVec2, DVec3, Vec3};
 use std::sync::Arc;
 
 /// [`GeometryTexel`](crate::geometry_texel::GeometryTexel).
@@ -60,7 +60,23 @@ pub struct PlacedMesh {
     /// Object to world space.
     pub to_world: DAffine3,
     /// Which way its tangents go; none where its material is isotropic.
-    pub tangent: Option<TangentRule>,
+    pub tangent: Option<PlacedTangent>,
+}
+
+/// Which way the tangents of an object go.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PlacedTangent {
+    /// Those of the surface.
+    pub rule: TangentRule,
+    /// By how much they are turned from there, counter-clockwise seen from outside: the rotation of the material.
+    pub turn_deg: f64,
+}
+
+impl PlacedTangent {
+    /// Cosine and sine of the turn.
+    pub fn turn(self) -> DVec2 {
+        DVec2::from_angle(self.turn_deg.to_radians())
+    }
 }
 
 /// What the pass is made of.
@@ -83,6 +99,7 @@ struct Push {
     up_over_extent: [f32; 4],
     forward: [f32; 4],
     tangent_axis: [f32; 4],
+    tangent_turn: [f32; 2],
     material: u32,
 }
 
@@ -114,7 +131,7 @@ impl GeometryCache {
             // Subtracted in double precision: far from the origin the difference is what counts.
             let from_eye = translation - eye;
             let row = |i: usize| pack(matrix3.row(i) / unit, from_eye[i] / unit);
-            let tangent_axis = match object.tangent {
+            let tangent_axis = match object.tangent.map(|tangent| tangent.rule) {
                 None => [0.0; 4],
                 Some(rule @ TangentRule::Around(_)) => rule.axis().extend(TANGENT_AROUND).to_array(),
                 Some(rule @ TangentRule::Along(_)) => rule.axis().extend(TANGENT_ALONG).to_array(),
@@ -125,6 +142,7 @@ impl GeometryCache {
                 up_over_extent: pack(up / half_height, 0.0),
                 forward: pack(forward, NEAR_PLANE),
                 tangent_axis,
+                tangent_turn: object.tangent.map_or(DVec2::X, PlacedTangent::turn).as_vec2().to_array(),
                 material: object.material,
             };
             (&self.meshes[object.mesh].triangles, push)
