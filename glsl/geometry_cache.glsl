@@ -15,10 +15,12 @@ layout(push_constant) uniform Object {
     uint material;
 } object;
 
-// How tangents go by the axis of an object: not at all, since its material needs none; around it; along it.
+// How tangents go by the axis of an object: not at all, since its material needs none; around it; along it; not by
+// it but by the mesh's texture coordinates.
 const float NO_TANGENT = 0.0;
 const float TANGENT_AROUND = 1.0;
 const float TANGENT_ALONG = 2.0;
+const float TANGENT_OF_MESH = 3.0;
 
 // Reversed, infinite projection: depth 1 at the near plane, 0 at infinity, so float precision is where it is needed.
 vec4 project(vec3 from_eye) {

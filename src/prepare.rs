@@ -5,8 +5,8 @@ use crate::geometry_texel::MAX_MATERIALS;
 use crate::memo::{Key, Keyed, Memo, Round, Step};
 use crate::method::Method;
 use crate::passes::{PlacedMesh, PlacedTangent, Sampling, View};
-use crate::scene::{Camera, MaterialSource, Mesh, Scene, TangentRule};
-use crate::steps::{DraftThreads, FitThreads, LoadEnvironment, LoadMaterial, LoadMesh};
+use crate::scene::{Camera, MaterialSource, Mesh, Scene, Source, TangentRule};
+use crate::steps::{DraftThreads, FitThreads, LoadBrushedMesh, LoadEnvironment, LoadMaterial, LoadMesh};
 use crate::threads::fitted::set_count;
 use crate::threads::{ThreadKind, ThreadSettings, Threads, WithThreads};
 use crate::{Error, Result};
@@ -201,7 +201,7 @@ fn prepare_by(scene: &Scene, round: &Round, ask_threads: &AskThreads) -> Result<
         objects,
         materials,
     };
-    prepared.place_tangents();
+    prepared.place_tangents(round)?;
     Ok(prepared)
 }
 
@@ -237,10 +237,7 @@ fn place_meshes(scene: &Scene, round: &Round) -> Result<(Vec<NamedMesh>, Vec<Pla
     let mut objects = Vec::new();
     for object in &scene.objects {
         let mesh = round.ask(&LoadMesh(&object.mesh))?;
-        let index = meshes.iter().position(|(_, known)| known.key == mesh.key).unwrap_or_else(|| {
-            meshes.push((object.mesh.to_string(), mesh));
-            meshes.len() - 1
-        });
+        let index = index_of_mesh(&mut meshes, mesh, &object.mesh);
         let material = used_materials.iter().position(|known| *known == object.material);
         objects.push(PlacedMesh {
             mesh: index,
@@ -250,6 +247,14 @@ fn place_meshes(scene: &Scene, round: &Round) -> Result<(Vec<NamedMesh>, Vec<Pla
         });
     }
     Ok((meshes, objects))
+}
+
+/// The place of `mesh`, which comes from `source`, among `meshes`: the last if it was not yet there.
+fn index_of_mesh(meshes: &mut Vec<NamedMesh>, mesh: Keyed<Mesh>, source: &Source) -> usize {
+    meshes.iter().position(|(_, known)| known.key == mesh.key).unwrap_or_else(|| {
+        meshes.push((source.to_string(), mesh));
+        meshes.len() - 1
+    })
 }
 
 /// An error for more materials than a texel of the geometry cache can tell apart.
@@ -298,23 +303,58 @@ impl Prepared {
     }
 
     /// Gives objects the tangents that their materials need, and no others: to be called when materials were changed.
-    pub fn place_tangents(&mut self) {
+    ///
+    /// # Errors
+    /// A mesh that cannot be read again with its texture coordinates; cancelled.
+    pub fn place_tangents(&mut self, round: &Round) -> Result<()> {
         // Found once a material: there may be thousands of objects.
         let are_isotropic: Vec<_> = self.materials.iter().map(|material| material.brdf.is_isotropic()).collect();
         for (object, settings) in self.objects.iter_mut().zip(&self.scene.objects) {
             let material = object.material as usize;
             let needs_tangent = !are_isotropic[material];
-            if needs_tangent && settings.tangent.is_none() {
-                let name = &self.materials[material].name;
-                tracing::info!(
+            if settings.tangent == Some(TangentRule::Uv) {
+                let brushed = needs_tangent.then(|| round.ask(&LoadBrushedMesh(&settings.mesh))).transpose()?;
+                let mesh = match brushed.filter(|mesh| !mesh.tangents.is_empty()) {
+                    Some(mesh) => mesh,
+                    None => round.ask(&LoadMesh(&settings.mesh))?,
+                };
+                object.mesh = index_of_mesh(&mut self.meshes, mesh, &settings.mesh);
+            }
+            let name = &self.materials[material].name;
+            let rule = match settings.tangent {
+                Some(TangentRule::Uv) if self.meshes[object.mesh].1.tangents.is_empty() => None,
+                rule => rule,
+            };
+            match settings.tangent {
+                _ if !needs_tangent || rule.is_some() => {}
+                None => tracing::info!(
                     "an object of \"{name}\", which is anisotropic, has no `tangent`: it is brushed around its y axis"
-                );
+                ),
+                Some(_) => tracing::warn!(
+                    "{} has no texture coordinates for its `tangent`: \"{name}\" is brushed around its y axis",
+                    settings.mesh
+                ),
             }
             object.tangent = needs_tangent.then(|| PlacedTangent {
-                rule: settings.tangent.unwrap_or(TangentRule::DEFAULT),
+                rule: rule.unwrap_or(TangentRule::DEFAULT),
                 turn_deg: self.materials[material].rotation_deg,
             });
         }
+        self.drop_unused_meshes();
+        Ok(())
+    }
+
+    /// Meshes that no object has take no memory on the device.
+    fn drop_unused_meshes(&mut self) {
+        let is_used = |index: &usize| self.objects.iter().any(|object| object.mesh == *index);
+        let kept: Vec<_> = (0..self.meshes.len()).filter(is_used).collect();
+        if kept.len() == self.meshes.len() {
+            return;
+        }
+        for object in &mut self.objects {
+            object.mesh = kept.iter().position(|index| *index == object.mesh).expect("a mesh of an object is kept");
+        }
+        self.meshes = kept.into_iter().map(|index| self.meshes[index].clone()).collect();
     }
 
     /// Whether a material of it is anisotropic, so that objects have tangents.

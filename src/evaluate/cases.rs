@@ -93,7 +93,7 @@ impl Cases {
             for (scene, prepared, display) in &mut scenes {
                 // The scene borrows the material and the environment while they are looked at together.
                 std::mem::swap(&mut prepared.materials, &mut material);
-                prepared.place_tangents();
+                prepared.place_tangents(&round)?;
                 for (environment_name, environment, renderer) in &mut environments {
                     observer.check()?;
                     std::mem::swap(&mut prepared.environment, environment);

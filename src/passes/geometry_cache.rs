@@ -14,7 +14,7 @@ use std::sync::Arc;
 const GEOMETRY_FORMAT: vk::Format = vk::Format::R32G32_UINT;
 const DEPTH_FORMAT: vk::Format = vk::Format::D32_SFLOAT;
 
-/// Bytes of a position, and of a normal.
+/// Bytes of a position, of a normal, and of a tangent.
 const VERTEX_STRIDE: u32 = size_of::<[f32; 3]>() as u32;
 
 /// Distance of the near plane in units of the scene's extent: with reversed, infinite depth it costs no precision to keep it
@@ -24,6 +24,7 @@ const NEAR_PLANE: f64 = 1e-6;
 /// How tangents go by the axis of an object, as glsl/geometry_cache.glsl has it; 0 is not at all.
 const TANGENT_AROUND: f32 = 1.0;
 const TANGENT_ALONG: f32 = 2.0;
+const TANGENT_OF_MESH: f32 = 3.0;
 
 /// The triangles of a mesh on the device.
 pub struct DeviceMesh {
@@ -39,9 +40,12 @@ impl DeviceMesh {
     /// No device memory left.
     pub fn new(device: &Arc<Device>, name: &str, mesh: &Mesh) -> Result<Self> {
         let attribute = |name, bytes| VertexAttribute { name, stride: VERTEX_STRIDE, bytes };
+        // What no tangent goes by takes no memory.
+        let tangents = if mesh.tangents.is_empty() { &mesh.normals } else { &mesh.tangents };
         let attributes = [
             attribute("positions", bytemuck::cast_slice(&mesh.positions)),
             attribute("normals", bytemuck::cast_slice(&mesh.normals)),
+            attribute("tangents", bytemuck::cast_slice(tangents)),
         ];
         Ok(Self {
             triangles: Triangles::new(device, name, &attributes, &mesh.indices)?,
@@ -109,7 +113,7 @@ struct Push {
 /// A driver that cannot compile them.
 pub fn geometry_pipeline(device: &Arc<Device>, cache: &PipelineCache) -> Result<GraphicsPipeline> {
     let state = GraphicsState {
-        attributes: &[(vk::Format::R32G32B32_SFLOAT, VERTEX_STRIDE); 2],
+        attributes: &[(vk::Format::R32G32B32_SFLOAT, VERTEX_STRIDE); 3],
         colors: &[GEOMETRY_FORMAT],
         depth: DEPTH_FORMAT,
     };
@@ -133,8 +137,9 @@ impl GeometryCache {
             let row = |i: usize| pack(matrix3.row(i) / unit, from_eye[i] / unit);
             let tangent_axis = match object.tangent.map(|tangent| tangent.rule) {
                 None => [0.0; 4],
-                Some(rule @ TangentRule::Around(_)) => rule.axis().extend(TANGENT_AROUND).to_array(),
-                Some(rule @ TangentRule::Along(_)) => rule.axis().extend(TANGENT_ALONG).to_array(),
+                Some(TangentRule::Around(axis)) => axis.extend(TANGENT_AROUND).to_array(),
+                Some(TangentRule::Along(axis)) => axis.extend(TANGENT_ALONG).to_array(),
+                Some(TangentRule::Uv) => [0.0, 0.0, 0.0, TANGENT_OF_MESH],
             };
             let push = Push {
                 to_eye: [0, 1, 2].map(row),

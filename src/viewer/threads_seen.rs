@@ -10,6 +10,7 @@ use crate::environment::Environment;
 use crate::evaluate::Display;
 use crate::passes::View;
 use crate::prepare::Prepared;
+use crate::scene::mesh::Hit;
 use crate::threads::Threads;
 
 /// Of more threads than this, every second, third or so is drawn.
@@ -42,9 +43,9 @@ impl Surface {
             let to_object = object.to_world.inverse();
             let origin = to_object.transform_point3(view.camera.eye);
             let along = to_object.transform_vector3(direction);
-            let (distance, normal) = prepared.meshes[object.mesh].1.hit(origin, along)?;
+            let Hit { distance, normal, tangent: of_mesh } = prepared.meshes[object.mesh].1.hit(origin, along)?;
             let tangent = object.tangent.map(|tangent| {
-                let of_surface = tangent.rule.at((origin + distance * along).as_vec3()).as_dvec3();
+                let of_surface = tangent.rule.at((origin + distance * along).as_vec3(), of_mesh.as_vec3()).as_dvec3();
                 (object.to_world.matrix3 * of_surface, tangent.turn())
             });
             Some((distance, to_object.matrix3.transpose() * normal, tangent, object.material as usize))
