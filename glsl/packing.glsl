@@ -17,4 +17,12 @@ vec3 octahedral_decode(vec2 e) {
     return normalize(n);
 }
 
+// How far from the middle a stereographic map goes: 13 degrees beyond the horizon.
+const float STEREOGRAPHIC_EXTENT = 1.25;
+
+// A direction, not of unit length, of a place on the stereographic map of directions about z: as places blend, so do directions.
+vec3 stereographic_decode(vec2 place) {
+    return vec3(2.0 * place, 1.0 - dot(place, place));
+}
+
 #endif

@@ -6,7 +6,7 @@ use crate::output::{self, ExrHeader, Format};
 use crate::pipeline::{DeviceScene, Rendering, Wanted};
 use crate::prepare::{in_own_axes, prepare};
 use crate::progress::Observer;
-use crate::scene::{Background, MaterialSource, Scene, Source, mesh};
+use crate::scene::{Background, ImageSettings, MaterialSource, Scene, Source, mesh};
 use crate::steps::{FitThreads, LoadMaterial};
 use crate::threads::{ThreadSettings, Threads};
 use crate::vulkan::{Device, Instance};
@@ -106,8 +106,8 @@ impl Renderer {
         })
     }
 
-    /// The threads of a material: a built-in, a file, or a [`Custom`](crate::Custom) BRDF. They are along the material's own axes, whatever its
-    /// rotation.
+    /// The threads that pictures of a material have by default: a built-in, a file, or a [`Custom`](crate::Custom) BRDF. They are
+    /// along the material's own axes, whatever its rotation.
     ///
     /// ```
     /// # let renderer = threadlight::Renderer::new()?;
@@ -121,9 +121,9 @@ impl Renderer {
     pub fn threads(&self, material: impl Into<MaterialSource>, count: usize) -> Result<Threads> {
         let round = self.memo.round(&());
         let (brdf, _) = in_own_axes(&round.ask(&LoadMaterial(&material.into()))?);
-        let threads =
-            round.ask(&FitThreads { brdf: &brdf, settings: ThreadSettings { count, ..Default::default() } })?;
-        Ok((*threads).clone())
+        let settings = ThreadSettings { count, ..Default::default() };
+        let settings = settings.for_picture(&brdf, ImageSettings::default().subpixels);
+        Ok((*round.ask(&FitThreads { brdf: &brdf, settings })?).clone())
     }
 }
 

@@ -20,6 +20,22 @@ pub fn octahedral_decode(e: Vec2) -> Vec3 {
     Vec3::new(unfold(e.x), unfold(e.y), z).normalize()
 }
 
+/// How far from the middle a stereographic map goes: 13 degrees beyond the horizon. Twin of `STEREOGRAPHIC_EXTENT`.
+pub const STEREOGRAPHIC_EXTENT: f32 = 1.25;
+
+/// Stereographic map of a unit vector to the plane, from -z: the upper hemisphere is the unit disc. What is outside of the map is moved to
+/// its border.
+pub fn stereographic_encode(d: Vec3) -> Vec2 {
+    // -z itself has no place outside, rather than all of them: it counts as z.
+    let place = d.truncate() / (1.0 + d.z).max(f32::MIN_POSITIVE);
+    place.clamp(Vec2::splat(-STEREOGRAPHIC_EXTENT), Vec2::splat(STEREOGRAPHIC_EXTENT))
+}
+
+/// The direction back, not of unit length. Twin of `stereographic_decode`.
+pub fn stereographic_decode(place: Vec2) -> Vec3 {
+    (2.0 * place).extend(1.0 - place.length_squared())
+}
+
 /// Two numbers from -1 to 1 in 16 bits each. Twin of `packSnorm2x16`.
 pub fn pack_snorm_2x16(value: Vec2) -> u32 {
     let [x, y] = value.to_array().map(|x| u32::from((x.clamp(-1.0, 1.0) * 32767.0).round() as i16 as u16));

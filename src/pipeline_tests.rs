@@ -47,7 +47,7 @@ fn wherever_the_device_fails_it_is_said_and_nothing_is_left() {
         // Every third: each opens a device with validation.
         for (index, name) in places.into_iter().step_by(3) {
             let start = Instant::now();
-            let fault = Fault { of: None, index, result, lasts: result == Call::ERROR_DEVICE_LOST };
+            let fault = Fault { of: None, after: None, index, result, lasts: result == Call::ERROR_DEVICE_LOST };
             let error = render(&prepared, Some(fault)).0.expect_err("a call fails").to_string();
             let remedy = if fault.lasts { "try again" } else { "a smaller --size" };
             assert!(error.contains(name) && error.contains(remedy), "{index}, {name}: {error}");

@@ -7,8 +7,7 @@ use crate::method::Method;
 use crate::passes::{PlacedMesh, PlacedTangent, Sampling, View};
 use crate::scene::{Camera, MaterialSource, Mesh, Scene, Source, TangentRule};
 use crate::steps::{DraftThreads, FitThreads, LoadBrushedMesh, LoadEnvironment, LoadMaterial, LoadMesh};
-use crate::threads::fitted::set_count;
-use crate::threads::{ThreadKind, ThreadSettings, Threads, WithThreads};
+use crate::threads::{ThreadSettings, Threads, WithThreads};
 use crate::{Error, Result};
 use glam::{DAffine3, DVec3};
 use std::cell::Cell;
@@ -96,8 +95,7 @@ pub fn ask_threads(
 fn thread_settings(method: Method, brdf: &Brdf, sampling: Sampling, subpixels: u32) -> Option<ThreadSettings> {
     let Sampling { count, seed } = sampling;
     let settings = ThreadSettings { kind: method.threads()?, count: count as usize, seed, ..ThreadSettings::default() };
-    let sets = if settings.kind == ThreadKind::Fitted { set_count(brdf, settings.count, subpixels) } else { 1 };
-    Some(ThreadSettings { sets, ..settings })
+    Some(settings.for_picture(brdf, subpixels))
 }
 
 /// Asks `round` for all that `scene` names, and for the threads of its materials.

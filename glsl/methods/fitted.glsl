@@ -1,5 +1,5 @@
-// Fitted threads: sum over k of w_k (environment blurred by kernel k)(d_k), plus the irradiance times what they leave of the albedo. Directions, widths and
-// weights were fitted to f(w_i, w_o) (n . w_i), so no BRDF is left to evaluate.
+// Fitted threads: sum over k of w_k (environment blurred by kernel k)(d_k), plus the irradiance times what they leave of the
+// albedo. Directions, widths and weights were fitted to f(w_i, w_o) (n . w_i), so no BRDF is left to evaluate.
 //
 // Few threads fit tails of lobes worst, and under small bright sources tails matter most. So the blurred environment is without
 // these, and they are shaded by the BRDF itself.
@@ -151,21 +151,25 @@ Rows rows_at(Surface surface, ThreadTable table) {
 }
 
 Kernel between(Kernel a, Kernel b, float t) {
-    return Kernel(mix(a.direction, b.direction, t), mix(a.level, b.level, t), mix(a.weight, b.weight, t));
+    return Kernel(mix(a.place, b.place, t), mix(a.level, b.level, t), mix(a.weight, b.weight, t));
 }
 
-// Thread k, in the environment's coordinates; its direction is no unit vector.
+// Thread k, in the shading frame, blurred by the normals of the pixel.
 Kernel kernel_at(Rows rows, uint k, Surface surface) {
     Kernel kernel = between(unpack_kernel(rows.below, k), unpack_kernel(rows.above, k), rows.t);
     if (HAS_TANGENTS != 0 && rows.next_azimuth != 0) {
         uint next = rows.next_azimuth;
         Kernel of_next = between(unpack_kernel(rows.below + next, k), unpack_kernel(rows.above + next, k), rows.t);
         kernel = between(kernel, of_next, rows.towards_next);
-        kernel.direction.y *= rows.side;
+        kernel.place.y *= rows.side;
     }
-    kernel.direction = surface.frame * kernel.direction;
     kernel.level = level_within_pixel(kernel.level, surface.normal_variance);
     return kernel;
+}
+
+// Where a kernel looks, in the environment's coordinates; no unit vector.
+vec3 looks_towards(Kernel kernel, Surface surface) {
+    return surface.frame * stereographic_decode(kernel.place);
 }
 
 vec3 albedo_at(Rows rows) {
@@ -190,7 +194,7 @@ vec3 estimate(Surface surface, Material material, uint first, uint stride) {
         do {
             Kernel kernel = kernel_at(rows, k, surface);
             weights += kernel.weight;
-            sum += kernel.weight * blurred_radiance(kernel.direction, kernel.level);
+            sum += kernel.weight * blurred_radiance(looks_towards(kernel, surface), kernel.level);
         } while ((k += stride) < table.count);
     }
     AtSources at = AtSources(vec3(0.0), vec3(0.0));
@@ -209,10 +213,10 @@ vec3 estimate(Surface surface, Material material, uint first, uint stride) {
             weights += kernel.weight;
             float sharp = sharp_part(kernel.level);
             if (sharp > 0.0) {
-                sum += kernel.weight * sharp * sharp_radiance(kernel.direction, of_kernels);
+                sum += kernel.weight * sharp * sharp_radiance(looks_towards(kernel, surface), of_kernels);
             }
             if (sharp < 1.0) {
-                sum += kernel.weight * (1.0 - sharp) * blurred_radiance(kernel.direction, kernel.level);
+                sum += kernel.weight * (1.0 - sharp) * blurred_radiance(looks_towards(kernel, surface), kernel.level);
             }
         } while ((k += stride) < table.sharp_count);
     }
@@ -222,7 +226,7 @@ vec3 estimate(Surface surface, Material material, uint first, uint stride) {
             Kernel kernel = kernel_at(rows, k, surface);
             float blurred = HAS_SHARP_KERNELS != 0 ? 1.0 - sharp_part(kernel.level) : 1.0;
             if (blurred > 0.0) {
-                sum += kernel.weight * blurred * of_kernels * blurred_sources(kernel.direction, kernel.level);
+                sum += kernel.weight * blurred * of_kernels * blurred_sources(looks_towards(kernel, surface), kernel.level);
             }
         } while ((k += stride) < table.count);
     }

@@ -2,13 +2,13 @@
 #include "packing.glsl"
 
 // Azimuth by azimuth of the view, and row by row of theta_o: the albedo as three floats, then thread by thread three words: direction
-// (octahedral, 2 x 16 bits), level and red weight, green and blue weight (half floats).
+// (its place on the stereographic map, 2 x 16 bits), level and red weight, green and blue weight (half floats).
 layout(set = 0, binding = 7, std430) readonly buffer Threads {
     uint threads[];
 };
 
 struct Kernel {
-    vec3 direction;
+    vec2 place; // of its direction on the stereographic map
     float level;
     vec3 weight;
 };
@@ -22,7 +22,8 @@ Kernel unpack_kernel(uint row, uint k) {
     uint at = row + 3 * (k + 1);
     vec2 level_red = unpackHalf2x16(threads[at + 1]);
     vec2 green_blue = unpackHalf2x16(threads[at + 2]);
-    return Kernel(octahedral_decode(unpackSnorm2x16(threads[at])), level_red.x, vec3(level_red.y, green_blue));
+    vec2 place = STEREOGRAPHIC_EXTENT * unpackSnorm2x16(threads[at]);
+    return Kernel(place, level_red.x, vec3(level_red.y, green_blue));
 }
 
 vec3 unpack_albedo(uint row) {

@@ -239,9 +239,9 @@ impl Model for Rgl {
     fn evaluate(&self, w_i: DVec3, w_o: DVec3) -> DVec3 {
         let tables = &*self.tables;
         let h = (w_i + w_o).normalize();
-        // Seen along the normal there is no plane of view, but values depend on its azimuth all the same, by what the measurement erred. Any
-        // will do: the one that Mitsuba takes.
-        let plane = if w_o.truncate() == DVec2::ZERO { DVec2::NEG_X } else { w_o.truncate() };
+        // Seen along the normal there is no plane of view, but values depend on its azimuth all the same, by what the measurement erred.
+        // It is the plane of x, where views have theirs that tables and threads are made for: so these go on evenly to the normal.
+        let plane = if w_o.truncate() == DVec2::ZERO { DVec2::X } else { w_o.truncate() };
         let phi_h = plane.perp_dot(h.truncate()).atan2(plane.dot(h.truncate()));
         let u = |theta: f64, phi: f64| dvec2((theta * FRAC_2_PI).sqrt(), 0.5 + 0.5 * FRAC_1_PI * phi);
         let theta_o = theta(w_o);

@@ -28,6 +28,9 @@ fn values_are_those_that_mitsuba_finds() {
         let [w_i, w_o, expected] = [0, 3, 6].map(|start| DVec3::from_slice(&numbers[start..]));
         // Mitsuba keeps what is out of the gamut.
         let expected = expected.max(DVec3::ZERO);
+        // Seen along the normal, where any plane of view is as good, Mitsuba's is that of -x.
+        let is_turned = w_o.truncate() == DVec2::ZERO;
+        let w_i = if is_turned { dvec3(-w_i.x, -w_i.y, w_i.z) } else { w_i };
         let found = brdf.as_ref().unwrap().evaluate(w_i, w_o);
         for channel in 0..3 {
             let error = (found[channel] - expected[channel]).abs();

@@ -9,7 +9,6 @@ use threadlight::low_level::output;
 use threadlight::low_level::prepare::in_own_axes;
 use threadlight::low_level::scene::{ImageSettings, MaterialSource};
 use threadlight::low_level::steps::{FitThreads, LoadMaterial};
-use threadlight::low_level::threads::fitted::set_count;
 use threadlight::low_level::threads::{self, ThreadKind, ThreadSettings};
 
 const EXAMPLES: &str = "\
@@ -69,12 +68,8 @@ impl Threads {
         let memo = Memo::new(cache_folder(self.no_cache).as_deref());
         let round = memo.round(&progress);
         let (brdf, _) = in_own_axes(&round.ask(&LoadMaterial(&source))?);
-        let sets = match kind {
-            // Those that pictures are rendered by if nothing else is asked for.
-            ThreadKind::Fitted => set_count(&brdf, count, ImageSettings::default().subpixels),
-            ThreadKind::Paper => 1,
-        };
-        let settings = ThreadSettings { kind, count, sets, seed: self.seed, ..Default::default() };
+        let settings = ThreadSettings { kind, count, seed: self.seed, ..Default::default() };
+        let settings = settings.for_picture(&brdf, ImageSettings::default().subpixels);
         let threads = round.ask(&FitThreads { brdf: &brdf, settings })?;
         progress.finish();
         let Asked { origin, time, .. } = round.asked(FitThreads::NAME)[0];

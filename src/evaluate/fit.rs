@@ -9,7 +9,7 @@ use crate::prepare::in_own_axes;
 use crate::progress::{Observer, OnlyCancels};
 use crate::scene::{ImageSettings, MaterialSource};
 use crate::steps::LoadMaterial;
-use crate::threads::fitted::{generate, set_count, validation_error};
+use crate::threads::fitted::{generate, validation_error};
 use crate::threads::{ThreadKind, ThreadSettings};
 
 /// What to fit, and how often.
@@ -50,8 +50,8 @@ pub fn run(fits: &Fits, memo: &Memo, observer: &dyn Observer, found: &mut Vec<Ti
         let (brdf, _) = in_own_axes(&memo.round(observer).ask(&LoadMaterial(source))?);
         for &threads in &fits.counts {
             let count = threads as usize;
-            let sets = set_count(&brdf, count, ImageSettings::default().subpixels);
-            let settings = ThreadSettings { kind: ThreadKind::Fitted, count, sets, ..ThreadSettings::default() };
+            let settings = ThreadSettings { kind: ThreadKind::Fitted, count, ..ThreadSettings::default() };
+            let settings = settings.for_picture(&brdf, ImageSettings::default().subpixels);
             let mut times_ms = Vec::new();
             let table = loop {
                 let start = Instant::now();

@@ -8,6 +8,7 @@ use crate::brdf::MIN_COS_THETA_D;
 use crate::environment::sources::{CLEAR, clearance};
 use crate::environment::{LightMap, SourceRecord};
 use crate::light::BlurredLight;
+use crate::packing::stereographic_decode;
 use crate::threads::Threads;
 use crate::threads::fitted::azimuths::fold_azimuth;
 use crate::threads::fitted::kernel::FINEST_WIDTH_RAD;
@@ -215,7 +216,7 @@ impl Rows {
         }
         let [below, above] = [self.below, self.above].map(|row| at(row + self.next_azimuth));
         let kernel = between(kernel, between(below, above, self.t), self.towards_next);
-        UnpackedKernel { direction: Vec3::new(1.0, self.side, 1.0) * kernel.direction, ..kernel }
+        UnpackedKernel { place: Vec2::new(1.0, self.side) * kernel.place, ..kernel }
     }
 
     /// Twin of `albedo_at`.
@@ -230,7 +231,7 @@ impl Rows {
 /// Twin of `between`.
 fn between(a: UnpackedKernel, b: UnpackedKernel, t: f32) -> UnpackedKernel {
     UnpackedKernel {
-        direction: a.direction.lerp(b.direction, t),
+        place: a.place.lerp(b.place, t),
         level: a.level + t * (b.level - a.level),
         weight: a.weight.lerp(b.weight, t),
     }
@@ -256,8 +257,9 @@ pub(super) fn estimate(point: &Point) -> Vec3 {
     for k in (point.first as usize..threads.count).step_by(point.stride) {
         let kernel = rows.kernel(threads, k);
         let level = level_within_pixel(kernel.level, surface.normal_variance);
+        let direction = surface.frame * stereographic_decode(kernel.place);
         weights += kernel.weight;
-        sum += kernel.weight * blurred_radiance(point.twin, surface.frame * kernel.direction, level, of_kernels);
+        sum += kernel.weight * blurred_radiance(point.twin, direction, level, of_kernels);
     }
     let share = point.stride as f32;
     let cosine_part = rows.albedo(threads) - share * weights;

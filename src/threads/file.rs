@@ -5,7 +5,7 @@
 //! | bytes | content |
 //! |---|---|
 //! | 8 | magic `THREADS\0` |
-//! | 4 | u32 format version, now 9 |
+//! | 4 | u32 format version, now 10 |
 //! | 4 | u32 length H of the header |
 //! | H | header, JSON: `method` ("fitted" or "paper"), `material`, `count`, `rows`, `seed`, and `azimuths` and `sets` if there is more than one |
 //! | ... | the rows, then the threads, see below |
@@ -21,11 +21,11 @@
 //! | `paper` | albedo, 3 f32 | theta, phi (radians), p (1/sr), 3 f32 |
 //! | `fitted` | albedo, 3 f32; expected relative error, f32 | 3 words, below |
 //!
-//! The words of a fitted thread: its direction, octahedral, x and y as 16-bit signed normalised numbers, x in the low half; level and
-//! red weight as half floats, level in the low half; green and blue weight as half floats, green in the low half. The level says
-//! by which von Mises-Fisher kernel the environment is to be blurred: of width 2^level / 256 radians if it is whole, by none at
-//! level -1, and otherwise by the linear blend of the two kernels of whole levels beside it. What the weights of all threads leave of the albedo is the
-//! weight of the irradiance over pi.
+//! The words of a fitted thread: its direction's place on the stereographic map, (x, y) / (1.25 (1 + z)), as 16-bit signed normalised
+//! numbers, x in the low half; level and red weight as half floats, level in the low half; green and blue weight as half floats, green
+//! in the low half. The level says by which von Mises-Fisher kernel the environment is to be blurred: of width 2^level / 256 radians if
+//! it is whole, by none at level -1, and otherwise by the linear blend of the two kernels of whole levels beside it. What the weights of
+//! all threads leave of the albedo is the weight of the irradiance over pi.
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
@@ -37,7 +37,7 @@ use crate::file_format;
 use crate::output::write_whole;
 
 /// Version of the file format and of the threads in it: to be raised when either changes, since caches depend on it.
-pub const FORMAT_VERSION: u32 = 9;
+pub const FORMAT_VERSION: u32 = 10;
 
 const MAGIC: &[u8; 8] = b"THREADS\0";
 const DIGEST_BYTES: usize = blake3::OUT_LEN;

@@ -38,11 +38,12 @@ pub use file::{FORMAT_VERSION, parse, read, write};
 pub use fitted::FittedTable;
 pub use plot::plot;
 
-/// A BRDF, and the threads by which it is shaded, for methods that have any.
-pub type WithThreads<'a> = (&'a Brdf, Option<&'a Threads>);
 pub use slice_table::SliceTable;
 pub use split_sum::SplitSum;
 pub use table::{Sample, ThreadTable};
+
+/// A BRDF, and the threads by which it is shaded, for methods that have any.
+pub type WithThreads<'a> = (&'a Brdf, Option<&'a Threads>);
 
 /// Lowest n . s of a sample: 0.006 degrees above the horizon, a thousand times what rounding theta to single precision moves
 /// it by, and far below what any view angle of a table needs.
@@ -124,7 +125,7 @@ impl Threads {
     /// Where `thread` looks in `row`, unit, in the shading frame.
     pub fn direction(&self, row: usize, thread: usize) -> DVec3 {
         match self {
-            Self::Fitted(table) => table.row(row)[thread].unpack().direction.as_dvec3(),
+            Self::Fitted(table) => table.row(row)[thread].unpack().direction().as_dvec3(),
             Self::Paper(table) => table.row(row)[thread].direction(),
         }
     }
@@ -214,6 +215,15 @@ impl Default for ThreadSettings {
 }
 
 impl ThreadSettings {
+    /// The same, in the sets that a picture of `brdf` with `subpixels` x `subpixels` to the pixel has them in.
+    pub fn for_picture(self, brdf: &Brdf, subpixels: u32) -> Self {
+        let sets = match self.kind {
+            ThreadKind::Fitted => fitted::set_count(brdf, self.count, subpixels),
+            ThreadKind::Paper => 1,
+        };
+        Self { sets, ..self }
+    }
+
     /// Errors where there is nothing or too much to make.
     fn check(&self) -> Result<()> {
         let most = self.kind.max_count();

@@ -111,7 +111,9 @@ pub fn run(settings: ViewerSettings) -> Result<Ended> {
 
 /// Keeps a `scene` whose viewer fails.
 fn keep(scene: &Scene, path: &std::path::Path) {
-    match scene.save(path) {
+    // Early on nothing was kept yet, and there is no folder.
+    let folder = path.parent().map_or(Ok(()), std::fs::create_dir_all);
+    match folder.map_err(|cause| Error::unwritable(path, cause)).and_then(|()| scene.save(path)) {
         Ok(()) => tracing::warn!("the scene as it was edited is kept: threadlight view {}", path.display()),
         Err(error) => tracing::warn!("the scene as it was edited is lost: {error}"),
     }

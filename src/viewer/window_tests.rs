@@ -11,34 +11,34 @@ use display::Display;
 use std::path::Path;
 use std::process::Command;
 
-/// The child's name of what fails: a call, which of them, and the index of the result in [`RESULTS`].
+/// The child's name of what fails: a call, how many pictures are shown before, and the index of the result in [`RESULTS`].
 const FAULT: &str = "THREADLIGHT_TEST_FAULT";
 const RESULTS: [Call; 3] = [Call::ERROR_SURFACE_LOST_KHR, Call::ERROR_OUT_OF_DATE_KHR, Call::ERROR_DEVICE_LOST];
 
 /// Runs the viewer in a process of its own, where a call fails; `None` where there is no display.
-fn child(name: &str, of: &str, index: usize, result: usize) -> Option<()> {
+fn child(name: &str, of: &str, shown: usize, result: usize) -> Option<()> {
     let display = Display::open()?;
     let folder = tempfile::tempdir().unwrap();
     let (_, module) = module_path!().split_once("::").expect("a crate");
     let child = Command::new(std::env::current_exe().expect("a name"))
         .args(["--exact", &format!("{module}::{name}"), "--ignored", "--nocapture"])
-        .env(FAULT, format!("{of} {index} {result}"))
+        .env(FAULT, format!("{of} {shown} {result}"))
         .env("DISPLAY", &display.name)
         .env_remove("WAYLAND_DISPLAY")
         .current_dir(&folder)
         .output()
         .expect("a process");
     let said = [child.stdout, child.stderr].map(|bytes| String::from_utf8_lossy(&bytes).into_owned()).concat();
-    assert!(child.status.success() && said.contains("1 passed"), "{of} {index} {result}: {said}");
+    assert!(child.status.success() && said.contains("1 passed"), "{of} {shown} {result}: {said}");
     Some(())
 }
 
 /// Plays a session of a hundred frames with the fault that the parent asks for; a device that is lost stays so.
 fn play() -> Result<Ended> {
     let fault = std::env::var(FAULT).expect("a fault");
-    let [of, index, result] = fault.split(' ').collect::<Vec<_>>()[..] else { panic!("{fault}") };
+    let [of, shown, result] = fault.split(' ').collect::<Vec<_>>()[..] else { panic!("{fault}") };
     let result = RESULTS[result.parse::<usize>().unwrap()];
-    let (of, lasts) = (Some(&*of.to_owned().leak()), result == Call::ERROR_DEVICE_LOST);
+    let (of, shown): (&str, usize) = (of.to_owned().leak(), shown.parse().unwrap());
     let exposures: String = (1..=99).map(|step| format!("{{\"set\": {{\"exposure\": 0.{step:02}}}}}\n")).collect();
     let clay = r#"{"set": {"material": {"builtin": "clay"}}}"#;
     let replay = format!("{clay}\n{exposures}\"wait\"\n{{\"save_scene\": \"end.toml\"}}\n\"quit\"\n");
@@ -55,16 +55,23 @@ fn play() -> Result<Ended> {
         replay_limit: Duration::from_secs(100),
         ..ViewerSettings::default()
     };
-    let fault = Fault { of, index: index.parse().unwrap(), result, lasts };
+    let fault = Fault {
+        of: Some(of),
+        after: Some(("vkQueuePresentKHR", shown)),
+        index: 0,
+        result,
+        lasts: result == Call::ERROR_DEVICE_LOST,
+    };
     let (ended, calls) = with_fault(Some(fault), || run(settings));
-    let made = calls.iter().filter(|call| Some(**call) == fault.of).count();
-    assert!(made > fault.index, "{made} calls of {:?}", fault.of);
+    let shows = calls.iter().enumerate().filter(|(_, call)| **call == "vkQueuePresentKHR").map(|(at, _)| at + 1);
+    let armed = std::iter::once(0).chain(shows).nth(shown).expect("so many pictures");
+    assert!(calls[armed..].contains(&of), "no call of {of} after {shown} pictures");
     ended
 }
 
 #[test]
 fn a_lost_surface_is_made_anew() {
-    for (of, index, result) in [
+    for (of, shown, result) in [
         ("vkAcquireNextImageKHR", 0, 0),
         ("vkAcquireNextImageKHR", 7, 0),
         ("vkAcquireNextImageKHR", 7, 1),
@@ -73,7 +80,7 @@ fn a_lost_surface_is_made_anew() {
         ("vkQueuePresentKHR", 7, 1),
         ("vkGetPhysicalDeviceSurfaceCapabilitiesKHR", 0, 0),
     ] {
-        if child("the_surface_is_lost", of, index, result).is_none() {
+        if child("the_surface_is_lost", of, shown, result).is_none() {
             return;
         }
     }
@@ -91,9 +98,8 @@ fn the_surface_is_lost() {
 #[test]
 fn what_was_edited_is_kept_when_the_device_is_lost() {
     for of in ["vkAcquireNextImageKHR", "vkQueuePresentKHR", "vkQueueSubmit2", "vkWaitSemaphores"] {
-        // Late enough that something was edited: the first frames wait for the window and the scene.
-        let index = if of.ends_with("KHR") { 60 } else { 200 };
-        if child("the_device_is_lost", of, index, 2).is_none() {
+        // By then something was edited: the replay makes one edit for each picture that is shown.
+        if child("the_device_is_lost", of, 60, 2).is_none() {
             return;
         }
     }
@@ -104,7 +110,8 @@ fn what_was_edited_is_kept_when_the_device_is_lost() {
 fn the_device_is_lost() {
     let error = play().map(drop).expect_err("a device that is lost").to_string();
     assert!(error.contains("device") && error.contains("try again") && !error.contains('\n'), "{error}");
-    let scene = Scene::load(Path::new("cache/edited.toml")).expect("a scene");
+    let kept = Scene::load(Path::new("cache/edited.toml"));
+    let scene = kept.unwrap_or_else(|unread| panic!("{unread}, after {error}"));
     assert!(scene.materials[0].name == "clay" && scene.image.exposure < 1.0, "{scene:?}");
     assert!(!Path::new("end.toml").exists());
 }

@@ -7,6 +7,8 @@ use std::cell::{Cell, RefCell};
 pub(crate) struct Fault {
     /// Only calls of this name count; all if there is none.
     pub of: Option<&'static str>,
+    /// Calls count only after so many calls of this name.
+    pub after: Option<(&'static str, usize)>,
     /// Which of them, counted from 0.
     pub index: usize,
     /// What it returns.
@@ -18,17 +20,21 @@ pub(crate) struct Fault {
 thread_local! {
     /// Names of the calls that this thread has made.
     static MADE: RefCell<Vec<&'static str>> = const { RefCell::new(Vec::new()) };
-    /// Which of them fails, and how many were counted.
-    static FAULT: Cell<Option<(Fault, usize)>> = const { Cell::new(None) };
+    /// Which of them fails, how many were made of those that come first, and how many were counted.
+    static FAULT: Cell<Option<(Fault, usize, usize)>> = const { Cell::new(None) };
 }
 
 /// Called before each call: an error for the one that is to fail.
 pub(super) fn before(name: &'static str) -> ash::prelude::VkResult<()> {
     MADE.with_borrow_mut(|made| made.push(name));
-    let Some((fault, counted)) = FAULT.get().filter(|(fault, _)| fault.of.is_none_or(|of| of == name)) else {
+    let Some((fault, mut preceded, counted)) = FAULT.get() else { return Ok(()) };
+    let may_count = fault.after.is_none_or(|(_, enough)| preceded >= enough);
+    preceded += usize::from(fault.after.is_some_and(|(first, _)| first == name));
+    let counts = may_count && fault.of.is_none_or(|of| of == name);
+    FAULT.set(Some((fault, preceded, counted + usize::from(counts))));
+    if !counts {
         return Ok(());
-    };
-    FAULT.set(Some((fault, counted + 1)));
+    }
     let fails = counted == fault.index || (fault.lasts && counted > fault.index);
     if fails { Err(fault.result) } else { Ok(()) }
 }
@@ -36,7 +42,7 @@ pub(super) fn before(name: &'static str) -> ash::prelude::VkResult<()> {
 /// What comes of `act` with a `fault` of this thread, and the calls that it made.
 pub(crate) fn with_fault<T>(fault: Option<Fault>, act: impl FnOnce() -> T) -> (T, Vec<&'static str>) {
     MADE.take();
-    FAULT.set(fault.map(|fault| (fault, 0)));
+    FAULT.set(fault.map(|fault| (fault, 0, 0)));
     let result = act();
     FAULT.set(None);
     (result, MADE.take())
@@ -87,7 +93,7 @@ mod tests {
         for (failing, name) in calls.iter().enumerate() {
             let mut messages = Messages::default();
             let result = ash::vk::Result::ERROR_OUT_OF_DEVICE_MEMORY;
-            let fault = Fault { of: None, index: failing, result, lasts: false };
+            let fault = Fault { of: None, after: None, index: failing, result, lasts: false };
             let (result, _) = with_fault(Some(fault), || use_everything(&mut messages));
             let error = result.expect_err("a call fails").to_string();
             assert!(error.contains(name), "{failing}, {name}: {error}");

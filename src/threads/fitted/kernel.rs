@@ -28,7 +28,8 @@ pub struct Kernel {
 }
 
 impl Kernel {
-    /// The one that is the part `t` of the way to `other`, as shading has it between rows.
+    /// The one that is the part `t` of the way to `other`, as shading has it between rows: that blends places on a map of directions, which
+    /// for neighbours a degree apart is the same to 2e-5 radians.
     pub fn between(&self, other: &Self, t: f64) -> Self {
         Self {
             direction: self.direction.lerp(other.direction, t).normalize(),

@@ -8,7 +8,7 @@
 //! | how kernels answer them | [`answers`] |
 //! | the fit of one row | [`solve`] |
 //! | of all rows | [`generate()`] |
-//! | sets of them, for sub-pixels | [`set_count`] |
+//! | sets of them, for sub-pixels | [`ThreadSettings::for_picture`](super::ThreadSettings::for_picture) |
 //! | azimuths of the view, for anisotropic BRDFs | [`azimuths`] |
 //! | of an edited BRDF, at once and coarsely | [`draft()`] |
 //! | what a fit leaves, under other lights | [`validation_error`] |
@@ -30,7 +30,7 @@ mod validate;
 pub use azimuths::azimuth_count;
 pub use draft::draft;
 pub use generate::generate;
-pub use sets::set_count;
+pub(super) use sets::set_count;
 pub use table::{FittedTable, PackedKernel, UnpackedKernel};
 pub use validate::validation_error;
 

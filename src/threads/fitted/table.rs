@@ -1,14 +1,16 @@
 //! Fitted threads as they are stored, uploaded and looked up: twelve bytes a thread and row. In shaders: glsl/threads/fitted.glsl.
 use std::f64::consts::FRAC_PI_2;
 
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 use half::f16;
 
 use super::azimuths::fold_azimuth;
 use super::kernel::{Kernel, SHARPEST_LEVEL, WIDEST_LEVEL, all_between};
-use crate::packing::{octahedral_decode, octahedral_encode, pack_snorm_2x16, unpack_snorm_2x16};
+use crate::packing::{
+    STEREOGRAPHIC_EXTENT, pack_snorm_2x16, stereographic_decode, stereographic_encode, unpack_snorm_2x16,
+};
 
-/// A kernel in three words: direction (octahedral, 2 x 16 bits), level and red weight, green and blue weight (half floats).
+/// A kernel in three words: direction (its place on the stereographic map, 2 x 16 bits), level and red weight, green and blue weight (half floats).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub struct PackedKernel(pub [u32; 3]);
@@ -16,29 +18,36 @@ pub struct PackedKernel(pub [u32; 3]);
 /// A kernel as shaders see it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UnpackedKernel {
-    /// Where it looks, unit, in the shading frame.
-    pub direction: Vec3,
+    /// Where it looks in the shading frame: its place on the stereographic map of [`crate::packing`].
+    pub place: Vec2,
     /// Its width: see [`super::kernel`].
     pub level: f32,
     /// Linear Rec. 709.
     pub weight: Vec3,
 }
 
+impl UnpackedKernel {
+    /// Where it looks, unit, in the shading frame.
+    pub fn direction(&self) -> Vec3 {
+        stereographic_decode(self.place).normalize()
+    }
+}
+
 impl PackedKernel {
     /// The nearest to `kernel`.
     pub fn new(kernel: &Kernel) -> Self {
         let half = |x: f64| u32::from(f16::from_f64(x.min(f64::from(f16::MAX))).to_bits());
-        let direction = pack_snorm_2x16(octahedral_encode(kernel.direction.as_vec3()));
+        let place = pack_snorm_2x16(stereographic_encode(kernel.direction.as_vec3()) / STEREOGRAPHIC_EXTENT);
         let DVec3 { x: red, y: green, z: blue } = kernel.weight;
-        Self([direction, half(kernel.level) | half(red) << 16, half(green) | half(blue) << 16])
+        Self([place, half(kernel.level) | half(red) << 16, half(green) | half(blue) << 16])
     }
 
     /// Twin of `unpack_kernel`.
     pub fn unpack(self) -> UnpackedKernel {
         let half = |bits: u32| f16::from_bits(bits as u16).to_f32();
-        let [direction, level_red, green_blue] = self.0;
+        let [place, level_red, green_blue] = self.0;
         UnpackedKernel {
-            direction: octahedral_decode(unpack_snorm_2x16(direction)),
+            place: STEREOGRAPHIC_EXTENT * unpack_snorm_2x16(place),
             level: half(level_red),
             weight: Vec3::new(half(level_red >> 16), half(green_blue), half(green_blue >> 16)),
         }
@@ -46,8 +55,12 @@ impl PackedKernel {
 
     /// The same in double precision.
     pub(super) fn kernel(self) -> Kernel {
-        let UnpackedKernel { direction, level, weight } = self.unpack();
-        Kernel { direction: direction.as_dvec3(), level: level.into(), weight: weight.as_dvec3() }
+        let kernel = self.unpack();
+        Kernel {
+            direction: kernel.direction().as_dvec3(),
+            level: kernel.level.into(),
+            weight: kernel.weight.as_dvec3(),
+        }
     }
 
     /// Whether its level and its weight are in their ranges.

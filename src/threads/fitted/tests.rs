@@ -24,7 +24,7 @@ fn check(name: &str, table: &FittedTable) {
     assert_eq!(table.kernels.len(), table.rows * table.count);
     for packed in &table.kernels {
         let kernel = packed.unpack();
-        assert!((kernel.direction.length() - 1.0).abs() < 1e-6, "{name}: {kernel:?}");
+        assert!((kernel.direction().length() - 1.0).abs() < 1e-6, "{name}: {kernel:?}");
         assert!((SHARPEST_LEVEL as f32..=WIDEST_LEVEL as f32).contains(&kernel.level), "{name}: {kernel:?}");
         assert!(kernel.weight.is_finite() && kernel.weight.min_element() >= 0.0, "{name}: {kernel:?}");
     }
@@ -35,7 +35,8 @@ fn check(name: &str, table: &FittedTable) {
 #[test]
 fn packing_keeps_kernels_to_its_rounding() {
     for (i, uv) in fibonacci_lattice(2000).enumerate() {
-        let z = 2.0 * uv.x - 1.0;
+        // As far down as the map goes on all sides.
+        let z = 1.2 * uv.x - 0.2;
         let direction = DVec3::new((6.0 * uv.y).cos(), (6.0 * uv.y).sin(), 0.0) * (1.0 - z * z).sqrt() + z * DVec3::Z;
         let kernel = Kernel {
             direction: direction.normalize(),
@@ -43,14 +44,14 @@ fn packing_keeps_kernels_to_its_rounding() {
             weight: DVec3::new(uv.x, 1e-3 * uv.y, i as f64),
         };
         let unpacked = PackedKernel::new(&kernel).unpack();
-        // 16 bits for a side of 2: half a step is 1.5e-5, and the map stretches it up to threefold.
-        assert!(unpacked.direction.as_dvec3().distance(kernel.direction) < 1e-4, "{kernel:?} {unpacked:?}");
+        // 16 bits for a side of 2.5: half a step is 1.9e-5 along both axes, and the map halves lengths, or less.
+        assert!(unpacked.direction().as_dvec3().distance(kernel.direction) < 5.5e-5, "{kernel:?} {unpacked:?}");
         // Half floats have eleven bits; numbers below 6e-5 are whole multiples of 6e-8.
         let error = (unpacked.weight.as_dvec3() - kernel.weight).abs();
         assert!(error.cmple(kernel.weight / 2048.0 + 3e-8).all(), "{kernel:?} {unpacked:?}");
         assert!((f64::from(unpacked.level) - kernel.level).abs() <= kernel.level.abs() / 2048.0 + 3e-8);
         let again = Kernel {
-            direction: unpacked.direction.as_dvec3(),
+            direction: unpacked.direction().as_dvec3(),
             level: unpacked.level.into(),
             weight: unpacked.weight.as_dvec3(),
         };
@@ -105,7 +106,7 @@ fn a_glossy_plastic_is_fitted_in_its_lobe_as_on_its_base() {
     let mirror = glam::Vec3::new(-1.0, 0.0, 1.0).normalize();
     let in_lobe = table.row(1).iter().map(|packed| packed.unpack()).filter(|kernel| {
         let width_deg = scale_rad(kernel.level.into()).to_degrees();
-        kernel.direction.angle_between(mirror).to_degrees() < 8.0 && width_deg < 4.0
+        kernel.direction().angle_between(mirror).to_degrees() < 8.0 && width_deg < 4.0
     });
     // Started on the base one is there, and the error is 0.0086; where kernels stick at whole levels it is 0.0101.
     assert!(in_lobe.count() >= 3);
