@@ -29,6 +29,7 @@ void main() {
     normal = normalize(normal);
     geometry = pack_geometry(normal, object.material);
     if (object.tangent_axis.w != NO_TANGENT) {
-        geometry = with_tangent(geometry, tangent_along(world_tangent, normal));
+        vec3 tangent = tangent_along(world_tangent, normal);
+        geometry = with_tangent(geometry, turned_tangent(tangent, normal, object.tangent_turn));
     }
 }

@@ -10,13 +10,17 @@ layout(push_constant) uniform Object {
     vec4 forward;           // w: near plane
     // The axis that tangents go by, in object space; w: how, as below.
     vec4 tangent_axis;
+    // Cosine and sine of the material's rotation, by which tangents are turned.
+    vec2 tangent_turn;
     uint material;
 } object;
 
-// How tangents go by the axis of an object: not at all, since its material needs none; around it; along it.
+// How tangents go by the axis of an object: not at all, since its material needs none; around it; along it; not by
+// it but by the mesh's texture coordinates.
 const float NO_TANGENT = 0.0;
 const float TANGENT_AROUND = 1.0;
 const float TANGENT_ALONG = 2.0;
+const float TANGENT_OF_MESH = 3.0;
 
 // Reversed, infinite projection: depth 1 at the near plane, 0 at infinity, so float precision is where it is needed.
 vec4 project(vec3 from_eye) {

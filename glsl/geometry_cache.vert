@@ -5,6 +5,7 @@
 
 layout(location = 0) in vec3 position;
 layout(location = 1) in vec3 normal;
+layout(location = 2) in vec3 tangent; // of texture coordinates; the normal of a mesh that has none
 
 layout(location = 0) out vec3 eye_position;
 layout(location = 1) out vec3 world_normal;
@@ -23,6 +24,7 @@ void main() {
     world_normal = cofactors * normal;
     // Both are linear in the position, so what is interpolated is right within a triangle too.
     vec3 axis = object.tangent_axis.xyz;
-    world_tangent = linear_part * (object.tangent_axis.w == TANGENT_AROUND ? cross(axis, position) : axis);
+    vec3 along = object.tangent_axis.w == TANGENT_AROUND ? cross(axis, position) : axis;
+    world_tangent = linear_part * (object.tangent_axis.w == TANGENT_OF_MESH ? tangent : along);
     gl_Position = project(from_eye);
 }

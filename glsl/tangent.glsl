@@ -19,4 +19,9 @@ vec3 tangent_along(vec3 direction, vec3 n) {
     return dot(along, along) > 1e-6 ? normalize(along) : any_tangent(n);
 }
 
+// Unit `tangent`, orthogonal to n, turned about n by an angle of this cosine and sine: counter-clockwise seen from where n points.
+vec3 turned_tangent(vec3 tangent, vec3 n, vec2 turn) {
+    return turn.x * tangent + turn.y * cross(n, tangent);
+}
+
 #endif

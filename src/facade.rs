@@ -4,7 +4,7 @@ use crate::memo::Memo;
 use crate::method::Method;
 use crate::output::{self, ExrHeader, Format};
 use crate::pipeline::{DeviceScene, Rendering, Wanted};
-use crate::prepare::prepare;
+use crate::prepare::{in_own_axes, prepare};
 use crate::progress::Observer;
 use crate::scene::{Background, ImageSettings, MaterialSource, Scene, Source, mesh};
 use crate::steps::{FitThreads, LoadMaterial};
@@ -106,7 +106,8 @@ impl Renderer {
         })
     }
 
-    /// The threads that pictures of a material have by default: a built-in, a file, or a [`Custom`](crate::Custom) BRDF.
+    /// The threads that pictures of a material have by default: a built-in, a file, or a [`Custom`](crate::Custom) BRDF. They are
+    /// along the material's own axes, whatever its rotation.
     ///
     /// ```
     /// # let renderer = threadlight::Renderer::new()?;
@@ -119,7 +120,7 @@ impl Renderer {
     /// A material that there is not; a number of threads from 1 to 128 it is not.
     pub fn threads(&self, material: impl Into<MaterialSource>, count: usize) -> Result<Threads> {
         let round = self.memo.round(&());
-        let brdf = round.ask(&LoadMaterial(&material.into()))?;
+        let (brdf, _) = in_own_axes(&round.ask(&LoadMaterial(&material.into()))?);
         let settings = ThreadSettings { count, ..Default::default() };
         let settings = settings.for_picture(&brdf, ImageSettings::default().subpixels);
         Ok((*round.ask(&FitThreads { brdf: &brdf, settings })?).clone())

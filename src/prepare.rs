@@ -4,9 +4,9 @@ use crate::environment::Environment;
 use crate::geometry_texel::MAX_MATERIALS;
 use crate::memo::{Key, Keyed, Memo, Round, Step};
 use crate::method::Method;
-use crate::passes::{PlacedMesh, Sampling, View};
-use crate::scene::{Camera, MaterialSource, Mesh, Scene, TangentRule};
-use crate::steps::{DraftThreads, FitThreads, LoadEnvironment, LoadMaterial, LoadMesh};
+use crate::passes::{PlacedMesh, PlacedTangent, Sampling, View};
+use crate::scene::{Camera, MaterialSource, Mesh, Scene, Source, TangentRule};
+use crate::steps::{DraftThreads, FitThreads, LoadBrushedMesh, LoadEnvironment, LoadMaterial, LoadMesh};
 use crate::threads::{ThreadSettings, Threads, WithThreads};
 use crate::{Error, Result};
 use glam::{DAffine3, DVec3};
@@ -43,13 +43,32 @@ pub type NamedMesh = (String, Keyed<Mesh>);
 pub struct PreparedMaterial {
     /// Name in the scene.
     pub name: String,
-    /// Its BRDF.
+    /// Its BRDF as the scene has it, against the tangent of a surface.
+    pub turned_brdf: Keyed<Brdf>,
+    /// The same in its own axes, by which it is shaded: [`in_own_axes`].
     pub brdf: Keyed<Brdf>,
+    /// By how many degrees these are turned: see [`PlacedTangent::turn_deg`].
+    pub rotation_deg: f64,
     /// Its threads, for methods that use them.
     pub threads: Option<Keyed<Threads>>,
 }
 
+/// `brdf` in its own axes, and its rotation in degrees: [`Brdf::without_rotation`].
+pub fn in_own_axes(brdf: &Keyed<Brdf>) -> (Keyed<Brdf>, f64) {
+    match brdf.without_rotation() {
+        // Known by what it is, so it is the same for all rotations.
+        Some((own, rotation_deg)) => (Keyed::new(Key::of_digest(own.fingerprint()), own), rotation_deg),
+        None => (brdf.clone(), 0.0),
+    }
+}
+
 impl PreparedMaterial {
+    /// A material of this name and BRDF, as the scene has it; threads are yet to come.
+    pub fn new(name: String, turned_brdf: Keyed<Brdf>) -> Self {
+        let (brdf, rotation_deg) = in_own_axes(&turned_brdf);
+        Self { name, turned_brdf, brdf, rotation_deg, threads: None }
+    }
+
     /// Its BRDF and threads.
     pub fn shaded(&self) -> WithThreads<'_> {
         (&self.brdf, self.threads.as_deref())
@@ -165,8 +184,9 @@ fn prepare_by(scene: &Scene, round: &Round, ask_threads: &AskThreads) -> Result<
             MaterialSource::Model { .. } => error.within(format!("material \"{name}\"")),
             _ => error,
         })?;
-        let threads = ask_threads(method, name, &brdf, sampling)?;
-        materials.push(PreparedMaterial { name: name.to_owned(), brdf, threads });
+        let material = PreparedMaterial::new(name.to_owned(), brdf);
+        let threads = ask_threads(method, name, &material.brdf, sampling)?;
+        materials.push(PreparedMaterial { threads, ..material });
     }
     let mut prepared = Prepared {
         scene: scene.clone(),
@@ -179,7 +199,7 @@ fn prepare_by(scene: &Scene, round: &Round, ask_threads: &AskThreads) -> Result<
         objects,
         materials,
     };
-    prepared.place_tangents();
+    prepared.place_tangents(round)?;
     Ok(prepared)
 }
 
@@ -215,10 +235,7 @@ fn place_meshes(scene: &Scene, round: &Round) -> Result<(Vec<NamedMesh>, Vec<Pla
     let mut objects = Vec::new();
     for object in &scene.objects {
         let mesh = round.ask(&LoadMesh(&object.mesh))?;
-        let index = meshes.iter().position(|(_, known)| known.key == mesh.key).unwrap_or_else(|| {
-            meshes.push((object.mesh.to_string(), mesh));
-            meshes.len() - 1
-        });
+        let index = index_of_mesh(&mut meshes, mesh, &object.mesh);
         let material = used_materials.iter().position(|known| *known == object.material);
         objects.push(PlacedMesh {
             mesh: index,
@@ -228,6 +245,14 @@ fn place_meshes(scene: &Scene, round: &Round) -> Result<(Vec<NamedMesh>, Vec<Pla
         });
     }
     Ok((meshes, objects))
+}
+
+/// The place of `mesh`, which comes from `source`, among `meshes`: the last if it was not yet there.
+fn index_of_mesh(meshes: &mut Vec<NamedMesh>, mesh: Keyed<Mesh>, source: &Source) -> usize {
+    meshes.iter().position(|(_, known)| known.key == mesh.key).unwrap_or_else(|| {
+        meshes.push((source.to_string(), mesh));
+        meshes.len() - 1
+    })
 }
 
 /// An error for more materials than a texel of the geometry cache can tell apart.
@@ -276,20 +301,58 @@ impl Prepared {
     }
 
     /// Gives objects the tangents that their materials need, and no others: to be called when materials were changed.
-    pub fn place_tangents(&mut self) {
+    ///
+    /// # Errors
+    /// A mesh that cannot be read again with its texture coordinates; cancelled.
+    pub fn place_tangents(&mut self, round: &Round) -> Result<()> {
         // Found once a material: there may be thousands of objects.
         let are_isotropic: Vec<_> = self.materials.iter().map(|material| material.brdf.is_isotropic()).collect();
         for (object, settings) in self.objects.iter_mut().zip(&self.scene.objects) {
             let material = object.material as usize;
             let needs_tangent = !are_isotropic[material];
-            if needs_tangent && settings.tangent.is_none() {
-                let name = &self.materials[material].name;
-                tracing::info!(
-                    "an object of \"{name}\", which is anisotropic, has no `tangent`: it is brushed around its y axis"
-                );
+            if settings.tangent == Some(TangentRule::Uv) {
+                let brushed = needs_tangent.then(|| round.ask(&LoadBrushedMesh(&settings.mesh))).transpose()?;
+                let mesh = match brushed.filter(|mesh| !mesh.tangents.is_empty()) {
+                    Some(mesh) => mesh,
+                    None => round.ask(&LoadMesh(&settings.mesh))?,
+                };
+                object.mesh = index_of_mesh(&mut self.meshes, mesh, &settings.mesh);
             }
-            object.tangent = needs_tangent.then(|| settings.tangent.unwrap_or(TangentRule::DEFAULT));
+            let name = &self.materials[material].name;
+            let rule = match settings.tangent {
+                Some(TangentRule::Uv) if self.meshes[object.mesh].1.tangents.is_empty() => None,
+                rule => rule,
+            };
+            match settings.tangent {
+                _ if !needs_tangent || rule.is_some() => {}
+                None => tracing::info!(
+                    "an object of \"{name}\", which is anisotropic, has no `tangent`: it is brushed around its y axis"
+                ),
+                Some(_) => tracing::warn!(
+                    "{} has no texture coordinates for its `tangent`: \"{name}\" is brushed around its y axis",
+                    settings.mesh
+                ),
+            }
+            object.tangent = needs_tangent.then(|| PlacedTangent {
+                rule: rule.unwrap_or(TangentRule::DEFAULT),
+                turn_deg: self.materials[material].rotation_deg,
+            });
         }
+        self.drop_unused_meshes();
+        Ok(())
+    }
+
+    /// Meshes that no object has take no memory on the device.
+    fn drop_unused_meshes(&mut self) {
+        let is_used = |index: &usize| self.objects.iter().any(|object| object.mesh == *index);
+        let kept: Vec<_> = (0..self.meshes.len()).filter(is_used).collect();
+        if kept.len() == self.meshes.len() {
+            return;
+        }
+        for object in &mut self.objects {
+            object.mesh = kept.iter().position(|index| *index == object.mesh).expect("a mesh of an object is kept");
+        }
+        self.meshes = kept.into_iter().map(|index| self.meshes[index].clone()).collect();
     }
 
     /// Whether a material of it is anisotropic, so that objects have tangents.

@@ -93,6 +93,29 @@ fn each_change_makes_what_it_needs_and_nothing_else() {
 }
 
 #[test]
+fn a_rotation_of_the_material_fits_nothing() {
+    let gpu = Validated::new();
+    let turned = |rotation_deg: f64| {
+        let text =
+            format!("distribution = 'ggx'\nmetal = 'Al'\nalpha_x = 0.1\nalpha_y = 0.3\nrotation_deg = {rotation_deg}");
+        let mut scene = small();
+        scene.materials[0].source =
+            MaterialSource::Model { model: "conductor".into(), parameters: text.parse().unwrap() };
+        scene.shading.threads = Some(1);
+        scene
+    };
+    let (renderer, made) = ask(&gpu, &turned(0.0));
+    assert!(made.contains(&"threads"), "{made:?}");
+    for rotation_deg in [30.0, -90.0] {
+        assert_eq!(ask(&gpu, &turned(rotation_deg)).1, ["material"], "{rotation_deg}");
+        let keys = [0.0, rotation_deg].map(|degrees| key_of(&turned(degrees), &gpu.memo).unwrap());
+        assert_ne!(keys[0], keys[1], "what is shown is another");
+    }
+    drop(renderer);
+    gpu.finish();
+}
+
+#[test]
 fn files_count_by_content() {
     let gpu = Validated::new();
     let folder = tempfile::tempdir().unwrap();

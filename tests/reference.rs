@@ -1,15 +1,17 @@
-//! Whole pictures against those of an independent renderer (Mitsuba 3), where these lie beside the project.
+//! Whole pictures against those of an independent renderer (Mitsuba 3): a small one that is kept here, and larger ones where these lie beside
+//! the project.
 mod common;
 
 use common::{Validated, model, ready, sphere};
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 use threadlight::low_level::evaluate::Display;
 use threadlight::low_level::evaluate::reference::{Integrator, Processor, ReferenceSettings, TOLERANCE, reference};
-use threadlight::low_level::output::read_image;
+use threadlight::low_level::output::{read_image, write_exr};
 use threadlight::low_level::pipeline::{Wanted, render_geometry};
 use threadlight::low_level::prepare::Prepared;
-use threadlight::low_level::scene::{Background, MaterialSource, Scene, Source};
+use threadlight::low_level::scene::{Background, Camera, MaterialSource, Scene, Source, TangentRule};
 use threadlight::low_level::shading::display_value;
 
 /// RMS of display values over the sphere's pixels in `found`, leaving out those within two pixels of its rim.
@@ -161,6 +163,60 @@ fn the_reference_on_the_gpu_converges_on_that_of_the_cpu() {
             // sequences are not independent, and single precision is not exact.
             assert!((0.7..1.4).contains(&(rms / estimate)), "{name}: RMS {rms}, estimate {estimate}");
         }
+    }
+    gpu.finish();
+}
+
+/// `radiance` of tests/picture_by_mitsuba.py.
+fn gradient_and_two_lights(d: DVec3) -> DVec3 {
+    let light = |towards: [f64; 3], sharpness: f64, colour: [f64; 3]| {
+        (sharpness * (d.dot(towards.into()) - 1.0)).exp() * DVec3::from(colour)
+    };
+    DVec3::new(0.25 + 0.15 * d.y, 0.3 + 0.1 * d.x, 0.35 - 0.1 * d.z)
+        + light([0.6, 0.64, 0.48], 12.0, [1.2, 0.96, 0.6])
+        + light([-0.48, 0.36, 0.8], 25.0, [0.8, 1.4, 2.0])
+}
+
+#[test]
+fn a_brushed_sphere_looks_as_mitsuba_has_it() {
+    const SIZE: (u32, u32) = (32, 24);
+    let gpu = Validated::new();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("lights.exr");
+    // Fine enough for what is linear between pixels to be within 3e-4 of the function.
+    let (columns, rows) = (512, 256);
+    let texel = |i: u32| {
+        let phi = std::f64::consts::TAU * (f64::from(i % columns) + 0.5) / f64::from(columns);
+        let (sin, cos) = (std::f64::consts::PI * (f64::from(i / columns) + 0.5) / f64::from(rows)).sin_cos();
+        gradient_and_two_lights(DVec3::new(sin * phi.sin(), cos, -sin * phi.cos())).as_vec3().extend(1.0).to_array()
+    };
+    let texels: Vec<_> = (0..columns * rows).map(texel).collect();
+    write_exr(&path, columns, rows, &texels, false, &Default::default()).unwrap();
+    let metal = "model = 'conductor'\ndistribution = 'ggx'\neta = [0.143, 0.375, 1.442]\nk = [3.983, 2.386, 1.603]";
+    for roughness in ["alpha_x = 0.1\nalpha_y = 0.4", "alpha_x = 0.4\nalpha_y = 0.1\nrotation_deg = 90"] {
+        let mut scene = sphere(model(&format!("{metal}\n{roughness}")), "white", 1, SIZE);
+        scene.environment.source = Source::File(path.clone());
+        scene.shading.method = "reference".to_owned();
+        scene.image.subpixels = 1;
+        scene.image.background = Background::None;
+        let eye = DVec3::new(1.5, 1.0, 3.5);
+        scene.camera = Some(Camera { eye, target: DVec3::ZERO, up: DVec3::Y, fov_y_deg: 36.0 });
+        scene.objects[0].tangent = Some(TangentRule::Around(Vec3::Y));
+        let settings = ReferenceSettings { tolerance: 2e-4, processor: Processor::Cpu };
+        let found = reference(&ready(&scene), &gpu.device, &settings, &gpu.round()).expect("a reference").radiance;
+        let (mut square, mut count, mut worst) = (0.0, 0, 0.0f64);
+        for line in include_str!("picture_by_mitsuba.csv").lines().skip(1) {
+            let numbers: Vec<f32> = line.split(',').map(|word| word.parse().expect("a number")).collect();
+            let pixel = found[(numbers[1] as u32 * SIZE.0 + numbers[0] as u32) as usize];
+            assert_eq!(pixel[3], 1.0, "{line}");
+            for (value, expected) in pixel.into_iter().zip(&numbers[2..5]) {
+                let error = f64::from(display_value(value, 1.0, 2.2) - display_value(*expected, 1.0, 2.2));
+                (square, count, worst) = (square + error * error, count + 1, worst.max(error.abs()));
+            }
+        }
+        let rms = (square / f64::from(count)).sqrt();
+        println!("{roughness:?}: RMS {rms:.1e} of {count} values, {worst:.1e} at most");
+        assert!(count > 800 && rms < 1e-3, "{roughness}: RMS {rms}");
     }
     gpu.finish();
 }

@@ -1,6 +1,6 @@
 // Ashikhmin and Shirley's anisotropic Phong. Twin of src/brdf/ashikhmin_shirley.rs.
 // a.rgb: 28 / (23 pi) diffuse (1 - specular), a.w: exponent along x; b.rgb: specular, b.w: exponent along y;
-// c.x, c.y: cosine and sine of the rotation of these axes, c.z: sqrt((n_x + 1) (n_y + 1)) / (8 pi).
+// c.x: sqrt((n_x + 1) (n_y + 1)) / (8 pi).
 #include "parameters.glsl"
 #include "microfacet.glsl"
 
@@ -15,7 +15,6 @@ vec3 ashikhmin_shirley(BrdfParameters parameters, vec3 w_i, vec3 w_o) {
     if (!(w_i.z > 0.0 && w_o.z > 0.0)) return vec3(0.0);
     vec3 h = normalize(w_i + w_o);
     float cos_theta_d = dot(w_o, h);
-    h = to_axes(parameters.c.xy, h);
     vec2 h2 = h.xy * h.xy;
     float sin2 = min(h2.x + h2.y, 1.0);
     // exponent sin^2 of the azimuth of h, times log(1 - sin^2) / sin^2 by its series where 1 - sin^2 would round away what a large exponent
@@ -24,6 +23,6 @@ vec3 ashikhmin_shirley(BrdfParameters parameters, vec3 w_i, vec3 w_o) {
     float log_over_sin2 = sin2 < 1e-2 ? -(1.0 + sin2 * (0.5 + sin2 * (1.0 / 3.0 + sin2 * 0.25))) : 2.0 * log(h.z) / sin2;
     // Where h is at the horizon 0 times infinity threatens.
     float lobe = exponent_sin2 > 0.0 ? exp(0.5 * exponent_sin2 * log_over_sin2) : 1.0;
-    float specular = parameters.c.z * lobe / (cos_theta_d * max(w_i.z, w_o.z));
+    float specular = parameters.c.x * lobe / (cos_theta_d * max(w_i.z, w_o.z));
     return fresnel_schlick(cos_theta_d, parameters.b.rgb) * specular + parameters.a.rgb * (ashikhmin_shirley_room(w_i.z) * ashikhmin_shirley_room(w_o.z));
 }

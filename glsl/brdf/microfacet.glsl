@@ -1,11 +1,10 @@
 // Microfacet distributions, shadowing and Fresnel reflectance. Twin of src/brdf/microfacet.rs, which cites the equations.
 #ifndef MICROFACET_GLSL
 #define MICROFACET_GLSL
-#include "axes.glsl"
 
 const float DISTRIBUTION_BECKMANN = 1.0; // else GGX
 
-// Below, directions are along the axes of the roughness, and alpha is along both.
+// Below, alpha is along x, the tangent, and along y.
 
 // D(h) in 1/sr.
 float microfacet_density(float distribution, vec3 h, vec2 alpha) {

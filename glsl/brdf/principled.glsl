@@ -1,14 +1,12 @@
 // glTF's metallic-roughness under a clear coat. Twin of src/brdf/principled.rs without sheen.
 // a.rgb: base colour, a.w: metallic; b.x: f0 of dielectrics; b.y: weight of the coat, b.z: its roughness_alpha, b.w: its f0;
-// c.x, c.y: roughness_alpha along both axes, c.z, c.w: cosine and sine of their rotation.
+// c.x, c.y: roughness_alpha along x, the tangent, and along y.
 #include "parameters.glsl"
 #include "microfacet.glsl"
 
 vec3 principled(BrdfParameters parameters, vec3 w_i, vec3 w_o) {
     const float GGX = 0.0;
     if (!(w_i.z > 0.0 && w_o.z > 0.0)) return vec3(0.0);
-    w_i = to_axes(parameters.c.zw, w_i);
-    w_o = to_axes(parameters.c.zw, w_o);
     vec3 h = normalize(w_i + w_o);
     float cos_theta_d = dot(w_o, h);
     vec3 base_colour = parameters.a.rgb;

@@ -150,6 +150,35 @@ fn turning_the_material_is_turning_both_directions_the_other_way() {
 }
 
 #[test]
+fn without_its_rotation_a_material_is_itself_in_its_own_axes() {
+    let coated = "base = { model = 'ward', diffuse = 0.1, specular = 0.4, normalisation = 'duer', alpha_x = 0.1, alpha_y = 0.3, \
+                  rotation_deg = 30 }; coat = { alpha = 0.1, ior = 1.5 }";
+    let coated = ("layered, rotation_deg = 30".to_owned(), of_model("layered", coated));
+    let mut turned_models = Vec::new();
+    for (name, brdf) in all().chain([coated]) {
+        let Some((own, rotation_deg)) = brdf.without_rotation() else {
+            assert!(!name.contains("rotation_deg"), "{name}");
+            continue;
+        };
+        // Names of built-in ones do not tell.
+        let is_said = name.contains(&format!("rotation_deg = {rotation_deg}"));
+        assert!(is_said || !name.contains("alpha_x"), "{name}: {rotation_deg}");
+        assert!(own.without_rotation().is_none() && own.symmetry().mirror_x, "{name}");
+        let back = glam::DMat3::from_rotation_z(-rotation_deg.to_radians());
+        for (w_i, w_o) in pairs() {
+            let [f, expected] = [brdf.evaluate(w_i, w_o), own.evaluate(back * w_i, back * w_o)];
+            let difference = (f - expected).abs().max_element();
+            // How much light a coat sends back is a mean over azimuths that depends on where they start.
+            let most = if brdf.model() == "layered" { 1e-3 } else { 1e-8 };
+            assert!(difference <= most * (1.0 + f.max_element()), "{name}: {f}, expected {expected}");
+        }
+        turned_models.push(brdf.model());
+    }
+    let models = ["conductor", "plastic", "ward", "ashikhmin_shirley", "principled", "layered"];
+    assert!(models.iter().all(|model| turned_models.contains(model)), "{turned_models:?}");
+}
+
+#[test]
 fn anisotropic_models_are_finite_and_not_negative_at_any_pair_of_directions() {
     let angles = [0.0, 1e-9, 1e-4, 1.0, 30.0, 60.0, 89.0, 89.999, 89.999_999, 90.0];
     for (name, brdf) in all() {

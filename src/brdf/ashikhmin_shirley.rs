@@ -88,9 +88,12 @@ impl Model for AshikhminShirley {
         let mut packed = [0.0; 12];
         packed[0..4].copy_from_slice(&diffuse.as_vec3().extend(self.exponent.x as f32).to_array());
         packed[4..8].copy_from_slice(&self.specular.as_vec3().extend(self.exponent.y as f32).to_array());
-        packed[8..10].copy_from_slice(&self.axes.gpu_parameters());
-        packed[10] = self.normalisation() as f32;
+        packed[8] = self.normalisation() as f32;
         packed
+    }
+
+    fn without_rotation(&self) -> Option<(Self, f64)> {
+        self.axes.without_rotation().map(|(axes, deg)| (Self { axes, ..*self }, deg))
     }
 
     fn hash_content(&self, hasher: &mut blake3::Hasher) {

@@ -36,8 +36,12 @@ impl Model for Conductor {
         let mut packed = [0.0; 12];
         packed[0..4].copy_from_slice(&self.eta.as_vec3().extend(0.0).to_array());
         packed[4..8].copy_from_slice(&self.k.as_vec3().extend(self.distribution.gpu_id()).to_array());
-        packed[8..12].copy_from_slice(&self.roughness.gpu_parameters());
+        packed[8..10].copy_from_slice(&self.roughness.gpu_parameters());
         packed
+    }
+
+    fn without_rotation(&self) -> Option<(Self, f64)> {
+        self.roughness.without_rotation().map(|(roughness, deg)| (Self { roughness, ..*self }, deg))
     }
 
     fn hash_content(&self, hasher: &mut blake3::Hasher) {

@@ -87,6 +87,11 @@ impl Model for Layered {
         Ok(Self::new(base, coat))
     }
 
+    fn without_rotation(&self) -> Option<(Self, f64)> {
+        // The coat is alike in all directions, so both turn together.
+        self.base.without_rotation().map(|(base, deg)| (Self::new(base, self.coat), deg))
+    }
+
     fn hash_content(&self, hasher: &mut blake3::Hasher) {
         hasher.update(self.base.fingerprint().as_bytes());
         self.coat.hash_content(hasher);

@@ -64,7 +64,8 @@ pub trait Model: Sized {
     /// Reads the model's parameters from a table; unknown keys are reported by the caller.
     fn from_parameters(parameters: &mut Parameters) -> Result<Self>;
 
-    /// The model's parameters as its GLSL twin expects them: `BrdfParameters { vec4 a, b, c }`. None of a model that has no twin.
+    /// The model's parameters as its GLSL twin expects them: `BrdfParameters { vec4 a, b, c }`, without those of [`Self::without_rotation`]. None
+    /// of a model that has no twin.
     fn gpu_parameters(&self) -> [f32; 12] {
         [0.0; 12]
     }
@@ -72,6 +73,12 @@ pub trait Model: Sized {
     /// Whether shaders have to look it up in a table although its model has a GLSL twin: where the twin leaves out what its parameters ask for.
     fn needs_table(&self) -> bool {
         false
+    }
+
+    /// The same in its own axes, and by how many degrees these are turned from the tangent, counter-clockwise seen from outside: none of a
+    /// model that has no such parameter, or where it is 0.
+    fn without_rotation(&self) -> Option<(Self, f64)> {
+        None
     }
 
     /// Adds everything that `evaluate` depends on to `hasher`.
@@ -107,6 +114,16 @@ macro_rules! brdf_models {
             /// Name of this BRDF's model: one of [`Brdf::MODELS`].
             pub fn model(&self) -> &'static str {
                 match self { $(Brdf::$Model(_) => stringify!($name),)+ }
+            }
+
+            /// The BRDF in its own axes, and by how many degrees these are turned from the tangent, counter-clockwise seen from outside: what
+            /// it is on a surface whose tangent is turned by as much. None if it is in its own axes.
+            ///
+            /// So one set of threads serves all rotations, and mirror planes of the BRDF are those of its frame.
+            pub fn without_rotation(&self) -> Option<(Brdf, f64)> {
+                match self {
+                    $(Brdf::$Model(model) => model.without_rotation().map(|(own, deg)| (Brdf::$Model(own), deg)),)+
+                }
             }
 
             fn read_model(model: &str, parameters: &mut Parameters) -> Result<Brdf> {
@@ -230,8 +247,10 @@ impl Brdf {
         TWINS.contains(&self.model()) && !dispatch!(self, model => model.needs_table())
     }
 
-    /// The model's parameters for its GLSL twin, `BrdfParameters { vec4 a, b, c }` in memory order.
+    /// The model's parameters for its GLSL twin, `BrdfParameters { vec4 a, b, c }` in memory order. Shaders have no rotation: see
+    /// [`Self::without_rotation`].
     pub fn gpu_parameters(&self) -> [f32; 12] {
+        debug_assert!(self.without_rotation().is_none(), "{} is rotated", self.model());
         dispatch!(self, model => model.gpu_parameters())
     }
 

@@ -67,8 +67,12 @@ impl Model for Plastic {
         packed[0..4].copy_from_slice(&self.base.as_vec3().extend(0.0).to_array());
         packed[4] = self.ior as f32;
         packed[5] = self.distribution.gpu_id();
-        packed[8..12].copy_from_slice(&self.roughness.gpu_parameters());
+        packed[8..10].copy_from_slice(&self.roughness.gpu_parameters());
         packed
+    }
+
+    fn without_rotation(&self) -> Option<(Self, f64)> {
+        self.roughness.without_rotation().map(|(roughness, deg)| (Self { roughness, ..*self }, deg))
     }
 
     fn hash_content(&self, hasher: &mut blake3::Hasher) {

@@ -253,8 +253,13 @@ impl Model for Principled {
         if let Some(Coat { weight, roughness, ior }) = self.coat {
             packed[5..8].copy_from_slice(&[weight, roughness * roughness, f0(ior)].map(|number| number as f32));
         }
-        packed[8..12].copy_from_slice(&self.facets().gpu_parameters());
+        packed[8..10].copy_from_slice(&self.facets().gpu_parameters());
         packed
+    }
+
+    fn without_rotation(&self) -> Option<(Self, f64)> {
+        let (facets, deg) = self.anisotropic?.without_rotation()?;
+        Some((Self { anisotropic: Some(facets), ..self.clone() }, deg))
     }
 
     fn hash_content(&self, hasher: &mut blake3::Hasher) {

@@ -38,9 +38,9 @@ impl Axes {
         DVec2::new(self.x.dot(w.truncate()), self.x.perp_dot(w.truncate()))
     }
 
-    /// What `to_axes` in glsl/brdf/axes.glsl reads: cosine and sine of the rotation.
-    pub(super) fn gpu_parameters(self) -> [f32; 2] {
-        self.x.as_vec2().to_array()
+    /// The axes that are the tangent and what is across it, and the rotation in degrees; none if they are that.
+    pub(super) fn without_rotation(self) -> Option<(Self, f64)> {
+        (self.rotation_deg != 0.0).then(|| (Self::new(0.0), self.rotation_deg))
     }
 }
 
@@ -135,10 +135,14 @@ impl Roughness {
         self.alpha.x * self.alpha.y
     }
 
-    /// As shaders have it: alpha_x, alpha_y, cosine and sine of the rotation.
-    pub(super) fn gpu_parameters(self) -> [f32; 4] {
-        let [cos, sin] = self.axes.gpu_parameters();
-        [self.alpha.x as f32, self.alpha.y as f32, cos, sin]
+    /// The same along the tangent and across it, and the rotation in degrees; none if it is that.
+    pub(super) fn without_rotation(self) -> Option<(Self, f64)> {
+        self.axes.without_rotation().map(|(axes, deg)| (Self { axes, ..self }, deg))
+    }
+
+    /// As shaders have it: roughness_alpha along both axes, which are those of the shading frame there.
+    pub(super) fn gpu_parameters(self) -> [f32; 2] {
+        self.alpha.as_vec2().to_array()
     }
 
     /// Adds it to a fingerprint. What is alike in all directions has none.

@@ -85,8 +85,12 @@ impl Model for Ward {
         let mut packed = [0.0; 12];
         packed[0..4].copy_from_slice(&self.diffuse.as_vec3().extend(self.normalisation as u8 as f32).to_array());
         packed[4..7].copy_from_slice(&self.specular.as_vec3().to_array());
-        packed[8..12].copy_from_slice(&self.roughness.gpu_parameters());
+        packed[8..10].copy_from_slice(&self.roughness.gpu_parameters());
         packed
+    }
+
+    fn without_rotation(&self) -> Option<(Self, f64)> {
+        self.roughness.without_rotation().map(|(roughness, deg)| (Self { roughness, ..*self }, deg))
     }
 
     fn hash_content(&self, hasher: &mut blake3::Hasher) {

@@ -6,6 +6,7 @@ use threadlight::Error;
 use threadlight::low_level::memo::{Asked, Memo, Origin, Step};
 use threadlight::low_level::method::Method;
 use threadlight::low_level::output;
+use threadlight::low_level::prepare::in_own_axes;
 use threadlight::low_level::scene::{ImageSettings, MaterialSource};
 use threadlight::low_level::steps::{FitThreads, LoadMaterial};
 use threadlight::low_level::threads::{self, ThreadKind, ThreadSettings};
@@ -66,7 +67,7 @@ impl Threads {
         let progress = TerminalProgress::new("threads")?;
         let memo = Memo::new(cache_folder(self.no_cache).as_deref());
         let round = memo.round(&progress);
-        let brdf = round.ask(&LoadMaterial(&source))?;
+        let (brdf, _) = in_own_axes(&round.ask(&LoadMaterial(&source))?);
         let settings = ThreadSettings { kind, count, seed: self.seed, ..Default::default() };
         let settings = settings.for_picture(&brdf, ImageSettings::default().subpixels);
         let threads = round.ask(&FitThreads { brdf: &brdf, settings })?;

@@ -88,12 +88,12 @@ impl Cases {
         self.check_materials(memo)?;
         for (material_name, source) in &self.materials {
             let brdf = memo.round(observer).ask(&LoadMaterial(source))?;
-            let mut material = vec![PreparedMaterial { name: material_name.clone(), brdf, threads: None }];
+            let mut material = vec![PreparedMaterial::new(material_name.clone(), brdf)];
             let mut tables = Vec::new();
             for (scene, prepared, display) in &mut scenes {
                 // The scene borrows the material and the environment while they are looked at together.
                 std::mem::swap(&mut prepared.materials, &mut material);
-                prepared.place_tangents();
+                prepared.place_tangents(&round)?;
                 for (environment_name, environment, renderer) in &mut environments {
                     observer.check()?;
                     std::mem::swap(&mut prepared.environment, environment);

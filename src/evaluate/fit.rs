@@ -5,6 +5,7 @@ use super::tables::{Section, Table};
 use crate::error::{Error, Result};
 use crate::memo::Memo;
 use crate::pipeline::median;
+use crate::prepare::in_own_axes;
 use crate::progress::{Observer, OnlyCancels};
 use crate::scene::{ImageSettings, MaterialSource};
 use crate::steps::LoadMaterial;
@@ -46,7 +47,7 @@ pub fn run(fits: &Fits, memo: &Memo, observer: &dyn Observer, found: &mut Vec<Ti
     let mut done = 0;
     observer.progress(done, total);
     for (material, source) in &fits.materials {
-        let brdf = memo.round(observer).ask(&LoadMaterial(source))?;
+        let (brdf, _) = in_own_axes(&memo.round(observer).ask(&LoadMaterial(source))?);
         for &threads in &fits.counts {
             let count = threads as usize;
             let settings = ThreadSettings { kind: ThreadKind::Fitted, count, ..ThreadSettings::default() };

@@ -7,14 +7,14 @@ use crate::scene::{Mesh, TangentRule};
 use crate::vulkan::{Device, GraphicsPipeline, GraphicsState, PipelineCache, Triangles, VertexAttribute, compiled};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
-use glam::{DAffine3, DVec3, Vec3};
+use glam::{DAffine3, DVec2, DVec3, Vec3};
 use std::sync::Arc;
 
 /// [`GeometryTexel`](crate::geometry_texel::GeometryTexel).
 const GEOMETRY_FORMAT: vk::Format = vk::Format::R32G32_UINT;
 const DEPTH_FORMAT: vk::Format = vk::Format::D32_SFLOAT;
 
-/// Bytes of a position, and of a normal.
+/// Bytes of a position, of a normal, and of a tangent.
 const VERTEX_STRIDE: u32 = size_of::<[f32; 3]>() as u32;
 
 /// Distance of the near plane in units of the scene's extent: with reversed, infinite depth it costs no precision to keep it
@@ -24,6 +24,7 @@ const NEAR_PLANE: f64 = 1e-6;
 /// How tangents go by the axis of an object, as glsl/geometry_cache.glsl has it; 0 is not at all.
 const TANGENT_AROUND: f32 = 1.0;
 const TANGENT_ALONG: f32 = 2.0;
+const TANGENT_OF_MESH: f32 = 3.0;
 
 /// The triangles of a mesh on the device.
 pub struct DeviceMesh {
@@ -39,9 +40,12 @@ impl DeviceMesh {
     /// No device memory left.
     pub fn new(device: &Arc<Device>, name: &str, mesh: &Mesh) -> Result<Self> {
         let attribute = |name, bytes| VertexAttribute { name, stride: VERTEX_STRIDE, bytes };
+        // What no tangent goes by takes no memory.
+        let tangents = if mesh.tangents.is_empty() { &mesh.normals } else { &mesh.tangents };
         let attributes = [
             attribute("positions", bytemuck::cast_slice(&mesh.positions)),
             attribute("normals", bytemuck::cast_slice(&mesh.normals)),
+            attribute("tangents", bytemuck::cast_slice(tangents)),
         ];
         Ok(Self {
             triangles: Triangles::new(device, name, &attributes, &mesh.indices)?,
@@ -60,7 +64,23 @@ pub struct PlacedMesh {
     /// Object to world space.
     pub to_world: DAffine3,
     /// Which way its tangents go; none where its material is isotropic.
-    pub tangent: Option<TangentRule>,
+    pub tangent: Option<PlacedTangent>,
+}
+
+/// Which way the tangents of an object go.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PlacedTangent {
+    /// Those of the surface.
+    pub rule: TangentRule,
+    /// By how much they are turned from there, counter-clockwise seen from outside: the rotation of the material.
+    pub turn_deg: f64,
+}
+
+impl PlacedTangent {
+    /// Cosine and sine of the turn.
+    pub fn turn(self) -> DVec2 {
+        DVec2::from_angle(self.turn_deg.to_radians())
+    }
 }
 
 /// What the pass is made of.
@@ -83,6 +103,7 @@ struct Push {
     up_over_extent: [f32; 4],
     forward: [f32; 4],
     tangent_axis: [f32; 4],
+    tangent_turn: [f32; 2],
     material: u32,
 }
 
@@ -92,7 +113,7 @@ struct Push {
 /// A driver that cannot compile them.
 pub fn geometry_pipeline(device: &Arc<Device>, cache: &PipelineCache) -> Result<GraphicsPipeline> {
     let state = GraphicsState {
-        attributes: &[(vk::Format::R32G32B32_SFLOAT, VERTEX_STRIDE); 2],
+        attributes: &[(vk::Format::R32G32B32_SFLOAT, VERTEX_STRIDE); 3],
         colors: &[GEOMETRY_FORMAT],
         depth: DEPTH_FORMAT,
     };
@@ -114,10 +135,11 @@ impl GeometryCache {
             // Subtracted in double precision: far from the origin the difference is what counts.
             let from_eye = translation - eye;
             let row = |i: usize| pack(matrix3.row(i) / unit, from_eye[i] / unit);
-            let tangent_axis = match object.tangent {
+            let tangent_axis = match object.tangent.map(|tangent| tangent.rule) {
                 None => [0.0; 4],
-                Some(rule @ TangentRule::Around(_)) => rule.axis().extend(TANGENT_AROUND).to_array(),
-                Some(rule @ TangentRule::Along(_)) => rule.axis().extend(TANGENT_ALONG).to_array(),
+                Some(TangentRule::Around(axis)) => axis.extend(TANGENT_AROUND).to_array(),
+                Some(TangentRule::Along(axis)) => axis.extend(TANGENT_ALONG).to_array(),
+                Some(TangentRule::Uv) => [0.0, 0.0, 0.0, TANGENT_OF_MESH],
             };
             let push = Push {
                 to_eye: [0, 1, 2].map(row),
@@ -125,6 +147,7 @@ impl GeometryCache {
                 up_over_extent: pack(up / half_height, 0.0),
                 forward: pack(forward, NEAR_PLANE),
                 tangent_axis,
+                tangent_turn: object.tangent.map_or(DVec2::X, PlacedTangent::turn).as_vec2().to_array(),
                 material: object.material,
             };
             (&self.meshes[object.mesh].triangles, push)

@@ -25,7 +25,7 @@ pub use bare_lookups::{BareLookups, bare_lookups};
 pub use classify::{Classify, Counters, SMOOTH_DEG, Tiles, classify, smooth_variance};
 pub use cube_borders::WayAround;
 pub use device_check::{Answers, Questions, Volume, ask};
-pub use geometry_cache::{DeviceMesh, GeometryCache, PlacedMesh, geometry_cache, geometry_pipeline};
+pub use geometry_cache::{DeviceMesh, GeometryCache, PlacedMesh, PlacedTangent, geometry_cache, geometry_pipeline};
 pub use light::DeviceLight;
 #[cfg(feature = "viewer")]
 pub use present::{Area, present};

@@ -365,9 +365,13 @@ fn object_table(object: &ObjectSettings, folder: Option<&Path>) -> Result<toml::
     let number = |value: f32| toml::Value::Float(value.to_string().parse().unwrap_or(f64::from(value)));
     let vector = |values: [f32; 3]| toml::Value::Array(values.map(number).to_vec());
     let rule = |rule| {
-        let key = if matches!(rule, TangentRule::Around(_)) { "around" } else { "along" };
-        let table = toml::Table::from_iter([(key.into(), vector(rule.axis().to_array()))]);
-        ("tangent".into(), toml::Value::Table(table))
+        let by = |key: &str, axis: glam::Vec3| toml::Table::from_iter([(key.into(), vector(axis.to_array()))]).into();
+        let value: toml::Value = match rule {
+            TangentRule::Around(axis) => by("around", axis),
+            TangentRule::Along(axis) => by("along", axis),
+            TangentRule::Uv => "uv".into(),
+        };
+        ("tangent".into(), value)
     };
     let entries = [
         source_entry(&object.mesh, "mesh", folder)?,

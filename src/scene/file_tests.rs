@@ -100,6 +100,7 @@ fn what_is_saved_reads_back_the_same() {
     odd.environment.intensity = f64::from(f32::MAX);
     odd.shading = ShadingSettings { seed: u64::MAX, ..odd.shading };
     odd.camera = Some(Camera::framing(DVec3::new(1.0 / 3.0, 1e9, -1e-9), 0.7, 1.1));
+    odd.objects[0].tangent = Some(TangentRule::Uv);
     odd.objects[0].translate = Vec3::new(f32::MAX, f32::MIN_POSITIVE, 1.0 / 3.0);
     odd.objects[0].rotate_deg = Vec3::new(0.1, -0.2, 1e-30);
     odd.materials[0].name = "\"quoted\"\n[image]\twith = '\u{e9}'".into();
@@ -194,6 +195,8 @@ fn bad_values_are_errors_that_name_the_key_and_its_line() {
         ("[environment]\nrotation_deg = inf", "rotation_deg", "line 2"),
         ("[environment]\nfile = 'x'\nbuiltin = 'y'", "builtin", "line 1"),
         ("[shading]\nthreads = 0", "threads", "line 2"),
+        ("[[object]]\nbuiltin = 'sphere'\ntangent = 'up'", "`uv`", "line 3"),
+        ("[[object]]\nbuiltin = 'sphere'\ntangent = { along = [0, 0, 0] }", "tangent", "line 3"),
         ("[shading]\nthreads = 10001", "threads", "line 2"),
         ("[shading]\nseed = -1", "seed", "line 2"),
         ("[[material]]\nname = 'm'", "model", "line 1"),

@@ -18,8 +18,21 @@ pub struct Mesh {
     pub positions: Vec<Vec3>,
     /// Unit, one a position.
     pub normals: Vec<Vec3>,
+    /// Those of the texture coordinates, unit, one a position; empty where they were not asked for, or there are none.
+    pub tangents: Vec<Vec3>,
     /// Three a triangle, each below the number of positions; no triangle is degenerate.
     pub indices: Vec<u32>,
+}
+
+/// Where a ray meets a mesh.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    /// How many of the ray's directions away.
+    pub distance: f64,
+    /// The interpolated normal, of any length.
+    pub normal: DVec3,
+    /// The interpolated tangent, of any length: 0 of a mesh without.
+    pub tangent: DVec3,
 }
 
 /// The names that [`Mesh::builtin`] takes.
@@ -52,7 +65,7 @@ impl Mesh {
         Self::FILES.load(path)
     }
 
-    /// The same surface with each triangle split into four at the middles of its edges; normals are interpolated.
+    /// The same surface with each triangle split into four at the middles of its edges; normals and tangents are interpolated.
     pub fn subdivided(&self) -> Self {
         let mut mesh = Self { indices: Vec::with_capacity(4 * self.indices.len()), ..self.clone() };
         let mut middles = HashMap::new();
@@ -65,6 +78,11 @@ impl Mesh {
                     mesh.positions.push(self.positions[from].midpoint(self.positions[to]));
                     // Opposite normals have no middle.
                     mesh.normals.push(normal.try_normalize().unwrap_or(self.normals[from]));
+                    if let [a, b] = [from, to].map(|end| self.tangents.get(end))
+                        && let (Some(a), Some(b)) = (a, b)
+                    {
+                        mesh.tangents.push((a + b).try_normalize().unwrap_or(*a));
+                    }
                     mesh.positions.len() as u32 - 1
                 })
             });
@@ -73,10 +91,10 @@ impl Mesh {
         mesh
     }
 
-    /// Where the ray from `origin` along `direction` (any length) first meets the surface, from either side: how many directions away,
-    /// and the interpolated normal, of any length. Tries every triangle: a millisecond for 100,000.
-    pub fn hit(&self, origin: DVec3, direction: DVec3) -> Option<(f64, DVec3)> {
-        let mut first: Option<(f64, DVec3)> = None;
+    /// Where the ray from `origin` along `direction` (any length) first meets the surface, from either side: how many directions away.
+    /// Tries every triangle: a millisecond for 100,000.
+    pub fn hit(&self, origin: DVec3, direction: DVec3) -> Option<Hit> {
+        let mut first: Option<Hit> = None;
         for triangle in self.indices.as_chunks::<3>().0 {
             let [a, b, c] = triangle.map(|index| self.positions[index as usize].as_dvec3());
             // Moeller and Trumbore 1997.
@@ -90,9 +108,14 @@ impl Mesh {
             let distance = along.dot(ac) * inverse;
             // A ray along the triangle's plane gives infinities or NaN, which are in no range.
             let is_inside = u >= 0.0 && v >= 0.0 && u + v <= 1.0 && distance > 0.0;
-            if is_inside && first.is_none_or(|(nearest, _)| distance < nearest) {
-                let [na, nb, nc] = triangle.map(|index| self.normals[index as usize].as_dvec3());
-                first = Some((distance, (1.0 - u - v) * na + u * nb + v * nc));
+            if is_inside && first.is_none_or(|nearest| distance < nearest.distance) {
+                let interpolated = |of: &[Vec3]| {
+                    let [a, b, c] =
+                        triangle.map(|index| of.get(index as usize).copied().unwrap_or_default().as_dvec3());
+                    (1.0 - u - v) * a + u * b + v * c
+                };
+                let (normal, tangent) = (interpolated(&self.normals), interpolated(&self.tangents));
+                first = Some(Hit { distance, normal, tangent });
             }
         }
         first
@@ -313,7 +336,7 @@ mod tests {
         for target in [DVec3::ZERO, DVec3::new(0.3, -0.2, 0.5), DVec3::new(-0.6, 0.6, 0.1)] {
             let origin = DVec3::new(1.5, 1.0, 3.5);
             let direction = 2.0 * (target - origin);
-            let (distance, normal) = sphere.hit(origin, direction).unwrap();
+            let Hit { distance, normal, .. } = sphere.hit(origin, direction).unwrap();
             let point = origin + distance * direction;
             assert!((point.length() - 1.0).abs() < 2e-4 && normal.normalize().distance(point) < 1e-3, "{point}");
             // From within it is seen too; away from it, it is not.

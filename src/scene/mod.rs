@@ -13,10 +13,12 @@ mod file;
 pub mod mesh;
 mod parameter;
 mod tangent_rule;
+mod texture_tangents;
 
 pub use camera::Camera;
 pub use mesh::Mesh;
 pub use tangent_rule::TangentRule;
+pub use texture_tangents::TexturedMesh;
 
 file_formats!(Mesh: obj_file);
 

@@ -3,39 +3,54 @@ use std::collections::HashMap;
 use std::fmt::Write;
 use std::path::Path;
 
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 
 use super::Mesh;
+use super::texture_tangents::TexturedMesh;
 use crate::error::{Error, Result};
 use crate::file_format::FileFormat;
 
 pub(super) const FORMAT: FileFormat<Mesh> =
     FileFormat { extension: "obj", name: "a Wavefront .obj", is_of_format: |_| true, parse };
 
-/// Reads all triangles and polygons as one mesh; objects, groups, materials, texture coordinates and
-/// lines are ignored. Polygons become fans. Where a normal is missing, zero or not finite, the mean normal of the
-/// faces that share the position takes its place, weighted by their angles there. Degenerate triangles are dropped.
+/// The same with its texture coordinates.
+pub(super) const TEXTURED_FORMAT: FileFormat<TexturedMesh> =
+    FileFormat { extension: "obj", name: "a Wavefront .obj", is_of_format: |_| true, parse: parse_textured };
+
 fn parse(path: &Path, bytes: &[u8]) -> Result<Mesh> {
+    parse_parts(path, bytes, false).map(|TexturedMesh { mesh, .. }| mesh)
+}
+
+fn parse_textured(path: &Path, bytes: &[u8]) -> Result<TexturedMesh> {
+    parse_parts(path, bytes, true)
+}
+
+/// Reads all triangles and polygons as one mesh; objects, groups, materials and lines are ignored, and so are texture coordinates if they are
+/// not wanted. Polygons become fans. Where a normal is missing, zero or not finite, the mean normal of the
+/// faces that share the position takes its place, weighted by their angles there. Degenerate triangles are dropped.
+fn parse_parts(path: &Path, bytes: &[u8], is_textured: bool) -> Result<TexturedMesh> {
     // Names in old files are in any encoding; the numbers are ASCII in all of them.
-    let obj = read_obj(&String::from_utf8_lossy(bytes))
+    let obj = read_obj(&String::from_utf8_lossy(bytes), is_textured)
         .map_err(|problem| Error::in_file(path, problem, "repair or export it again"))?;
-    let (mesh, dropped) = clean(&obj);
+    let (textured, dropped) = clean(&obj);
+    let mesh = &textured.mesh;
     if mesh.indices.is_empty() {
         return Err(Error::in_file(path, "has no triangle with an area", "give a mesh with faces"));
     }
-    if dropped > 0 {
+    // A file that is read for its tangents was read without them before.
+    if dropped > 0 && !is_textured {
         tracing::warn!("{}: dropped {dropped} degenerate triangles", path.display());
     }
     tracing::debug!("{}: {} triangles, {} vertices", path.display(), mesh.indices.len() / 3, mesh.positions.len());
-    Ok(mesh)
+    Ok(textured)
 }
 
 /// The triangles in the text of an OBJ, each corner with an index into the positions and one into the normals; a corner
-/// without a normal has one of length 0. The error is what is wrong.
-fn read_obj(text: &str) -> Result<tobj::Mesh, String> {
+/// without a normal has one of length 0. If `is_textured` each has an index into the texture coordinates too, which are NaN where it has none. The error is what is wrong.
+fn read_obj(text: &str, is_textured: bool) -> Result<tobj::Mesh, String> {
     let options = tobj::LoadOptions { triangulate: true, ..Default::default() };
     let no_materials = |_: &Path| Ok(Default::default());
-    let (models, _) = tobj::load_obj_buf(&mut geometry_lines(text)?.as_bytes(), &options, no_materials)
+    let (models, _) = tobj::load_obj_buf(&mut geometry_lines(text, is_textured)?.as_bytes(), &options, no_materials)
         .map_err(|cause| format!("is not a sound OBJ: {cause}"))?;
     // Without o, g and usemtl there is one model.
     let mesh = models.into_iter().next().map(|model| model.mesh).unwrap_or_default();
@@ -46,45 +61,68 @@ fn read_obj(text: &str) -> Result<tobj::Mesh, String> {
 }
 
 /// The lines of an OBJ that are the mesh, such that tobj reads them right: of `v` the coordinates, `vn`, and `f` with its
-/// corners as `position//normal`.
+/// corners as `position//normal`; if `is_textured` also `vt` with two coordinates, and corners as `position/vt/normal`.
 ///
 /// The rest goes since tobj takes polylines (`l`) for faces, wants colours for all vertices or none, and begins a new mesh at
 /// every group and material, whose vertices then are no longer shared. Corners without a normal get one of length 0,
-/// the last in the file, as from tobj they would get that of the corner before. Indices of normals are checked here: unlike
-/// those of positions, tobj takes 0 for none, and multiplies absurd ones until they overflow.
-fn geometry_lines(text: &str) -> Result<String, String> {
-    let normals = text.lines().filter(|line| line.split_ascii_whitespace().next() == Some("vn")).count() as i64;
-    let (mut lines, mut normals_before) = (String::with_capacity(text.len()), 0);
+/// the last in the file, as from tobj they would get that of the corner before; those without texture coordinates get NaN in the same way. Indices
+/// of both are checked here: unlike those of positions, tobj takes 0 for none, and multiplies absurd ones until they overflow.
+fn geometry_lines(text: &str, is_textured: bool) -> Result<String, String> {
+    let count_of = |keyword: &str| {
+        let is_one = |line: &&str| line.split_ascii_whitespace().next() == Some(keyword);
+        text.lines().filter(is_one).count() as i64
+    };
+    let (normals, uvs) = (count_of("vn"), count_of("vt"));
+    let (mut lines, mut normals_before, mut uvs_before) = (String::with_capacity(text.len()), 0, 0);
     for (index, line) in text.lines().enumerate() {
         let mut words = line.split_ascii_whitespace();
-        let Some(keyword @ ("v" | "vn" | "f")) = words.next() else { continue };
+        let Some(keyword @ ("v" | "vn" | "vt" | "f")) = words.next() else { continue };
+        if keyword == "vt" && !is_textured {
+            continue;
+        }
         lines += keyword;
         normals_before += i64::from(keyword == "vn");
+        uvs_before += i64::from(keyword == "vt");
         if keyword == "f" {
             for word in words {
                 let mut numbers = word.split('/');
                 let position = numbers.next().unwrap_or_default();
-                let normal = match numbers.nth(1).unwrap_or_default() {
-                    "" => normals + 1,
-                    number => number
-                        .parse()
-                        .ok()
-                        .filter(|number| (1..=normals).contains(number) || (-normals_before..0).contains(number))
-                        .ok_or_else(|| format!("line {}: there is no normal {number}", index + 1))?,
-                };
+                let problem = |what| format!("line {}: there is no {what}", index + 1);
+                let uv = numbers.next().unwrap_or_default();
+                let normal = index_among(numbers.next().unwrap_or_default(), normals, normals_before)
+                    .map_err(|number| problem(format!("normal {number}")))?;
                 // Writing to a string cannot fail.
-                let _ = write!(lines, " {position}//{normal}");
+                let _ = match is_textured {
+                    false => write!(lines, " {position}//{normal}"),
+                    true => {
+                        let uv = index_among(uv, uvs, uvs_before)
+                            .map_err(|number| problem(format!("texture coordinate {number}")))?;
+                        write!(lines, " {position}/{uv}/{normal}")
+                    }
+                };
             }
+        } else if keyword == "vt" {
+            // The second one may be left out, a third has no meaning here.
+            words.chain(["0"]).take(2).for_each(|word| lines.extend([" ", word]));
         } else {
             words.take(3).for_each(|word| lines.extend([" ", word]));
         }
         lines.push('\n');
     }
-    Ok(lines + "vn 0 0 0\n")
+    Ok(lines + if is_textured { "vn 0 0 0\nvt nan nan\n" } else { "vn 0 0 0\n" })
 }
 
-/// Joins corners with the same position and normal into vertices; gives also the number of dropped triangles.
-fn clean(obj: &tobj::Mesh) -> (Mesh, usize) {
+/// What `number`, the word of an index, stands for among `count` things of which so many are `before` it: the one after all if it is empty.
+fn index_among(number: &str, count: i64, before: i64) -> Result<i64, &str> {
+    if number.is_empty() {
+        return Ok(count + 1);
+    }
+    let index = number.parse().ok();
+    index.filter(|index| (1..=count).contains(index) || (-before..0).contains(index)).ok_or(number)
+}
+
+/// Joins corners with the same position, normal and texture coordinates into vertices; gives also the number of dropped triangles.
+fn clean(obj: &tobj::Mesh) -> (TexturedMesh, usize) {
     let (positions, normals) = (vectors(&obj.positions), vectors(&obj.normals));
     // Normals that are none count as missing.
     let normal_at = |index: u32| {
@@ -93,9 +131,9 @@ fn clean(obj: &tobj::Mesh) -> (Mesh, usize) {
     };
     let mut mean_normals = vec![DVec3::ZERO; positions.len()];
     let mut vertices = HashMap::new();
-    let (mut mesh, mut dropped, mut missing) = (Mesh::default(), 0, Vec::new());
+    let (mut mesh, mut uvs, mut dropped, mut missing) = (Mesh::default(), Vec::new(), 0, Vec::new());
     let triangles = obj.indices.as_chunks::<3>().0.iter().zip(obj.normal_indices.as_chunks::<3>().0);
-    for (triangle, triangle_normals) in triangles {
+    for (number, (triangle, triangle_normals)) in triangles.enumerate() {
         let [a, b, c] = triangle.map(|position| positions[position as usize].as_dvec3());
         let area = (b - a).cross(c - a);
         let longest = (b - a).length_squared().max((c - a).length_squared()).max((c - b).length_squared());
@@ -108,9 +146,11 @@ fn clean(obj: &tobj::Mesh) -> (Mesh, usize) {
         for (&position, [at, next, before]) in triangle.iter().zip([[a, b, c], [b, c, a], [c, a, b]]) {
             mean_normals[position as usize] += (next - at).angle_between(before - at) * face_normal;
         }
-        for (&position, &normal) in triangle.iter().zip(triangle_normals) {
+        for (corner, (&position, &normal)) in triangle.iter().zip(triangle_normals).enumerate() {
             let normal = normal_at(normal).map(|direction| (normal, direction));
-            let index = *vertices.entry((position, normal.map(|(index, _)| index))).or_insert_with(|| {
+            let uv = obj.texcoord_indices.get(3 * number + corner).copied();
+            let index = *vertices.entry((position, normal.map(|(index, _)| index), uv)).or_insert_with(|| {
+                uvs.extend(uv.map(|uv| Vec2::from_slice(&obj.texcoords[2 * uv as usize..])));
                 if normal.is_none() {
                     missing.push((mesh.positions.len(), position));
                 }
@@ -125,7 +165,7 @@ fn clean(obj: &tobj::Mesh) -> (Mesh, usize) {
         // Faces back to back cancel: any direction is as good, as long as it is one.
         mesh.normals[vertex] = mean_normals[position as usize].try_normalize().unwrap_or(DVec3::Y).as_vec3();
     }
-    (mesh, dropped)
+    (TexturedMesh { mesh, uvs }, dropped)
 }
 
 /// Every three numbers as a vector.
@@ -190,18 +230,30 @@ mod tests {
             state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
             WORDS[(state >> 33) as usize % WORDS.len()]
         };
-        let mut meshes = 0;
+        let (mut meshes, mut brushed_meshes) = (0, 0);
         for _ in 0..20_000 {
-            let mut text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nf 1//1 2 3".to_owned();
+            let mut text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1/1 2/2 3/3".to_owned();
             (0..8).for_each(|_| text.extend([" ", next()]));
-            let Ok(obj) = read_obj(&text) else { continue };
-            let (mesh, _) = clean(&obj);
+            let textured = read_obj(&text, true).map(|obj| clean(&obj).0);
+            let Ok(obj) = read_obj(&text, false) else { continue };
+            let (TexturedMesh { mesh, .. }, _) = clean(&obj);
             meshes += 1;
+            // Wrong indices of texture coordinates are errors where these are wanted.
+            if let Ok(textured) = textured {
+                assert!(
+                    textured.mesh.indices.len() == mesh.indices.len()
+                        && textured.uvs.len() == textured.mesh.positions.len()
+                );
+                let brushed = textured.with_tangents();
+                assert!(brushed.indices.len() == mesh.indices.len(), "{text}");
+                assert!(brushed.tangents.iter().all(|tangent| tangent.is_normalized()), "{text}");
+                brushed_meshes += usize::from(!brushed.tangents.is_empty());
+            }
             assert!(mesh.positions.iter().all(|position| position.is_finite()), "{text}");
             assert!(mesh.normals.len() == mesh.positions.len() && mesh.indices.len() % 3 == 0, "{text}");
             assert!(mesh.normals.iter().all(|normal| normal.is_normalized()), "{text}");
             assert!(mesh.indices.iter().all(|&index| (index as usize) < mesh.positions.len()), "{text}");
         }
-        assert!(meshes > 1000, "{meshes}");
+        assert!(meshes > 1000 && brushed_meshes > 10, "{meshes}, {brushed_meshes}");
     }
 }

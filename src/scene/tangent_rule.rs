@@ -10,24 +10,29 @@ pub enum TangentRule {
     Around(Vec3),
     /// Along an axis: what of it is in the tangent plane.
     Along(Vec3),
+    /// Along the first of the mesh's texture coordinates, towards where it grows.
+    Uv,
 }
 
 impl TangentRule {
     /// Of an object without one: around the vertical.
     pub const DEFAULT: Self = Self::Around(Vec3::Y);
 
-    /// The tangent at `position`, of any length, not yet put into the tangent plane. `world_tangent` in glsl/geometry_cache.vert.
-    pub fn at(self, position: Vec3) -> Vec3 {
+    /// The tangent at `position`, where the mesh's own is `of_mesh`: of any length, not yet put into the tangent plane. `world_tangent` in
+    /// glsl/geometry_cache.vert.
+    pub fn at(self, position: Vec3, of_mesh: Vec3) -> Vec3 {
         match self {
             Self::Around(axis) => axis.cross(position),
             Self::Along(axis) => axis,
+            Self::Uv => of_mesh,
         }
     }
 
-    /// The axis, not zero.
-    pub fn axis(self) -> Vec3 {
+    /// The axis, not zero, of a rule that has one.
+    pub fn axis(self) -> Option<Vec3> {
         match self {
-            Self::Around(axis) | Self::Along(axis) => axis,
+            Self::Around(axis) | Self::Along(axis) => Some(axis),
+            Self::Uv => None,
         }
     }
 }
@@ -37,19 +42,20 @@ impl TangentRule {
 enum RawRule {
     Around([f32; 3]),
     Along([f32; 3]),
+    Uv,
 }
 
 impl TryFrom<RawRule> for TangentRule {
     type Error = String;
 
     fn try_from(raw: RawRule) -> Result<Self, String> {
-        let (RawRule::Around(axis) | RawRule::Along(axis)) = raw;
+        let (RawRule::Around(axis) | RawRule::Along(axis)) = raw else { return Ok(Self::Uv) };
         // Its square must not leave the range of floats.
         let axis = Vec3::from(axis).as_dvec3().try_normalize();
         let axis = axis.ok_or("the axis of `tangent` must be three finite numbers, not all 0")?.as_vec3();
         Ok(match raw {
             RawRule::Around(_) => Self::Around(axis),
-            RawRule::Along(_) => Self::Along(axis),
+            RawRule::Along(_) | RawRule::Uv => Self::Along(axis),
         })
     }
 }

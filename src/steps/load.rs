@@ -5,7 +5,7 @@ use crate::environment::Environment;
 use crate::error::Error;
 use crate::file_format::FileKind;
 use crate::memo::{Key, Keyed, Memo, Round, Step};
-use crate::scene::{MaterialSource, Mesh, Source};
+use crate::scene::{MaterialSource, Mesh, Source, TexturedMesh};
 use std::path::{Path, PathBuf};
 
 /// The key of what `source` names, in a file of one of the formats `files`.
@@ -46,6 +46,26 @@ impl Step for LoadMesh<'_> {
     fn make(&self, round: &Round) -> Result<Mesh> {
         match self.0 {
             Source::File(path) => Mesh::FILES.parse(path, &round.memo().file_bytes(path)?),
+            Source::Builtin(name) => Mesh::builtin(name),
+        }
+    }
+}
+
+/// The same with the tangents of its texture coordinates, if it has any.
+pub struct LoadBrushedMesh<'a>(pub &'a Source);
+
+impl Step for LoadBrushedMesh<'_> {
+    type Output = Mesh;
+    const NAME: &'static str = "tangents";
+
+    fn key(&self, memo: &Memo) -> Result<Key> {
+        Ok(Key::builder("with tangents").key(key_of(memo, &TexturedMesh::FILES, self.0)?).build())
+    }
+
+    fn make(&self, round: &Round) -> Result<Mesh> {
+        match self.0 {
+            Source::File(path) => Ok(TexturedMesh::FILES.parse(path, &round.memo().file_bytes(path)?)?.with_tangents()),
+            // None has texture coordinates.
             Source::Builtin(name) => Mesh::builtin(name),
         }
     }

@@ -10,6 +10,7 @@ use crate::environment::Environment;
 use crate::evaluate::Display;
 use crate::passes::View;
 use crate::prepare::Prepared;
+use crate::scene::mesh::Hit;
 use crate::threads::Threads;
 
 /// Of more threads than this, every second, third or so is drawn.
@@ -42,10 +43,11 @@ impl Surface {
             let to_object = object.to_world.inverse();
             let origin = to_object.transform_point3(view.camera.eye);
             let along = to_object.transform_vector3(direction);
-            let (distance, normal) = prepared.meshes[object.mesh].1.hit(origin, along)?;
-            let tangent = object
-                .tangent
-                .map(|rule| object.to_world.matrix3 * rule.at((origin + distance * along).as_vec3()).as_dvec3());
+            let Hit { distance, normal, tangent: of_mesh } = prepared.meshes[object.mesh].1.hit(origin, along)?;
+            let tangent = object.tangent.map(|tangent| {
+                let of_surface = tangent.rule.at((origin + distance * along).as_vec3(), of_mesh.as_vec3()).as_dvec3();
+                (object.to_world.matrix3 * of_surface, tangent.turn())
+            });
             Some((distance, to_object.matrix3.transpose() * normal, tangent, object.material as usize))
         });
         let (_, normal, tangent, material) = hits.min_by(|(a, ..), (b, ..)| a.total_cmp(b))?;
@@ -53,7 +55,9 @@ impl Surface {
         let x = (w_o - n.dot(w_o) * n).try_normalize().unwrap_or_else(|| n.any_orthonormal_vector());
         let to_world = DMat3::from_cols(x, n.cross(x), n);
         let to_environment = DMat3::from_rotation_y(-view.rotation_deg.to_radians()) * to_world;
-        let phi_o_rad = tangent.map_or(0.0, |tangent| -tangent.dot(to_world.y_axis).atan2(tangent.dot(x)));
+        let phi_o_rad = tangent.map_or(0.0, |(tangent, turn)| {
+            -turn.rotate(DVec2::new(tangent.dot(x), tangent.dot(to_world.y_axis))).to_angle()
+        });
         Some(Self {
             material,
             phi_o_rad,

@@ -84,7 +84,7 @@ impl Commands {
                 return Err(pipeline.layouts.refuse("the mesh has other attributes than the vertex shader"));
             }
             self.push(&pipeline.layouts, push_constants)?;
-            let buffers: Vec<_> = triangles.attributes.iter().map(|buffer| buffer.raw).collect();
+            let buffers: Vec<_> = triangles.attributes().map(|buffer| buffer.raw).collect();
             let offsets = vec![0; buffers.len()];
             // SAFETY: called while rendering; the buffers are those of the pipeline's attributes, and all indices are of vertices.
             unsafe {

@@ -12,13 +12,15 @@ pub struct VertexAttribute<'a> {
     pub name: &'a str,
     /// Bytes of one vertex.
     pub stride: u32,
-    /// One vertex after another.
+    /// One vertex after another. Two attributes of the same bytes in memory share one buffer.
     pub bytes: &'a [u8],
 }
 
-/// A mesh on the device: one buffer for each attribute, and the indices.
+/// A mesh on the device: a buffer for each attribute, and the indices.
 pub struct Triangles {
-    pub(super) attributes: Vec<Buffer>,
+    buffers: Vec<Buffer>,
+    /// The buffer of each attribute.
+    attributes: Vec<usize>,
     /// Bytes of one vertex in each.
     pub(super) strides: Vec<u32>,
     pub(super) indices: Buffer,
@@ -41,15 +43,28 @@ impl Triangles {
         let (vertex, index) = (vk::BufferUsageFlags::VERTEX_BUFFER, vk::BufferUsageFlags::INDEX_BUFFER);
         let upload =
             |part: &str, usage, bytes: &[u8]| Buffer::with_contents(device, &format!("{name} {part}"), usage, bytes);
-        let uploaded = attributes.iter().map(|attribute| upload(attribute.name, vertex, attribute.bytes));
+        let mut distinct: Vec<&VertexAttribute> = Vec::new();
+        let mut buffer_of = Vec::new();
+        for attribute in attributes {
+            let known = distinct.iter().position(|known| std::ptr::eq(known.bytes, attribute.bytes));
+            buffer_of.push(known.unwrap_or(distinct.len()));
+            distinct.extend(known.is_none().then_some(attribute));
+        }
+        let uploaded = distinct.iter().map(|attribute| upload(attribute.name, vertex, attribute.bytes));
         Ok(Self {
-            attributes: uploaded.collect::<Result<_>>()?,
+            buffers: uploaded.collect::<Result<_>>()?,
+            attributes: buffer_of,
             strides: attributes.iter().map(|attribute| attribute.stride).collect(),
             indices: upload("indices", index, bytemuck::cast_slice(indices))?,
             index_count: indices.len() as u32,
             identity: Identity::new(),
             device: device.clone(),
         })
+    }
+
+    /// The buffer of each attribute.
+    pub(super) fn attributes(&self) -> impl Iterator<Item = &Buffer> {
+        self.attributes.iter().map(|&buffer| &self.buffers[buffer])
     }
 
     /// The device that they are on.

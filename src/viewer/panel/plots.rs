@@ -65,7 +65,7 @@ impl State {
 fn first_material(viewer: &Viewer) -> Option<Keyed<Brdf>> {
     let prepared = &viewer.loaded()?.prepared;
     let material = prepared.objects.first()?.material as usize;
-    Some(prepared.materials.get(material)?.brdf.clone())
+    Some(prepared.materials.get(material)?.turned_brdf.clone())
 }
 
 /// Lobes above the surface, with their lights.
