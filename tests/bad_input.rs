@@ -368,6 +368,7 @@ fn hostile_scene_files_are_refused() {
         ("[shading]\nthreads = 0", "threads"),
         ("[shading]\nthreads = 1025", "threads"),
         ("[shading]\nmethod = 'magic'", "magic"),
+        ("[shading]\npattern = 'dots'", "per-pixel"),
         ("[scene]", "scene"),
         ("[environment]\nbuiltin = 'mars'", "mars"),
         ("[environment]\nintensity = -1", "intensity"),

@@ -18,7 +18,7 @@ fn speed() -> Speed {
     (scene.image.width, scene.image.height) = (40, 30);
     let (name, material) = analytic_materials().remove(0);
     let cases = Cases {
-        methods: vec![Method::Paper, Method::Uniform],
+        methods: vec![Method::Paper.into(), Method::Uniform.into()],
         counts: vec![2, 4],
         materials: vec![(name.into(), material)],
         environments: vec![("white".into(), Source::Builtin("white".into()))],

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use super::metrics::Display;
 use crate::error::Result;
 use crate::memo::{Keyed, Memo, Round};
-use crate::method::Method;
+use crate::method::{Method, Variant};
 use crate::passes::Sampling;
 use crate::pipeline::DeviceScene;
 use crate::prepare::{Prepared, PreparedMaterial, ask_threads, prepare};
@@ -18,7 +18,7 @@ use crate::vulkan::Device;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Estimator {
     /// How radiance is estimated.
-    pub method: Method,
+    pub variant: Variant,
     /// 1 to 1024.
     pub count: u32,
 }
@@ -27,7 +27,7 @@ pub struct Estimator {
 #[derive(Clone, Debug)]
 pub struct Cases {
     /// Estimators.
-    pub methods: Vec<Method>,
+    pub methods: Vec<Variant>,
     /// Numbers of threads, or of samples: each 1 to 1024.
     pub counts: Vec<u32>,
     /// Materials, by names that differ. One at a time is that of all objects.
@@ -44,9 +44,9 @@ impl Cases {
     /// Every method at every count that it can have, the count changing fastest.
     pub fn estimators(&self) -> Vec<Estimator> {
         let possible = |method: Method, count: u32| (1..=method.max_count(1)).contains(&count);
-        let of_method = |&method: &Method| {
-            let counts = self.counts.iter().copied().filter(move |&count| possible(method, count));
-            counts.map(move |count| Estimator { method, count })
+        let of_method = |&variant: &Variant| {
+            let counts = self.counts.iter().copied().filter(move |&count| possible(variant.method, count));
+            counts.map(move |count| Estimator { variant, count })
         };
         self.methods.iter().flat_map(of_method).collect()
     }
@@ -163,8 +163,8 @@ impl Place<'_> {
     /// # Errors
     /// A number of threads that is out of range, or cancelled.
     pub fn choose(&mut self, estimator: Estimator) -> Result<()> {
-        let Estimator { method, count } = estimator;
-        let sampling = Sampling { count, seed: self.cases.seed };
+        let Estimator { variant: Variant { method, pattern }, count } = estimator;
+        let sampling = Sampling { count, seed: self.cases.seed, pattern };
         let threads = ask_threads(
             &self.round(),
             method,

@@ -154,7 +154,7 @@ impl Sweep {
 fn row(place: &Place, metrics: &Metrics, rendering: &Rendering) -> Row {
     let &Metrics { rms, rms_linear, max, ssim, flip, nan, .. } = metrics;
     Row {
-        method: place.prepared.method.name().to_owned(),
+        method: place.prepared.variant().name(),
         threads: place.prepared.sampling.count,
         material: place.material.to_owned(),
         environment: place.environment.to_owned(),

@@ -68,7 +68,7 @@ impl BenchGallery {
             counts: &[1, 4, 16, 64, 100],
             size: Some((160, 120)),
         })?;
-        let estimator = Estimator { method: materials.methods[0], count: self.threads };
+        let estimator = Estimator { variant: materials.methods[0], count: self.threads };
         let compared = named("--compare", &self.compare)?;
         let compared = compared.into_iter().map(|(name, text)| (name, MaterialSource::named(text))).collect();
         let sweep = Sweep {

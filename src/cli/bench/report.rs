@@ -76,10 +76,10 @@ impl BenchReport {
         };
         let speed = Speed { cases: only_first.clone(), threads: self.threads, repeat: self.repeat };
         let shown = Cases { materials: with_builtin(&cases.materials), ..only_first };
-        let method = cases.methods[0];
-        let of_method = cases.estimators().into_iter().filter(|estimator| estimator.method == method);
-        let highest = of_method.map(|estimator| estimator.count).max().unwrap_or(method.default_count());
-        let estimator = Estimator { method, count: highest };
+        let variant = cases.methods[0];
+        let of_method = cases.estimators().into_iter().filter(|estimator| estimator.variant == variant);
+        let highest = of_method.map(|estimator| estimator.count).max().unwrap_or(variant.method.default_count());
+        let estimator = Estimator { variant, count: highest };
 
         let device = self.cases.open_device()?;
         let memo = self.cases.memo();
@@ -93,7 +93,7 @@ impl BenchReport {
         let sheets = gallery::material_sheets(&shown, estimator, &device, &memo, &progress)?;
         progress.finish();
         let light = format!("{}, {}", shown.environments[0].0, shown.scenes[0].0);
-        let caption = format!("{light}; method {}, {highest} threads or samples", estimator.method.name());
+        let caption = format!("{light}; method {}, {highest} threads or samples", variant.name());
         report.materials = sheets.into_iter().map(|(_, picture)| (caption.clone(), picture)).collect();
         let captions = measured.references.iter().map(|(place, _)| place.join(", "));
         let pictures = gallery::comparison_sheets(&measured).into_iter().map(|(_, picture)| picture);
