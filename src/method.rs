@@ -175,10 +175,10 @@ impl Method {
         self.threads().map_or(samples, |kind| kind.max_count() as u32)
     }
 
-    /// Whether its shader evaluates BRDFs under `environment`: fitted threads hold all that is needed, but for small bright sources.
+    /// Whether its shader evaluates BRDFs under `environment`: fitted threads and Gaussians hold all that is needed, but for small bright sources.
     pub fn evaluates_brdf(self, environment: &Environment) -> bool {
         match self.threads() {
-            Some(ThreadKind::Fitted) => !environment.small_sources().list.is_empty(),
+            Some(kind) if kind.are_kernels() => !environment.small_sources().list.is_empty(),
             _ => !self.lookups().split_sum,
         }
     }

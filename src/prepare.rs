@@ -8,7 +8,7 @@ use crate::passes::{PlacedMesh, Sampling, View};
 use crate::scene::{Camera, MaterialSource, Mesh, Scene, TangentRule};
 use crate::steps::{DraftThreads, FitThreads, LoadEnvironment, LoadMaterial, LoadMesh};
 use crate::threads::fitted::set_count;
-use crate::threads::{ThreadKind, ThreadSettings, Threads, WithThreads};
+use crate::threads::{ThreadSettings, Threads, WithThreads};
 use crate::{Error, Result};
 use glam::{DAffine3, DVec3};
 use std::cell::Cell;
@@ -77,7 +77,7 @@ pub fn ask_threads(
 fn thread_settings(method: Method, brdf: &Brdf, sampling: Sampling, subpixels: u32) -> Option<ThreadSettings> {
     let Sampling { count, seed, .. } = sampling;
     let settings = ThreadSettings { kind: method.threads()?, count: count as usize, seed, ..ThreadSettings::default() };
-    let sets = if settings.kind == ThreadKind::Fitted { set_count(brdf, settings.count, subpixels) } else { 1 };
+    let sets = if settings.kind.are_kernels() { set_count(brdf, settings.count, subpixels) } else { 1 };
     Some(ThreadSettings { sets, ..settings })
 }
 

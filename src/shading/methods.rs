@@ -11,6 +11,11 @@ methods! {
         threads: Some(ThreadKind::Paper),
         ..Properties::biased("Sample threads as published by Kim, Kyung and Lee (2010), box-filtered lookups.", BOX_FILTERED)
     },
+    gaussian => Gaussian: Properties {
+        threads: Some(ThreadKind::Gaussian),
+        shares_surface: true,
+        ..Properties::biased("Spherical Gaussians fitted to the BRDF itself (Green, Kautz and Durand 2007), looked up as fitted threads.", BLURRED)
+    },
     split_sum => SplitSum: Properties {
         shares_surface: true,
         ..Properties::biased("The split sum of engines (Karis 2013): the light filtered by the GGX that suits the BRDF best, times the BRDF's albedo.", SPLIT_SUM)
