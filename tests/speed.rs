@@ -4,8 +4,8 @@ mod common;
 use common::{Validated, analytic_materials, ready, sphere};
 use threadlight::Error;
 use threadlight::low_level::environment::Pyramid;
-use threadlight::low_level::evaluate::Cases;
 use threadlight::low_level::evaluate::speed::{self, Growth, Speed, Timings};
+use threadlight::low_level::evaluate::{Cases, Shard};
 use threadlight::low_level::method::Method;
 use threadlight::low_level::passes::BareLookups;
 use threadlight::low_level::pipeline::time_bare_lookups;
@@ -24,6 +24,7 @@ fn speed() -> Speed {
         environments: vec![("white".into(), Source::Builtin("white".into()))],
         scenes: vec![("sphere".into(), scene)],
         seed: 0,
+        shard: Shard::WHOLE,
     };
     Speed { cases, threads: 4, repeat: 1 }
 }

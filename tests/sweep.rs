@@ -5,7 +5,7 @@ use common::{Validated, model, ready, sphere};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use tempfile::TempDir;
 use threadlight::low_level::evaluate::sweep::{self, Measured};
-use threadlight::low_level::evaluate::{Cases, ReferencePicture, Sweep, gallery};
+use threadlight::low_level::evaluate::{Cases, ReferencePicture, Shard, Sweep, gallery};
 use threadlight::low_level::memo::Round;
 use threadlight::low_level::method::Method;
 use threadlight::low_level::output::{ExrHeader, write_exr};
@@ -38,6 +38,7 @@ fn sweep(folder: &TempDir) -> Sweep {
         environments: vec![("white".into(), Source::Builtin("white".into())), ("map".into(), Source::File(map))],
         scenes: vec![("sphere".into(), scene)],
         seed: 0,
+        shard: Shard::WHOLE,
     };
     Sweep { cases, repeat: 1, whole_picture: false, expected: false, keep_pictures: false }
 }

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use threadlight::low_level::environment;
 use threadlight::low_level::evaluate::reference::{Processor, ReferenceSettings};
 use threadlight::low_level::evaluate::sweep::Measured;
-use threadlight::low_level::evaluate::{Cases, Sweep, reference_picture, sweep};
+use threadlight::low_level::evaluate::{Cases, Shard, Sweep, reference_picture, sweep};
 use threadlight::low_level::memo::{Memo, Round};
 use threadlight::low_level::method::{Method, Variant};
 use threadlight::low_level::output;
@@ -91,6 +91,7 @@ impl CasesArguments {
                 .map(|(name, text)| Ok((name, self.scene_of(text, size)?)))
                 .collect::<Result<_>>()?,
             seed: self.seed,
+            shard: Shard::WHOLE,
         })
     }
 
