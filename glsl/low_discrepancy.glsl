@@ -28,9 +28,8 @@ struct Stream {
     uvec4 scramble;
 };
 
-// A stream of points for this pixel, whose sub-pixels share it.
-Stream point_stream(uint index) {
-    uvec2 pixel = subpixel / SUBPIXELS;
+// A stream of points for a pixel, whose sub-pixels share it.
+Stream point_stream(uvec2 pixel, uint index) {
     uint place = pixel.x | pixel.y << 16;
     return Stream(pcg4d(uvec4(place, 2 * index, push.seed)).xy, pcg4d(uvec4(place, 2 * index + 1, push.seed)));
 }

@@ -3,6 +3,7 @@
 //! A method is one GLSL file in `glsl/methods/` that defines `estimate`, its CPU twin in `shading/`, and an entry in the table
 //! `shading/methods.rs`.
 use crate::environment::Environment;
+use crate::scene::Pattern;
 use crate::threads::ThreadKind;
 use crate::vulkan::{Shader, compiled};
 use crate::{Error, Result};
@@ -23,6 +24,8 @@ struct Properties {
     lookups: Lookups,
     /// Whether its shader includes shared_sum.glsl.
     shares_surface: bool,
+    /// Whether its shader includes pattern.glsl.
+    has_pattern: bool,
     is_unbiased: bool,
 }
 
@@ -33,21 +36,27 @@ pub struct Lookups {
     pub box_filtered: bool,
     /// The environment blurred by the kernels of fitted threads, with what belongs to that.
     pub blurred: bool,
-    /// The environment filtered by GGX and by the cosine, as the split sum has it.
-    pub prefiltered: bool,
     /// The environment as it is, with the density of its light.
     pub map: bool,
     /// The alias table of that density.
     pub aliases: bool,
     /// CDFs of BRDFs.
     pub slices: bool,
-    /// Albedos of BRDFs, and how rough the nearest GGX is.
-    pub split_sums: bool,
+    /// What the split sum has: the environment filtered by GGX and by the cosine, albedos of BRDFs, and how rough the nearest GGX is.
+    pub split_sum: bool,
 }
 
 impl Properties {
     const fn unbiased(summary: &'static str, lookups: Lookups) -> Self {
-        Self { summary, older_name: None, threads: None, lookups, shares_surface: false, is_unbiased: true }
+        Self {
+            summary,
+            older_name: None,
+            threads: None,
+            lookups,
+            shares_surface: false,
+            has_pattern: false,
+            is_unbiased: true,
+        }
     }
 
     const fn biased(summary: &'static str, lookups: Lookups) -> Self {
@@ -55,16 +64,9 @@ impl Properties {
     }
 }
 
-const NOTHING: Lookups = Lookups {
-    box_filtered: false,
-    blurred: false,
-    prefiltered: false,
-    map: false,
-    aliases: false,
-    slices: false,
-    split_sums: false,
-};
-const PREFILTERED: Lookups = Lookups { prefiltered: true, split_sums: true, ..NOTHING };
+const NOTHING: Lookups =
+    Lookups { box_filtered: false, blurred: false, map: false, aliases: false, slices: false, split_sum: false };
+const SPLIT_SUM: Lookups = Lookups { split_sum: true, ..NOTHING };
 const BLURRED: Lookups = Lookups { blurred: true, ..NOTHING };
 const BOX_FILTERED: Lookups = Lookups { box_filtered: true, ..NOTHING };
 const MAP: Lookups = Lookups { map: true, ..NOTHING };
@@ -161,7 +163,7 @@ impl Method {
 
     /// How many threads or samples it has where none are asked for.
     pub fn default_count(self) -> u32 {
-        let samples = if self.lookups().split_sums { 1 } else { DEFAULT_SAMPLES };
+        let samples = if self.lookups().split_sum { 1 } else { DEFAULT_SAMPLES };
         self.threads().map_or(samples, |kind| kind.default_count() as u32)
     }
 
@@ -169,15 +171,15 @@ impl Method {
     pub fn max_count(self, subpixels: u32) -> u32 {
         // A pixel at an edge takes all samples in each sub-pixel. lavapipe silently leaves loops after 65535 iterations in all.
         const MOST_ITERATIONS: u32 = 65_000;
-        let samples = if self.lookups().split_sums { 1 } else { MOST_ITERATIONS / (subpixels * subpixels) };
+        let samples = if self.lookups().split_sum { 1 } else { MOST_ITERATIONS / (subpixels * subpixels) };
         self.threads().map_or(samples, |kind| kind.max_count() as u32)
     }
 
-    /// Whether its shader evaluates BRDFs under `environment`: fitted threads hold all that is needed, but for small bright sources.
+    /// Whether its shader evaluates BRDFs under `environment`: fitted threads and Gaussians hold all that is needed, but for small bright sources.
     pub fn evaluates_brdf(self, environment: &Environment) -> bool {
         match self.threads() {
-            Some(ThreadKind::Fitted) => !environment.small_sources().list.is_empty(),
-            _ => !self.lookups().split_sums,
+            Some(kind) if kind.are_kernels() => !environment.small_sources().list.is_empty(),
+            _ => !self.lookups().split_sum,
         }
     }
 
@@ -185,6 +187,11 @@ impl Method {
     /// its shader includes glsl/shared_sum.glsl.
     pub fn shares_surface(self) -> bool {
         self.properties().shares_surface
+    }
+
+    /// Whether it draws its samples at either of two patterns: its shader includes glsl/pattern.glsl.
+    pub fn has_pattern(self) -> bool {
+        self.properties().has_pattern
     }
 
     /// Whether a shader runs it: all but the reference.
@@ -195,6 +202,49 @@ impl Method {
     /// Whether the mean over seeds is equation (1), whatever the number of samples.
     pub fn is_unbiased(self) -> bool {
         self.properties().is_unbiased
+    }
+}
+
+/// A method, and where it draws its samples: what tables have a row for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Variant {
+    /// How radiance is estimated.
+    pub method: Method,
+    /// Where samples are drawn; [`Pattern::PerPixel`] of methods that have no choice.
+    pub pattern: Pattern,
+}
+
+/// What the names of variants with a fixed pattern end in.
+const FIXED: &str = "_fixed";
+
+impl Variant {
+    /// `method`, with `pattern` if it has a choice.
+    pub fn new(method: Method, pattern: Pattern) -> Self {
+        Self { method, pattern: if method.has_pattern() { pattern } else { Pattern::PerPixel } }
+    }
+
+    /// The name of the method, followed by `_fixed` if the pattern is.
+    pub fn name(self) -> String {
+        let suffix = if self.pattern == Pattern::Fixed { FIXED } else { "" };
+        format!("{}{suffix}", self.method.name())
+    }
+
+    /// The variant of that name.
+    ///
+    /// # Errors
+    /// There is none.
+    pub fn from_name(name: &str) -> Result<Self> {
+        let fixed = name.strip_suffix(FIXED).map(Method::from_name).and_then(Result::ok);
+        match fixed.filter(|method| method.has_pattern()) {
+            Some(method) => Ok(Self { method, pattern: Pattern::Fixed }),
+            None => Method::from_name(name).map(Self::from),
+        }
+    }
+}
+
+impl From<Method> for Variant {
+    fn from(method: Method) -> Self {
+        Self::new(method, Pattern::PerPixel)
     }
 }
 
@@ -222,19 +272,33 @@ mod tests {
     }
 
     #[test]
+    fn variants_of_methods_that_have_a_pattern_are_named_by_it() {
+        for &method in Method::ALL {
+            for pattern in Pattern::ALL {
+                let variant = Variant::new(method, pattern);
+                assert_eq!(Variant::from_name(&variant.name()).unwrap(), variant);
+                let is_fixed = variant.name() == format!("{}_fixed", method.name());
+                assert_eq!(is_fixed, pattern == Pattern::Fixed && method.has_pattern());
+            }
+            let declares = |shader: &Shader| shader.declares("FIXED_PATTERN").unwrap();
+            assert_eq!(method.shader().is_ok_and(declares), method.has_pattern(), "{}", method.name());
+        }
+        assert!(Variant::from_name("paper_fixed").unwrap_err().to_string().contains("paper_fixed"));
+    }
+
+    #[test]
     fn what_methods_look_up_is_what_their_shaders_declare() {
         for method in Method::ALL.iter().filter(|method| method.runs_on_gpu()) {
             let declares = |name| method.shader().unwrap().declares(name).unwrap();
-            let split_sums = declares("SplitSums");
-            let blurred = declares("irradiance_map") && !split_sums;
+            let split_sum = declares("SplitSums");
+            let blurred = declares("irradiance_map") && !split_sum;
             let declared = Lookups {
                 box_filtered: declares("environment_pyramid") && !declares("irradiance_map"),
                 blurred,
-                prefiltered: declares("irradiance_map") && split_sums,
                 map: declares("environment_map") && !blurred,
                 aliases: declares("LightAliases"),
                 slices: declares("Slices"),
-                split_sums,
+                split_sum,
             };
             assert_eq!(method.lookups(), declared, "{}", method.name());
         }

@@ -5,7 +5,7 @@ use crate::memo::{Held, Keyed, Round};
 use crate::output::ExrHeader;
 use crate::passes::*;
 use crate::prepare::Prepared;
-use crate::scene::Mesh;
+use crate::scene::{Mesh, Pattern};
 use crate::steps::{
     CheckDevice, CompileCompute, CompileGeometryCache, UploadBackground, UploadLight, UploadMaterials, UploadMesh,
     light, pipelines,
@@ -112,6 +112,9 @@ impl DeviceScene {
         let subpixels = ("SUBPIXELS", view.subpixels);
         let has_tangents = ("HAS_TANGENTS", prepared.has_tangents().into());
         let mut constants = vec![subpixels, has_tangents, ("MODELS_USED", materials.models_used)];
+        if method.has_pattern() {
+            constants.push(("FIXED_PATTERN", (sampling.pattern == Pattern::Fixed).into()));
+        }
         constants.extend(light.blurred.iter().flat_map(|blurred| blurred.needs.constants()));
         let light = round.ask(&UploadLight { device, method, environment, light: &light, way_around })?;
         let pipeline = compile(shader, &constants)?;
@@ -197,7 +200,7 @@ impl Rendering {
     pub fn exr_header(&self, prepared: &Prepared, device: &str) -> ExrHeader {
         let materials: Vec<_> = prepared.materials.iter().map(|material| material.name.as_str()).collect();
         ExrHeader {
-            method: prepared.method.name().to_owned(),
+            method: prepared.variant().name(),
             threads: prepared.sampling.count,
             material: materials.join(", "),
             environment: prepared.environment.name.clone(),

@@ -3,7 +3,7 @@ use crate::brdf::Brdf;
 use crate::environment::Environment;
 use crate::geometry_texel::MAX_MATERIALS;
 use crate::memo::{Key, Keyed, Memo, Round, Step};
-use crate::method::Method;
+use crate::method::{Method, Variant};
 use crate::passes::{PlacedMesh, PlacedTangent, Sampling, View};
 use crate::scene::{Camera, MaterialSource, Mesh, Scene, Source, TangentRule};
 use crate::steps::{DraftThreads, FitThreads, LoadBrushedMesh, LoadEnvironment, LoadMaterial, LoadMesh};
@@ -93,7 +93,7 @@ pub fn ask_threads(
 
 /// Which threads `method` shades `brdf` by, if it does.
 fn thread_settings(method: Method, brdf: &Brdf, sampling: Sampling, subpixels: u32) -> Option<ThreadSettings> {
-    let Sampling { count, seed } = sampling;
+    let Sampling { count, seed, .. } = sampling;
     let settings = ThreadSettings { kind: method.threads()?, count: count as usize, seed, ..ThreadSettings::default() };
     Some(settings.for_picture(brdf, subpixels))
 }
@@ -168,7 +168,8 @@ fn prepare_by(scene: &Scene, round: &Round, ask_threads: &AskThreads) -> Result<
     let method = Method::from_name(&scene.shading.method)?;
     let count = scene.shading.threads.unwrap_or(method.default_count());
     check_count(method, count, scene.image.subpixels)?;
-    let sampling = Sampling { count, seed: scene.shading.seed };
+    let Variant { pattern, .. } = Variant::new(method, scene.shading.pattern);
+    let sampling = Sampling { count, seed: scene.shading.seed, pattern };
     let (meshes, objects) = place_meshes(scene, round)?;
     let environment = round.ask(&LoadEnvironment(&scene.environment.source))?;
     for object in &objects {
@@ -212,7 +213,8 @@ pub fn key_of(scene: &Scene, memo: &Memo) -> Result<Key> {
     let count = scene.shading.threads.unwrap_or(method.default_count());
     let image = &scene.image;
     let shows_environment = image.background == crate::scene::Background::Environment;
-    let mut key = Key::builder(method.name()).number(count).number(scene.shading.seed);
+    let variant = Variant::new(method, scene.shading.pattern);
+    let mut key = Key::builder(&variant.name()).number(count).number(scene.shading.seed);
     key = key.number(image.subpixels).number(u64::from(shows_environment));
     key = key.key(LoadEnvironment(&scene.environment.source).key(memo)?);
     let used_materials = scene.used_materials();
@@ -353,6 +355,11 @@ impl Prepared {
             object.mesh = kept.iter().position(|index| *index == object.mesh).expect("a mesh of an object is kept");
         }
         self.meshes = kept.into_iter().map(|index| self.meshes[index].clone()).collect();
+    }
+
+    /// The method, and where it draws its samples.
+    pub fn variant(&self) -> Variant {
+        Variant::new(self.method, self.sampling.pattern)
     }
 
     /// Whether a material of it is anisotropic, so that objects have tangents.

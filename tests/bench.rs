@@ -88,7 +88,7 @@ fn a_gallery_has_all_materials_and_the_methods_on_one() {
     );
     let said = bench(&folder, &arguments);
     assert!(said.starts_with("clay\n  RMS"), "{said}");
-    assert_eq!(files(&folder, "out"), ["clay_white_sphere.png", "materials.png"]);
+    assert_eq!(files(&folder, "out"), ["clay_white_sphere.png", "clay_white_sphere_side_by_side.png", "materials.png"]);
     let rows = json(&folder, "rows.json");
     assert_eq!(rows.as_array().unwrap().len(), 4);
     let methods = image::open(folder.path().join("out/clay_white_sphere.png")).unwrap();
@@ -117,6 +117,45 @@ fn a_report_is_one_page_that_needs_no_other_file() {
         assert!(page.matches("<img").count() == 2 && page.matches("<svg").count() >= 4);
         assert!(!page.contains("href=") && !page.contains("<script") && !page.contains("NaN"), "the page needs others");
     }
+}
+
+#[test]
+fn the_parts_of_a_sweep_together_are_the_whole() {
+    let folder = tempfile::tempdir().unwrap();
+    let sweep = format!(
+        "error --materials clay,white-plastic --environments white,sky --counts 1,4 --size 24x18 --methods paper,uniform --repeat 1 {QUICK_TRUTH}"
+    );
+    // Tables that hold no times.
+    let without_times = |text: &str| -> Vec<String> {
+        let is_kept = |line: &&str| !line.starts_with("The reference");
+        let mut is_time = false;
+        let kept = text.lines().filter(is_kept).filter(|line| {
+            if line.split("  ").any(|cell| cell.trim() == "1") {
+                is_time = line.contains("GPU ms") || line.contains("time,");
+            }
+            !is_time
+        });
+        kept.map(str::to_owned).collect()
+    };
+    let rows = |name: &str| {
+        let mut rows = json(&folder, name);
+        for row in rows.as_array_mut().unwrap() {
+            let row = row.as_object_mut().unwrap();
+            assert!(row.remove("gpu_ms").is_some() && row.remove("frame_ms").is_some());
+        }
+        rows
+    };
+    let whole = without_times(&bench(&folder, &format!("{sweep} --json whole.json --plot whole")));
+    for part in 1..=3 {
+        bench(&folder, &format!("{sweep} --shard {part}/3 --json {part}.json"));
+    }
+    let merge = "report --from 1.json 2.json 3.json --json merged.json --plot merged";
+    let merged = without_times(&bench(&folder, merge));
+    assert!(whole.len() > 30, "{whole:#?}");
+    assert_eq!(merged, whole);
+    assert_eq!(rows("merged.json"), rows("whole.json"));
+    assert_eq!(rows("1.json").as_array().unwrap().len() + 12, rows("whole.json").as_array().unwrap().len());
+    assert_eq!(files(&folder, "merged"), files(&folder, "whole"));
 }
 
 #[test]
@@ -171,7 +210,7 @@ fn a_hard_case_is_shaded_as_on_the_cpu() {
     assert!(text.contains("normals at all angles to the view") && !text.contains("broken"), "{text}");
     let rows = json(&folder, "rows.json");
     let methods: Vec<_> = rows.as_array().unwrap().iter().map(|row| row["method"].as_str().unwrap()).collect();
-    assert_eq!(methods, ["fitted", "paper"]);
+    assert_eq!(methods, ["fitted", "paper", "gaussian"]);
     let fields = ["bright", "case", "covered", "method", "most", "not_finite", "rms", "wrongly_shown"];
     assert_eq!(keys(&rows[0]), fields);
     assert!(rows[0]["covered"].as_u64() > Some(1000) && rows[0]["rms"].as_f64() < Some(2e-3), "{rows}");

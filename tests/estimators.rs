@@ -10,27 +10,25 @@ use threadlight::low_level::evaluate::Display;
 use threadlight::low_level::evaluate::reference::Integrator;
 use threadlight::low_level::geometry_texel::GeometryTexel;
 use threadlight::low_level::memo::Memo;
-use threadlight::low_level::method::Method;
+use threadlight::low_level::method::{Method, Variant};
 use threadlight::low_level::output::write_exr;
 use threadlight::low_level::pipeline::{DeviceScene, Rendering, Wanted};
 use threadlight::low_level::prepare::Prepared;
-use threadlight::low_level::scene::{Background, MaterialSettings, MaterialSource, ObjectSettings, Scene, Source};
+use threadlight::low_level::scene::{
+    Background, MaterialSettings, MaterialSource, ObjectSettings, Pattern, Scene, Source,
+};
 use threadlight::low_level::shading::{CpuShader, Surface};
 
 /// The methods that draw random numbers.
-const ESTIMATORS: [Method; 7] = [
-    Method::Uniform,
-    Method::Cosine,
-    Method::Importance,
-    Method::Filtered,
-    Method::Environment,
-    Method::Ris,
-    Method::Mis,
-];
+fn estimators() -> Vec<Variant> {
+    let names = "uniform cosine importance importance_fixed filtered filtered_fixed environment ris mis";
+    names.split(' ').map(|name| Variant::from_name(name).unwrap()).collect()
+}
 
-/// Those among them that are right on average.
+/// Those among them that are right on average, and whose pixels have nothing to do with each other.
 fn unbiased() -> impl Iterator<Item = Method> {
-    ESTIMATORS.into_iter().filter(|method| method.is_unbiased())
+    let independent = estimators().into_iter().filter(|variant| variant.pattern == Pattern::PerPixel);
+    independent.map(|variant| variant.method).filter(|method| method.is_unbiased())
 }
 
 /// A renderer whose compiled shaders are kept between tests and runs.
@@ -42,11 +40,18 @@ fn render(gpu: &Validated, prepared: &Prepared) -> Rendering {
     renderer(gpu, prepared).render(EVERYTHING, 1).unwrap()
 }
 
-/// A sphere without background, shaded by `method`.
-fn scene(material: MaterialSource, environment: Source, method: Method, samples: u32, size: (u32, u32)) -> Scene {
+/// A sphere without background, shaded by `variant`.
+fn scene(
+    material: MaterialSource,
+    environment: Source,
+    variant: impl Into<Variant>,
+    samples: u32,
+    size: (u32, u32),
+) -> Scene {
+    let Variant { method, pattern } = variant.into();
     let mut scene = sphere(material, "white", samples, size);
     scene.environment.source = environment;
-    scene.shading.method = method.name().to_owned();
+    (scene.shading.method, scene.shading.pattern) = (method.name().to_owned(), pattern);
     scene.image.background = Background::None;
     scene
 }
@@ -76,7 +81,7 @@ fn every_estimator_agrees_with_its_cpu_twin() {
     let table = folder.path().join("table.binary");
     std::fs::write(&table, common::merl_like_table()).unwrap();
     let studio = small_environment(folder.path(), "studio");
-    for method in ESTIMATORS {
+    for method in estimators() {
         // Two spheres side by side, so that materials beyond the first are met too.
         let (_, metal) = analytic_materials().remove(1);
         let mut scene = scene(metal, studio.clone(), method, 30, (48, 24));
@@ -282,7 +287,8 @@ fn a_white_furnace_shows_the_albedo_through_importance_sampling() {
     let white = Source::Builtin("white".to_owned());
     for (name, material) in analytic_materials() {
         let mut albedos = Vec::new();
-        for method in [Method::Importance, Method::Filtered] {
+        for method in ["importance", "filtered", "filtered_fixed"] {
+            let method = Variant::from_name(method).unwrap();
             let mut scene = scene(material.clone(), white.clone(), method, 1024, (24, 18));
             scene.image.subpixels = 1;
             let prepared = ready(&scene);
@@ -307,12 +313,42 @@ fn a_white_furnace_shows_the_albedo_through_importance_sampling() {
 }
 
 #[test]
+fn a_fixed_pattern_has_bias_in_the_place_of_noise() {
+    let gpu = Validated::new();
+    let folder = tempfile::tempdir().unwrap();
+    let (_, material) = wide_materials().remove(0);
+    let sky = small_environment(folder.path(), "sky");
+    // How far pixels are from the mean of their neighbours, of those that see a surface on all sides.
+    let roughness = |name: &str| {
+        let mut scene = scene(material.clone(), sky.clone(), Variant::from_name(name).unwrap(), 16, (48, 36));
+        scene.image.subpixels = 1;
+        let radiance = render(&gpu, &ready(&scene)).radiance;
+        let at = |x: usize, y: usize| Vec4::from(radiance[48 * y + x]);
+        let (mut squares, mut count) = (0.0, 0);
+        for (x, y) in (1..35).flat_map(|y| (1..47).map(move |x| (x, y))) {
+            let around = [at(x - 1, y), at(x + 1, y), at(x, y - 1), at(x, y + 1)];
+            if around.iter().all(|pixel| pixel.w == 1.0) {
+                let mean = around.iter().sum::<Vec4>() / 4.0;
+                squares += (at(x, y) / mean - 1.0).truncate().length_squared();
+                count += 3;
+            }
+        }
+        assert!(count > 1000, "{count}");
+        (squares / count as f32).sqrt()
+    };
+    let (per_pixel, fixed) = (roughness("filtered"), roughness("filtered_fixed"));
+    println!("{per_pixel} {fixed}");
+    assert!(fixed < 0.25 * per_pixel, "{per_pixel} {fixed}");
+    gpu.finish();
+}
+
+#[test]
 fn seeds_reproduce_the_noise_to_the_byte() {
     let gpu = Validated::new();
     let folder = tempfile::tempdir().unwrap();
     let sky = small_environment(folder.path(), "sky");
     let (_, material) = analytic_materials().remove(3);
-    for method in ESTIMATORS {
+    for method in estimators() {
         let mut scene = scene(material.clone(), sky.clone(), method, 6, (24, 18));
         let mut picture = |seed: u64| {
             scene.shading.seed = seed;
@@ -342,7 +378,7 @@ fn a_narrow_lobe_under_a_sun_of_a_million_stays_finite() {
     let mut materials = analytic_materials();
     materials.truncate(1);
     materials.push(("narrow", model(narrow)));
-    for method in ESTIMATORS {
+    for method in estimators() {
         for (name, material) in &materials {
             // So large on the picture that view angles up to 90 degrees are met.
             let mut scene = scene(material.clone(), Source::File(path.clone()), method, 16, (64, 48));

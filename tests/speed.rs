@@ -4,8 +4,8 @@ mod common;
 use common::{Validated, analytic_materials, ready, sphere};
 use threadlight::Error;
 use threadlight::low_level::environment::Pyramid;
-use threadlight::low_level::evaluate::Cases;
 use threadlight::low_level::evaluate::speed::{self, Growth, Speed, Timings};
+use threadlight::low_level::evaluate::{Cases, Shard};
 use threadlight::low_level::method::Method;
 use threadlight::low_level::passes::BareLookups;
 use threadlight::low_level::pipeline::time_bare_lookups;
@@ -18,12 +18,13 @@ fn speed() -> Speed {
     (scene.image.width, scene.image.height) = (40, 30);
     let (name, material) = analytic_materials().remove(0);
     let cases = Cases {
-        methods: vec![Method::Paper, Method::Uniform],
+        methods: vec![Method::Paper.into(), Method::Uniform.into()],
         counts: vec![2, 4],
         materials: vec![(name.into(), material)],
         environments: vec![("white".into(), Source::Builtin("white".into()))],
         scenes: vec![("sphere".into(), scene)],
         seed: 0,
+        shard: Shard::WHOLE,
     };
     Speed { cases, threads: 4, repeat: 1 }
 }

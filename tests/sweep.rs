@@ -5,7 +5,7 @@ use common::{Validated, model, ready, sphere};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use tempfile::TempDir;
 use threadlight::low_level::evaluate::sweep::{self, Measured};
-use threadlight::low_level::evaluate::{Cases, ReferencePicture, Sweep, gallery};
+use threadlight::low_level::evaluate::{Cases, ReferencePicture, Shard, Sweep, gallery};
 use threadlight::low_level::memo::Round;
 use threadlight::low_level::method::Method;
 use threadlight::low_level::output::{ExrHeader, write_exr};
@@ -32,12 +32,13 @@ fn sweep(folder: &TempDir) -> Sweep {
     let metal =
         model("model = 'conductor'\ndistribution = 'ggx'\nalpha = 0.3\neta = [0.2, 0.9, 1.1]\nk = [3.9, 2.4, 2.1]");
     let cases = Cases {
-        methods: vec![Method::Paper],
+        methods: vec![Method::Paper.into()],
         counts: vec![4, 16],
         materials: vec![("grey".into(), grey()), ("metal".into(), metal)],
         environments: vec![("white".into(), Source::Builtin("white".into())), ("map".into(), Source::File(map))],
         scenes: vec![("sphere".into(), scene)],
         seed: 0,
+        shard: Shard::WHOLE,
     };
     Sweep { cases, repeat: 1, whole_picture: false, expected: false, keep_pictures: false }
 }
@@ -117,7 +118,7 @@ fn methods_with_and_without_threads_are_measured_side_by_side_and_shown() {
     let gpu = Validated::new();
     let folder = tempfile::tempdir().unwrap();
     let mut sweep = Sweep { keep_pictures: true, ..sweep(&folder) };
-    sweep.cases.methods = vec![Method::Paper, Method::Importance, Method::Paper];
+    sweep.cases.methods = vec![Method::Paper.into(), Method::Importance.into(), Method::Paper.into()];
     sweep.cases.materials.truncate(1);
     let mut measured = Measured::default();
     sweep::run(&sweep, &gpu.device, &gpu.memo, &|prepared, _| sixteen_threads(&gpu, prepared), &(), &mut measured)

@@ -255,7 +255,7 @@ fn sampling_has_the_reference_as_its_limit() {
     let truth = Rendering { radiance: truth.unwrap().radiance, ..Rendering::default() };
     let mut prepared = ready(&scene(material, "mis", 1));
     for (count, most) in [(64, 0.05), (4096, 0.006)] {
-        prepared.sampling = Sampling { count, seed: 7 };
+        prepared.sampling = Sampling { count, seed: 7, ..prepared.sampling };
         let error = rms(&gpu.render(&prepared, EVERYTHING), &truth);
         assert!(error < most, "{count} samples: {error}");
     }

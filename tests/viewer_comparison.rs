@@ -23,7 +23,7 @@ fn a_picture_is_compared_with_another_method_with_itself_and_with_the_reference(
     assert_eq!((metrics.rms, itself.part, itself.error_estimate, itself.size), (0.0, 1.0, None, [96, 72]));
     assert_eq!((itself.display.len(), itself.heat_map.len()), (4 * 96 * 72, 4 * 96 * 72));
 
-    let fitted = ShadingSettings { method: "fitted".into(), threads: Some(16), seed: 0 };
+    let fitted = ShadingSettings { method: "fitted".into(), threads: Some(16), ..ShadingSettings::default() };
     let fitted = compared(Other::Shading(fitted)).remove(0);
     assert_eq!(fitted.name, "fitted, 16");
     let between = fitted.metrics.unwrap();

@@ -10,7 +10,8 @@
 vec3 estimate(Surface surface, Material material, uint first, uint stride) {
     vec3 w_o = view_direction(surface);
     SliceRows rows = slice_rows(material, w_o);
-    Stream streams[2] = Stream[](point_stream(0), point_stream(1));
+    uvec2 pixel = subpixel / SUBPIXELS;
+    Stream streams[2] = Stream[](point_stream(pixel, 0), point_stream(pixel, 1));
     vec3 sum = vec3(0.0);
     for (uint k = first; k < push.sample_count; k += stride) {
         [[unroll]] for (int way = 0; way < 2; ++way) {

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use threadlight::low_level::environment;
 use threadlight::low_level::method::Method;
 use threadlight::low_level::scene::{
-    Background, EXPOSURE, GAMMA, MAX_SAMPLES, MAX_SIZE_PX, MAX_SUBPIXELS, MaterialSource, Scene, Source, mesh,
+    Background, EXPOSURE, GAMMA, MAX_SAMPLES, MAX_SIZE_PX, MAX_SUBPIXELS, MaterialSource, Pattern, Scene, Source, mesh,
 };
 
 /// What is rendered.
@@ -25,6 +25,9 @@ pub struct SceneFlags {
     pub method: Option<String>,
     #[arg(long, help = nameable::counts(), value_name = "N", value_parser = value_parser!(u32).range(1..=i64::from(MAX_SAMPLES)))]
     pub threads: Option<u32>,
+    /// Where methods filtered and importance draw samples: at random numbers of each pixel's own (noise), or at one fixed set (bias).
+    #[arg(long, value_name = "per-pixel|fixed", value_parser = pattern(), hide_possible_values = true)]
+    pub pattern: Option<Pattern>,
     /// Sub-pixels per axis, 1 to 4.
     #[arg(long, value_name = "S", value_parser = value_parser!(u32).range(1..=i64::from(MAX_SUBPIXELS)))]
     pub subpixels: Option<u32>,
@@ -95,6 +98,7 @@ impl SceneFlags {
         }
         lay(&self.method, &mut scene.shading.method);
         scene.shading.threads = self.threads.or(scene.shading.threads);
+        lay(&self.pattern, &mut scene.shading.pattern);
         lay(&self.seed, &mut scene.shading.seed);
         lay(&self.subpixels, &mut scene.image.subpixels);
         lay(&self.exposure, &mut scene.image.exposure);
@@ -118,6 +122,12 @@ fn methods() -> PossibleValuesParser {
         let value = PossibleValue::new(method.name()).help(method.summary());
         method.older_name().into_iter().fold(value, PossibleValue::alias)
     }))
+}
+
+/// `per-pixel` or `fixed`.
+fn pattern() -> impl TypedValueParser<Value = Pattern> {
+    PossibleValuesParser::new(Pattern::ALL.map(Pattern::name))
+        .map(|name| if name == Pattern::Fixed.name() { Pattern::Fixed } else { Pattern::PerPixel })
 }
 
 /// `environment` or `none`.

@@ -25,7 +25,7 @@ pub struct Threads {
     /// Number of threads: 1 to 128 (fitted; 16 by default) or 1 to 1024 (paper; 100 by default).
     #[arg(long, value_name = "N")]
     count: Option<u32>,
-    /// Whose threads: fitted or paper.
+    /// Whose threads: fitted, paper or gaussian.
     #[arg(long, value_name = "METHOD", default_value = ThreadKind::default().name())]
     method: String,
     /// Seed of everything random; the same seed gives the same bytes.
@@ -49,7 +49,7 @@ impl Threads {
             return Err(Error::input("threads", "has nothing to write", remedy).into());
         }
         let kind = Method::from_name(&self.method)?.threads().ok_or_else(|| {
-            Error::input(format!("method \"{}\"", self.method), "has no threads", "use fitted or paper")
+            Error::input(format!("method \"{}\"", self.method), "has no threads", "use fitted, paper or gaussian")
         })?;
         let count = self.count.map_or(kind.default_count(), |count| count as usize);
         if !(1..=kind.max_count()).contains(&count) {

@@ -1,10 +1,11 @@
 //! What evaluations go through: every material in every environment in every scene, by every method at every count.
+use std::ops::Range;
 use std::sync::Arc;
 
 use super::metrics::Display;
 use crate::error::Result;
 use crate::memo::{Keyed, Memo, Round};
-use crate::method::Method;
+use crate::method::{Method, Variant};
 use crate::passes::Sampling;
 use crate::pipeline::DeviceScene;
 use crate::prepare::{Prepared, PreparedMaterial, ask_threads, prepare};
@@ -18,16 +19,39 @@ use crate::vulkan::Device;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Estimator {
     /// How radiance is estimated.
-    pub method: Method,
+    pub variant: Variant,
     /// 1 to 1024.
     pub count: u32,
+}
+
+/// A part of the combinations of materials and environments, for jobs that share a sweep: part `index`, from 0, of `count`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Shard {
+    index: usize,
+    count: usize,
+}
+
+impl Shard {
+    /// All of them.
+    pub const WHOLE: Self = Self { index: 0, count: 1 };
+
+    /// The part of that `number`, from 1, of `count`; none if there is none of that number.
+    pub fn new(number: usize, count: usize) -> Option<Self> {
+        (1..=count).contains(&number).then(|| Self { index: number - 1, count })
+    }
+
+    /// Which of `length` things are in this part. Neighbours stay together, as the threads of a material are made once for all environments.
+    fn of(self, length: usize) -> Range<usize> {
+        let start = |index: usize| index * length / self.count;
+        start(self.index)..start(self.index + 1)
+    }
 }
 
 /// All combinations of these.
 #[derive(Clone, Debug)]
 pub struct Cases {
     /// Estimators.
-    pub methods: Vec<Method>,
+    pub methods: Vec<Variant>,
     /// Numbers of threads, or of samples: each 1 to 1024.
     pub counts: Vec<u32>,
     /// Materials, by names that differ. One at a time is that of all objects.
@@ -38,22 +62,40 @@ pub struct Cases {
     pub scenes: Vec<(String, Scene)>,
     /// Seed of whatever is random.
     pub seed: u64,
+    /// Which combinations of materials and environments.
+    pub shard: Shard,
 }
 
 impl Cases {
     /// Every method at every count that it can have, the count changing fastest.
     pub fn estimators(&self) -> Vec<Estimator> {
         let possible = |method: Method, count: u32| (1..=method.max_count(1)).contains(&count);
-        let of_method = |&method: &Method| {
-            let counts = self.counts.iter().copied().filter(move |&count| possible(method, count));
-            counts.map(move |count| Estimator { method, count })
+        let of_method = |&variant: &Variant| {
+            let counts = self.counts.iter().copied().filter(move |&count| possible(variant.method, count));
+            counts.map(move |count| Estimator { variant, count })
         };
         self.methods.iter().flat_map(of_method).collect()
     }
 
     /// How many combinations of material, environment and scene there are.
     pub fn place_count(&self) -> usize {
-        self.materials.len() * self.environments.len() * self.scenes.len()
+        self.pairs().len() * self.scenes.len()
+    }
+
+    /// The combinations of materials and environments of the shard, by number: the environment changes fastest.
+    fn pairs(&self) -> Range<usize> {
+        self.shard.of(self.materials.len() * self.environments.len())
+    }
+
+    /// Whether the shard has material and environment of these numbers together.
+    fn has(&self, material: usize, environment: usize) -> bool {
+        self.pairs().contains(&(material * self.environments.len() + environment))
+    }
+
+    /// The materials of the shard, with their numbers.
+    fn own_materials(&self) -> impl Iterator<Item = (usize, &(String, MaterialSource))> {
+        let is_used = |material: usize| (0..self.environments.len()).any(|environment| self.has(material, environment));
+        self.materials.iter().enumerate().filter(move |(material, _)| is_used(*material))
     }
 
     /// Whether all materials can be used: better found out before hours are spent on the first one.
@@ -61,7 +103,7 @@ impl Cases {
     /// # Errors
     /// The first that cannot.
     pub fn check_materials(&self, memo: &Memo) -> Result<()> {
-        self.materials.iter().try_for_each(|(_, source)| memo.round(&()).ask(&LoadMaterial(source)).map(drop))
+        self.own_materials().try_for_each(|(_, (_, source))| memo.round(&()).ask(&LoadMaterial(source)).map(drop))
     }
 
     /// Calls `visit` for each combination of material, scene and environment, the last one changing fastest.
@@ -77,8 +119,10 @@ impl Cases {
         let observer = &OnlyCancels(observer);
         let round = memo.round(observer);
         let mut environments = Vec::new();
-        for (name, source) in &self.environments {
-            environments.push((name, round.ask(&LoadEnvironment(source))?, None));
+        for (index, (name, source)) in self.environments.iter().enumerate() {
+            if (0..self.materials.len()).any(|material| self.has(material, index)) {
+                environments.push((index, name, round.ask(&LoadEnvironment(source))?, None));
+            }
         }
         let mut scenes = Vec::new();
         for (name, scene) in &self.scenes {
@@ -86,7 +130,7 @@ impl Cases {
             scenes.push((name, self.prepare_scene(scene, &round)?, display));
         }
         self.check_materials(memo)?;
-        for (material_name, source) in &self.materials {
+        for (number, (material_name, source)) in self.own_materials() {
             let brdf = memo.round(observer).ask(&LoadMaterial(source))?;
             let mut material = vec![PreparedMaterial::new(material_name.clone(), brdf)];
             let mut tables = Vec::new();
@@ -94,7 +138,8 @@ impl Cases {
                 // The scene borrows the material and the environment while they are looked at together.
                 std::mem::swap(&mut prepared.materials, &mut material);
                 prepared.place_tangents(&round)?;
-                for (environment_name, environment, renderer) in &mut environments {
+                let own = environments.iter_mut().filter(|(environment, ..)| self.has(number, *environment));
+                for (_, environment_name, environment, renderer) in own {
                     observer.check()?;
                     std::mem::swap(&mut prepared.environment, environment);
                     visit(&mut Place {
@@ -163,8 +208,8 @@ impl Place<'_> {
     /// # Errors
     /// A number of threads that is out of range, or cancelled.
     pub fn choose(&mut self, estimator: Estimator) -> Result<()> {
-        let Estimator { method, count } = estimator;
-        let sampling = Sampling { count, seed: self.cases.seed };
+        let Estimator { variant: Variant { method, pattern }, count } = estimator;
+        let sampling = Sampling { count, seed: self.cases.seed, pattern };
         let threads = ask_threads(
             &self.round(),
             method,
@@ -192,5 +237,22 @@ impl Place<'_> {
         let renderer = DeviceScene::new(device, self.prepared, &self.round())?;
         *self.renderer = Some(renderer.clone());
         Ok(renderer)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shards_have_each_combination_once() {
+        for (count, length) in [(1, 4), (2, 4), (3, 7), (7, 3), (5, 0), (100, 2000)] {
+            let parts = (1..=count).map(|number| Shard::new(number, count).unwrap().of(length));
+            assert!(parts.clone().flatten().eq(0..length), "{count} of {length}");
+            let sizes: Vec<_> = parts.map(|part| part.len()).collect();
+            assert!(sizes.iter().max().unwrap() - sizes.iter().min().unwrap() <= 1, "{sizes:?}");
+        }
+        assert!(Shard::new(0, 2).is_none() && Shard::new(3, 2).is_none() && Shard::new(1, 0).is_none());
+        assert_eq!(Shard::new(1, 1), Some(Shard::WHOLE));
     }
 }

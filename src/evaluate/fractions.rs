@@ -69,7 +69,7 @@ pub fn run(
                     material: place.material.to_owned(),
                     environment: place.environment.to_owned(),
                     scene: place.scene.to_owned(),
-                    method: estimator.method.name(),
+                    method: estimator.variant.method.name(),
                     count: estimator.count,
                     bits,
                     rms,

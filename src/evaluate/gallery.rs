@@ -3,6 +3,7 @@ use std::sync::Arc;
 
 use image::RgbImage;
 
+use super::Row;
 use super::cases::{Cases, Estimator};
 use super::sheet::{Sheet, Tile};
 use super::sweep::Measured;
@@ -108,6 +109,29 @@ pub fn comparison_sheets(measured: &Measured) -> Vec<Named> {
         rows.push(("reference".to_owned(), last));
         let headings = counts.iter().map(|count| format!("n = {count}")).collect();
         (place.join("_"), Sheet { headings, rows }.draw())
+    };
+    measured.references.iter().map(sheet).collect()
+}
+
+/// For each place in `measured`, whose pictures were kept, a picture by each method at the highest of its counts, with what it took and its
+/// RMS below, and the reference; called after material, environment and scene, and `side_by_side`.
+pub fn side_by_side_sheets(measured: &Measured) -> Vec<Named> {
+    const COLUMNS: usize = 3;
+    let sheet = |(place, reference): &([String; 3], RgbImage)| {
+        let [material, environment, scene] = place;
+        let all = measured.rows.iter().zip(&measured.pictures);
+        let here =
+            all.filter(|(row, _)| (&row.material, &row.environment, &row.scene) == (material, environment, scene));
+        let best_of =
+            |method: &String| here.clone().filter(|(row, _)| row.method == *method).max_by_key(|(row, _)| row.threads);
+        let best = in_order(here.clone().map(|(row, _)| &row.method)).into_iter().filter_map(best_of);
+        let tile = |(row, picture): (&Row, &RgbImage)| {
+            let Row { method, threads, gpu_ms, rms, .. } = row;
+            Tile { picture: picture.clone(), caption: format!("{method} {threads}: {gpu_ms:.0} ms, RMS {rms:.4}") }
+        };
+        let truth = Tile { picture: reference.clone(), caption: "reference".to_owned() };
+        let tiles = best.map(tile).chain([truth]).collect();
+        (format!("{}_side_by_side", place.join("_")), Sheet::of(tiles, COLUMNS).draw())
     };
     measured.references.iter().map(sheet).collect()
 }

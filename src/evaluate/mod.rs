@@ -29,6 +29,7 @@ pub mod live;
 pub mod material_curves;
 pub mod material_fit;
 pub mod material_plot;
+mod merge;
 pub mod metrics;
 pub mod plots;
 pub mod reference;
@@ -41,8 +42,9 @@ pub mod stress;
 pub mod sweep;
 pub mod tables;
 
-pub use cases::{Cases, Estimator, Place};
+pub use cases::{Cases, Estimator, Place, Shard};
 pub use difference::difference_picture;
+pub use merge::merged;
 pub use metrics::{Comparable, Display, Metrics, compare};
 pub use reference_picture::{ReferencePicture, reference_picture};
 pub use sweep::{Row, Sweep};

@@ -145,12 +145,12 @@ pub fn run(
             advance()?;
         }
         timings.frames.extend(take_turns(entrants, device, speed.repeat, &mut advance)?);
-        for &method in &speed.cases.methods {
+        for &variant in &speed.cases.methods {
             for (growing, what, steps) in SERIES {
                 let mut entrants = Vec::new();
                 for &step in steps {
                     let entrant = |place: &mut Place| {
-                        place.choose(Estimator { method, count: growing.count(step, speed.threads) })?;
+                        place.choose(Estimator { variant, count: growing.count(step, speed.threads) })?;
                         Entrant::new(device, place)
                     };
                     entrants.push(growing.at(step, place, entrant)?);
@@ -239,7 +239,7 @@ impl Entrant {
         time_bare_lookups(device, &floor)?;
         let triangles = |object: &PlacedMesh| prepared.meshes[object.mesh].1.indices.len() as u64 / 3;
         let frame = TimedFrame {
-            method: prepared.method.name().to_owned(),
+            method: prepared.variant().name(),
             threads,
             material: place.material.to_owned(),
             environment: place.environment.to_owned(),

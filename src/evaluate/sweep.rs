@@ -1,4 +1,5 @@
 //! Error and time of every method at every number of threads, over materials, environments and scenes.
+use std::fmt;
 use std::sync::Arc;
 
 use image::RgbImage;
@@ -11,6 +12,7 @@ use super::reference_picture::ReferencePicture;
 use super::sheet::over_grey;
 use crate::error::Result;
 use crate::memo::{Memo, Round};
+use crate::passes::View;
 use crate::pipeline::{Rendering, Wanted};
 use crate::prepare::Prepared;
 use crate::progress::Observer;
@@ -69,9 +71,37 @@ pub struct Row {
     /// Pixels that see a surface; 0 in measurements that were written before this was counted.
     #[serde(default)]
     pub covered_pixels: u64,
+    /// How it was measured; none in measurements that were written before this was kept.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub settings: Option<Settings>,
     /// What `rms` was expected to be, where that was asked for: see [`TrueSample::expected_rms`].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub expected_rms: Option<f64>,
+}
+
+/// What measurements that are compared or averaged have in common.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Settings {
+    /// Columns of the picture.
+    pub width: u32,
+    /// Rows of it.
+    pub height: u32,
+    /// Sub-pixels per axis.
+    pub subpixels: u32,
+    /// Of whatever is random.
+    pub seed: u64,
+    /// Times are medians over so many frames.
+    pub repeat: u32,
+    /// Whether background pixels count.
+    pub whole_picture: bool,
+}
+
+impl fmt::Display for Settings {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let Self { width, height, subpixels, seed, repeat, whole_picture } = self;
+        let background = if *whole_picture { ", with background" } else { "" };
+        write!(f, "{width}x{height} pixels of {subpixels} x {subpixels}, seed {seed}, {repeat} frames{background}")
+    }
 }
 
 impl Row {
@@ -134,7 +164,8 @@ pub fn run(
             let metrics = compare(&comparable(&rendering.radiance), &truth, !sweep.whole_picture)
                 .map_err(|error| error.within(format!("{} on {}", place.material, place.scene)))?;
             let expected_rms = sample.as_ref().map(|sample| sample.expected_rms(&rendering.radiance));
-            measured.rows.push(Row { expected_rms, ..row(place, &metrics, &rendering) });
+            let settings = Some(sweep.settings(place.prepared));
+            measured.rows.push(Row { settings, expected_rms, ..row(place, &metrics, &rendering) });
             if sweep.keep_pictures {
                 measured.pictures.push(over_grey(&rendering.radiance, width, height, display));
             }
@@ -149,12 +180,18 @@ impl Sweep {
     pub fn row_count(&self) -> usize {
         self.cases.estimators().len() * self.cases.place_count()
     }
+
+    fn settings(&self, prepared: &Prepared) -> Settings {
+        let &View { width, height, subpixels, .. } = &prepared.view;
+        let &Self { repeat, whole_picture, .. } = self;
+        Settings { width, height, subpixels, seed: self.cases.seed, repeat, whole_picture }
+    }
 }
 
 fn row(place: &Place, metrics: &Metrics, rendering: &Rendering) -> Row {
     let &Metrics { rms, rms_linear, max, ssim, flip, nan, .. } = metrics;
     Row {
-        method: place.prepared.method.name().to_owned(),
+        method: place.prepared.variant().name(),
         threads: place.prepared.sampling.count,
         material: place.material.to_owned(),
         environment: place.environment.to_owned(),
@@ -169,6 +206,7 @@ fn row(place: &Place, metrics: &Metrics, rendering: &Rendering) -> Row {
         frame_ms: rendering.frame_ms,
         lookups: rendering.lookups,
         covered_pixels: rendering.counters.covered_pixels(),
+        settings: None,
         expected_rms: None,
     }
 }

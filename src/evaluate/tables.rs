@@ -293,6 +293,7 @@ pub(super) mod tests {
                             frame_ms: 1.0 + cost * f64::from(threads),
                             lookups: u64::from(threads) * 1000,
                             covered_pixels: 800,
+                            settings: None,
                             expected_rms: None,
                         });
                     }

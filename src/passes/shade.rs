@@ -6,6 +6,7 @@ use crate::brdf::{Brdf, MaterialRecord, Tabulated, ThreadTableRecord, merl};
 use crate::graph::{BufferDesc, BufferHandle, FrameGraph, ImageDesc, ImageHandle};
 use crate::memo::Keyed;
 use crate::method::Method;
+use crate::scene::Pattern;
 use crate::threads::{SliceTable, SplitSum, Threads};
 use crate::vulkan::{self, Bound, Buffer, ComputePipeline, Device, Sampler, SamplerKind};
 use ash::vk;
@@ -81,7 +82,7 @@ impl DeviceMaterials {
             records.push(record);
             if lookups.slices {
                 slices.extend(SliceTable::new(brdf).cdfs);
-            } else if lookups.split_sums {
+            } else if lookups.split_sum {
                 slices.extend(SplitSum::new(brdf).device_floats());
             }
         }
@@ -92,7 +93,7 @@ impl DeviceMaterials {
             records: storage("materials", bytemuck::cast_slice(&records))?,
             threads: optional("threads", bytemuck::cast_slice(&threads.words))?,
             slices: optional("slices", bytemuck::cast_slice(&slices))?,
-            slices_name: if lookups.split_sums { "SplitSums" } else { "Slices" },
+            slices_name: if lookups.split_sum { "SplitSums" } else { "Slices" },
             measured_tables: measured.upload(device, "measured BRDFs")?,
             made_tables: made.upload(device, "tabulated BRDFs")?,
             table_sampler: Sampler::new(device, "brdf tables", SamplerKind::WrappedLinear)?,
@@ -131,13 +132,15 @@ impl ThreadWords {
     }
 }
 
-/// How a method samples: nothing that would need another shader.
+/// How a method samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Sampling {
     /// Threads of a pixel, or samples of methods that have none.
     pub count: u32,
     /// What the random numbers of those start from.
     pub seed: u64,
+    /// Where samples are drawn, by methods that have the choice. The shader is specialised by it.
+    pub pattern: Pattern,
 }
 
 /// What the pass is made of.

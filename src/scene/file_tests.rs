@@ -1,7 +1,7 @@
 //! Scene files: all keys are read, written and checked.
 use glam::{DVec3, Vec3};
 
-use super::super::Background;
+use super::super::{Background, Pattern};
 use super::*;
 
 const FULL: &str = r#"
@@ -25,6 +25,7 @@ const FULL: &str = r#"
     method = "paper"
     threads = 64
     seed = 7
+    pattern = "fixed"
     [[material]]
     name = "measured"
     file = "x.binary"
@@ -72,7 +73,10 @@ fn every_key_is_read_and_paths_start_at_the_file() {
     let expected =
         EnvironmentSettings { source: Source::File("/base/maps/x.hdr".into()), rotation_deg: -30.0, intensity: 2.0 };
     assert_eq!(scene.environment, expected);
-    assert_eq!(scene.shading, ShadingSettings { method: "paper".into(), threads: Some(64), seed: 7 });
+    assert_eq!(
+        scene.shading,
+        ShadingSettings { method: "paper".into(), threads: Some(64), seed: 7, pattern: Pattern::Fixed }
+    );
     assert_eq!(scene.materials[0].source, MaterialSource::File("/base/x.binary".into()));
     let MaterialSource::Model { model, parameters } = &scene.materials[1].source else { panic!("not a model") };
     assert_eq!((model.as_str(), parameters["alpha"].as_float(), parameters.len()), ("conductor", Some(0.1), 4));

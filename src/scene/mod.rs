@@ -12,11 +12,13 @@ pub mod camera;
 mod file;
 pub mod mesh;
 mod parameter;
+mod pattern;
 mod tangent_rule;
 mod texture_tangents;
 
 pub use camera::Camera;
 pub use mesh::Mesh;
+pub use pattern::Pattern;
 pub use tangent_rule::TangentRule;
 pub use texture_tangents::TexturedMesh;
 
@@ -148,6 +150,8 @@ pub struct ShadingSettings {
     /// Threads, or samples of methods that have none, 1 to [`MAX_SAMPLES`]; without it, as many as suit the method.
     #[serde(deserialize_with = "file::threads", skip_serializing_if = "Option::is_none")]
     pub threads: Option<u32>,
+    /// Where methods that can choose draw their samples.
+    pub pattern: Pattern,
     /// Seed of whatever is random.
     pub seed: u64,
 }
@@ -300,7 +304,7 @@ impl EnvironmentSettings {
 
 impl Default for ShadingSettings {
     fn default() -> Self {
-        Self { method: DEFAULT_METHOD.into(), threads: None, seed: 0 }
+        Self { method: DEFAULT_METHOD.into(), threads: None, pattern: Pattern::default(), seed: 0 }
     }
 }
 

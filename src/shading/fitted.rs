@@ -81,7 +81,7 @@ impl<'a> Lobe<'a> {
     /// Twin of `away_from`.
     fn away(&self, direction: Vec3) -> f32 {
         let (surface, record) = (&self.point.surface, self.point.record());
-        let is_isotropic = matches!(self.point.threads(), Some(Threads::Fitted(table)) if table.azimuths == 1);
+        let is_isotropic = self.point.threads().and_then(Threads::fitted).is_some_and(|table| table.azimuths == 1);
         if is_isotropic {
             return direction.distance(self.mirror);
         }
@@ -221,7 +221,7 @@ fn between(a: UnpackedKernel, b: UnpackedKernel, t: f32) -> UnpackedKernel {
 /// # Panics
 /// A scene prepared for another method has other threads.
 pub(super) fn estimate(point: &Point) -> Vec3 {
-    let Some(Threads::Fitted(threads)) = point.threads() else { panic!("fitted threads are there") };
+    let threads = point.threads().and_then(Threads::fitted).expect("fitted threads or Gaussians are there");
     let surface = &point.surface;
     let light = blurred_light(point.twin);
     let sources = &point.twin.sources;

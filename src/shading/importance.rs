@@ -7,9 +7,10 @@ use super::{Point, importance_sampling::SliceRows};
 pub(super) fn estimate(point: &Point) -> Vec3 {
     let w_o = point.surface.view_direction();
     let rows = SliceRows::new(point.slices(), w_o);
+    let fixed_set = point.fixed_stream();
     let mut sum = Vec3::ZERO;
     for k in point.partition() {
-        let Some((w_i, p)) = rows.sample_brdf(w_o, point.random_bits(k)) else { continue };
+        let Some((w_i, p)) = rows.sample_brdf(w_o, point.sample_bits(&fixed_set, k)) else { continue };
         sum += point.brdf(w_i, w_o) * (w_i.z / p) * point.environment_radiance(point.surface.frame * w_i);
     }
     sum / point.sample_count() as f32

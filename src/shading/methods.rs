@@ -11,14 +11,25 @@ methods! {
         threads: Some(ThreadKind::Paper),
         ..Properties::biased("Sample threads as published by Kim, Kyung and Lee (2010), box-filtered lookups.", BOX_FILTERED)
     },
+    gaussian => Gaussian: Properties {
+        threads: Some(ThreadKind::Gaussian),
+        shares_surface: true,
+        ..Properties::biased("Spherical Gaussians fitted to the BRDF itself (Green, Kautz and Durand 2007), looked up as fitted threads.", BLURRED)
+    },
     split_sum => SplitSum: Properties {
         shares_surface: true,
-        ..Properties::biased("The split sum of engines (Karis 2013): the light filtered by the GGX that suits the BRDF best, times the BRDF's albedo.", PREFILTERED)
+        ..Properties::biased("The split sum of engines (Karis 2013): the light filtered by the GGX that suits the BRDF best, times the BRDF's albedo.", SPLIT_SUM)
     },
     uniform => Uniform: Properties::unbiased("Monte Carlo, uniform over the hemisphere.", MAP),
     cosine => Cosine: Properties::unbiased("Monte Carlo, by the cosine to the normal.", MAP),
-    importance => Importance: Properties::unbiased("Monte Carlo by a 2D CDF of BRDF times cosine (Matusik et al. 2003).", MAP.and_slices()),
-    filtered => Filtered: Properties::biased("As importance, with filtered lookups (Colbert and Krivanek 2007); biased.", BOX_FILTERED.and_slices()),
+    importance => Importance: Properties {
+        has_pattern: true,
+        ..Properties::unbiased("Monte Carlo by a 2D CDF of BRDF times cosine (Matusik et al. 2003).", MAP.and_slices())
+    },
+    filtered => Filtered: Properties {
+        has_pattern: true,
+        ..Properties::biased("As importance, with filtered lookups (Colbert and Krivanek 2007); biased.", BOX_FILTERED.and_slices())
+    },
     environment => Environment: Properties::unbiased("Monte Carlo by the environment's light (Agarwal et al. 2003).", MAP_BY_LIGHT),
     ris => Ris: Properties {
         older_name: Some("resampled"),

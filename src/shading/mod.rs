@@ -11,10 +11,12 @@ use crate::memo::Round;
 use crate::method::{Lookups, Method};
 use crate::passes::{SMOOTH_DEG, View, smooth_variance};
 use crate::prepare::{Prepared, PreparedMaterial};
+use crate::scene::Pattern;
 use crate::steps::{Tabulate, light};
 use crate::tangent::any_tangent;
 use crate::threads::{SliceTable, SplitSum, Threads};
 use glam::{Mat3, UVec2, Vec2, Vec3, Vec4};
+use low_discrepancy::Stream;
 use random::random_bits;
 
 mod importance_sampling;
@@ -170,7 +172,7 @@ impl<'a> CpuShader<'a> {
             false => Ok(Some(Brdf::Tabulated((*round.ask(&Tabulate(&material.brdf))?).clone()))),
         };
         let split_sums =
-            lookups.split_sums.then(|| materials.iter().map(|material| SplitSum::new(&material.brdf)).collect());
+            lookups.split_sum.then(|| materials.iter().map(|material| SplitSum::new(&material.brdf)).collect());
         Ok(Self {
             prepared,
             light,
@@ -314,6 +316,20 @@ impl Point<'_> {
 
     fn random_bits(&self, index: u32) -> [u32; 4] {
         random_bits(self.subpixel, index, self.twin.prepared.sampling.seed)
+    }
+
+    /// The low-discrepancy set that is the same for all pixels. Twin of `fixed_stream` in glsl/pattern.glsl.
+    fn fixed_stream(&self) -> Stream {
+        Stream::new(UVec2::ZERO, 0, self.twin.prepared.sampling.seed)
+    }
+
+    /// The random words of sample `k`. Twin of `sample_bits` in glsl/pattern.glsl.
+    fn sample_bits(&self, fixed_set: &Stream, k: u32) -> [u32; 4] {
+        if self.twin.prepared.sampling.pattern == Pattern::PerPixel {
+            return self.random_bits(k);
+        }
+        let [x, y, z, w] = fixed_set.bits(k);
+        [z, x, y, w]
     }
 
     /// The pyramid's mean radiance over `solid_angle` (sr) around `direction`.

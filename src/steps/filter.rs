@@ -152,7 +152,7 @@ pub fn light(
             true => Some(blurred_light(round, device, environment, materials)?),
             false => None,
         },
-        prefiltered: match lookups.prefiltered {
+        prefiltered: match lookups.split_sum {
             true => Some(PrefilteredLight {
                 by_ggx: round.ask(&GgxFilter(environment))?,
                 irradiance: round.ask(&Irradiance(environment))?,

@@ -61,7 +61,7 @@ impl Step for DraftThreads<'_> {
     fn make(&self, round: &Round) -> Result<Threads> {
         match &**self.before {
             Threads::Fitted(before) => Ok(Threads::Fitted(draft(self.brdf, before, round.observer())?)),
-            Threads::Paper(_) => Err(Error::input("threads", "of this kind are not drafted", "make them")),
+            _ => Err(Error::input("threads", "of this kind are not drafted", "make them")),
         }
     }
 }

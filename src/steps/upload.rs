@@ -110,7 +110,7 @@ impl Step for UploadLight<'_> {
     fn key(&self, _: &Memo) -> Result<Key> {
         let lookups = self.method.lookups();
         let mut key = on(self.device, "light").key(self.environment.key);
-        for part in [lookups.box_filtered, lookups.blurred, lookups.prefiltered, lookups.map, lookups.aliases] {
+        for part in [lookups.box_filtered, lookups.blurred, lookups.split_sum, lookups.map, lookups.aliases] {
             key = key.number(u64::from(part));
         }
         if let Some(blurred) = &self.light.blurred {

@@ -7,19 +7,19 @@
 //! | 8 | magic `THREADS\0` |
 //! | 4 | u32 format version, now 10 |
 //! | 4 | u32 length H of the header |
-//! | H | header, JSON: `method` ("fitted" or "paper"), `material`, `count`, `rows`, `seed`, and `azimuths` and `sets` if there is more than one |
+//! | H | header, JSON: `method` ("fitted", "paper" or "gaussian"), `material`, `count`, `rows`, `seed`, and `azimuths` and `sets` if there is more than one |
 //! | ... | the rows, then the threads, see below |
 //! | 32 | BLAKE3 digest of everything before |
 //!
 //! Row r is for the view angle theta_o = r 90 deg / rows, in the frame whose z is the normal and in which w_o = (sin theta_o, 0,
 //! cos theta_o). Colours are linear Rec. 709. Thread k of row r is the (r count + k)-th. Of an anisotropic BRDF there are as many rows for
 //! each of 10, 19 or 37 azimuths of w_o from the tangent, every 10 degrees; then those of the second azimuth follow those of the first.
-//! Of fitted threads in several sets thread k is of set k % sets: each set does alone, with as many times the weights as there are sets.
+//! Of fitted threads and Gaussians in several sets thread k is of set k % sets: each set does alone, with as many times the weights as there are sets.
 //!
 //! | method | a row | a thread |
 //! |---|---|---|
 //! | `paper` | albedo, 3 f32 | theta, phi (radians), p (1/sr), 3 f32 |
-//! | `fitted` | albedo, 3 f32; expected relative error, f32 | 3 words, below |
+//! | `fitted`, `gaussian` | albedo, 3 f32; expected relative error, f32 | 3 words, below |
 //!
 //! The words of a fitted thread: its direction's place on the stereographic map, (x, y) / (1.25 (1 + z)), as 16-bit signed normalised
 //! numbers, x in the low half; level and red weight as half floats, level in the low half; green and blue weight as half floats, green
@@ -85,7 +85,7 @@ fn encode(threads: &Threads) -> Vec<u8> {
     let [rows, count] = threads.size();
     let method = threads.kind().name().to_owned();
     let (material, seed, azimuths, sets) = match threads {
-        Threads::Fitted(table) => (table.material.clone(), 0, table.azimuths, table.sets),
+        Threads::Fitted(table) | Threads::Gaussian(table) => (table.material.clone(), 0, table.azimuths, table.sets),
         Threads::Paper(table) => (table.material.clone(), table.seed, 1, 1),
     };
     let header = serde_json::to_vec(&Header { method, material, count, rows, seed, azimuths, sets });
@@ -95,7 +95,7 @@ fn encode(threads: &Threads) -> Vec<u8> {
     bytes.extend((header.len() as u32).to_le_bytes());
     bytes.extend(header);
     let words = match threads {
-        Threads::Fitted(table) => table.file_words(),
+        Threads::Fitted(table) | Threads::Gaussian(table) => table.file_words(),
         Threads::Paper(table) => table.file_words(),
     };
     bytes.extend(words.iter().flat_map(|word| word.to_le_bytes()));
@@ -120,26 +120,27 @@ fn decode(bytes: &[u8]) -> Result<Threads, String> {
     let (header, payload) = rest.split_at_checked(u32::from_le_bytes(length) as usize).ok_or("is cut short")?;
     let header: Header = serde_json::from_slice(header).map_err(|error| format!("has a bad header ({error})"))?;
     let Header { method, material, count, rows, seed, azimuths, sets } = header;
-    let kind = [ThreadKind::Fitted, ThreadKind::Paper].into_iter().find(|kind| kind.name() == method);
+    let kind = ThreadKind::ALL.into_iter().find(|kind| kind.name() == method);
     let kind = kind.ok_or_else(|| format!("holds threads of the unknown method {method:?}"))?;
     let words_a_row = match kind {
-        ThreadKind::Fitted => FittedTable::FILE_ROW_WORDS,
+        ThreadKind::Fitted | ThreadKind::Gaussian => FittedTable::FILE_ROW_WORDS,
         ThreadKind::Paper => ThreadTable::FILE_ROW_WORDS,
     };
     let per_row = count.checked_mul(3).and_then(|words| words.checked_add(words_a_row));
     let all_rows = rows.checked_mul(azimuths);
     let expected = per_row.and_then(|words| words.checked_mul(all_rows?)?.checked_mul(4));
     let is_possible = (azimuths, sets) == (1, 1)
-        || kind == ThreadKind::Fitted && [1, 10, 19, 37].contains(&azimuths) && (1..=count).contains(&sets);
+        || kind.are_kernels() && [1, 10, 19, 37].contains(&azimuths) && (1..=count).contains(&sets);
     if count == 0 || rows == 0 || !is_possible || expected != Some(payload.len()) {
         return Err("has a header that does not fit its content".into());
     }
     let words: Vec<u32> = payload.as_chunks().0.iter().map(|&word| u32::from_le_bytes(word)).collect();
     let (of_rows, of_threads) = words.split_at(words_a_row * rows * azimuths);
     Ok(match kind {
-        ThreadKind::Fitted => {
+        ThreadKind::Fitted | ThreadKind::Gaussian => {
             let table = FittedTable::from_file_words(of_rows, of_threads)?;
-            Threads::Fitted(FittedTable { rows, azimuths, count, sets, material, ..table })
+            let table = FittedTable { rows, azimuths, count, sets, material, ..table };
+            if kind == ThreadKind::Fitted { Threads::Fitted(table) } else { Threads::Gaussian(table) }
         }
         ThreadKind::Paper => {
             let table = ThreadTable::from_file_words(of_rows, of_threads)?;
@@ -158,8 +159,8 @@ mod tests {
         ThreadTable { rows: 3, count: 2, seed: 9, material: "a \"name\"".into(), albedo: vec![[0.5; 3]; 3], samples }
     }
 
-    fn fitted() -> Threads {
-        Threads::Fitted(FittedTable {
+    fn fitted() -> FittedTable {
+        FittedTable {
             rows: 2,
             azimuths: 1,
             count: 1,
@@ -168,14 +169,14 @@ mod tests {
             albedo: vec![[0.1, 0.2, 0.4]; 2],
             relative_error: vec![1e-3; 2],
             kernels: vec![PackedKernel([0x1234_5678, 0x3800_4000, 0x3400_3000]); 2],
-        })
+        }
     }
 
     #[test]
     fn a_table_is_read_as_it_was_written() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.threads");
-        for threads in [Threads::Paper(table()), fitted()] {
+        for threads in [Threads::Paper(table()), Threads::Fitted(fitted()), Threads::Gaussian(fitted())] {
             write(&threads, &path).unwrap();
             assert_eq!(read(&path).unwrap(), threads);
         }

@@ -60,21 +60,32 @@ pub enum ThreadKind {
     Fitted,
     /// The paper's.
     Paper,
+    /// Gaussians fitted to the BRDF itself, not to its answers to lights: else as [`Self::Fitted`].
+    Gaussian,
 }
 
 impl ThreadKind {
+    /// All kinds.
+    pub const ALL: [Self; 3] = [Self::Fitted, Self::Paper, Self::Gaussian];
+
+    /// Whether they are kernels of the blurred environment, a [`FittedTable`].
+    pub fn are_kernels(self) -> bool {
+        self != Self::Paper
+    }
+
     /// What files call it, and the method that shades by it.
     pub fn name(self) -> &'static str {
         match self {
             Self::Fitted => "fitted",
             Self::Paper => "paper",
+            Self::Gaussian => "gaussian",
         }
     }
 
     /// The number of threads where nobody asks for another: the paper's; fitted ones do with fewer.
     pub fn default_count(self) -> usize {
         match self {
-            Self::Fitted => 16,
+            Self::Fitted | Self::Gaussian => 16,
             Self::Paper => 100,
         }
     }
@@ -82,19 +93,21 @@ impl ThreadKind {
     /// Most threads that a table can have.
     pub fn max_count(self) -> usize {
         match self {
-            Self::Fitted => fitted::MAX_COUNT,
+            Self::Fitted | Self::Gaussian => fitted::MAX_COUNT,
             Self::Paper => MAX_COUNT,
         }
     }
 }
 
-/// Threads of either kind.
+/// Threads of any kind.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Threads {
     /// Fitted to the BRDF.
     Fitted(FittedTable),
     /// The paper's.
     Paper(ThreadTable),
+    /// Gaussians fitted to the BRDF itself.
+    Gaussian(FittedTable),
 }
 
 impl Threads {
@@ -102,14 +115,15 @@ impl Threads {
     pub fn kind(&self) -> ThreadKind {
         match self {
             Self::Fitted(_) => ThreadKind::Fitted,
+            Self::Gaussian(_) => ThreadKind::Gaussian,
             Self::Paper(_) => ThreadKind::Paper,
         }
     }
 
-    /// These, if they are fitted.
+    /// These, if they are kernels: fitted, or Gaussians.
     pub fn fitted(&self) -> Option<&FittedTable> {
         match self {
-            Self::Fitted(table) => Some(table),
+            Self::Fitted(table) | Self::Gaussian(table) => Some(table),
             Self::Paper(_) => None,
         }
     }
@@ -117,7 +131,7 @@ impl Threads {
     /// Number of view angles and of threads.
     pub fn size(&self) -> [usize; 2] {
         match self {
-            Self::Fitted(table) => [table.rows, table.count],
+            Self::Fitted(table) | Self::Gaussian(table) => [table.rows, table.count],
             Self::Paper(table) => [table.rows, table.count],
         }
     }
@@ -125,7 +139,7 @@ impl Threads {
     /// Where `thread` looks in `row`, unit, in the shading frame.
     pub fn direction(&self, row: usize, thread: usize) -> DVec3 {
         match self {
-            Self::Fitted(table) => table.row(row)[thread].unpack().direction().as_dvec3(),
+            Self::Fitted(table) | Self::Gaussian(table) => table.row(row)[thread].unpack().direction().as_dvec3(),
             Self::Paper(table) => table.row(row)[thread].direction(),
         }
     }
@@ -135,7 +149,7 @@ impl Threads {
     pub fn seen_from(&self, theta_o: f64, phi_o: f64) -> Vec<(DVec3, f64)> {
         let count = self.size()[1];
         match self {
-            Self::Fitted(table) => {
+            Self::Fitted(table) | Self::Gaussian(table) => {
                 let kernels = table.seen_from(theta_o, phi_o).into_iter();
                 let kernels: Vec<_> = kernels.map(|kernel| (kernel.direction, luminance(kernel.weight))).collect();
                 let total: f64 = kernels.iter().map(|(_, weight)| weight).sum();
@@ -151,7 +165,7 @@ impl Threads {
     /// The words of the shader's buffer of threads: see [`FittedTable::device_words`] and [`ThreadTable::device_words`].
     pub fn device_words(&self) -> Vec<u32> {
         match self {
-            Self::Fitted(table) => table.device_words(),
+            Self::Fitted(table) | Self::Gaussian(table) => table.device_words(),
             Self::Paper(table) => table.device_words(),
         }
     }
@@ -159,7 +173,7 @@ impl Threads {
     /// How many threads of a row that buffer holds: all but those that have no weight.
     pub fn device_count(&self) -> usize {
         match self {
-            Self::Fitted(table) => table.used_count(),
+            Self::Fitted(table) | Self::Gaussian(table) => table.used_count(),
             Self::Paper(table) => table.count,
         }
     }
@@ -167,7 +181,7 @@ impl Threads {
     /// Words of an element of that buffer, as the shader declares it.
     pub fn device_element_words(&self) -> usize {
         match self {
-            Self::Fitted(_) => FittedTable::DEVICE_ELEMENT_WORDS,
+            Self::Fitted(_) | Self::Gaussian(_) => FittedTable::DEVICE_ELEMENT_WORDS,
             Self::Paper(_) => ThreadTable::DEVICE_ELEMENT_WORDS,
         }
     }
@@ -175,7 +189,7 @@ impl Threads {
     /// The same, with this name of the material.
     pub fn of_material(mut self, name: &str) -> Self {
         match &mut self {
-            Self::Fitted(table) => name.clone_into(&mut table.material),
+            Self::Fitted(table) | Self::Gaussian(table) => name.clone_into(&mut table.material),
             Self::Paper(table) => name.clone_into(&mut table.material),
         }
         self
@@ -189,6 +203,7 @@ impl Threads {
 pub fn generate(brdf: &Brdf, settings: &ThreadSettings, observer: &dyn Observer) -> Result<Threads> {
     Ok(match settings.kind {
         ThreadKind::Fitted => Threads::Fitted(fitted::generate(brdf, settings, observer)?),
+        ThreadKind::Gaussian => Threads::Gaussian(fitted::generate(brdf, settings, observer)?),
         ThreadKind::Paper => Threads::Paper(generate::generate(brdf, settings, observer)?),
     })
 }
@@ -204,7 +219,7 @@ pub struct ThreadSettings {
     pub rows: usize,
     /// Where the first row's points start.
     pub seed: u64,
-    /// How many sets fitted threads are made in, each of which does alone: thread k is of set k % `sets`. The paper's need none.
+    /// How many sets fitted threads and Gaussians are made in, each of which does alone: thread k is of set k % `sets`. The paper's need none.
     pub sets: usize,
 }
 
@@ -217,10 +232,7 @@ impl Default for ThreadSettings {
 impl ThreadSettings {
     /// The same, in the sets that a picture of `brdf` with `subpixels` x `subpixels` to the pixel has them in.
     pub fn for_picture(self, brdf: &Brdf, subpixels: u32) -> Self {
-        let sets = match self.kind {
-            ThreadKind::Fitted => fitted::set_count(brdf, self.count, subpixels),
-            ThreadKind::Paper => 1,
-        };
+        let sets = if self.kind.are_kernels() { fitted::set_count(brdf, self.count, subpixels) } else { 1 };
         Self { sets, ..self }
     }
 

@@ -101,7 +101,8 @@ impl Answers {
                 (direction, weight / total, solid_angle_sr / TAU)
             })
             .collect();
-        let TestLights { direction: [xs, ys, zs], weight, cosine, response: [red, green, blue], unit } = &self.lights;
+        let TestLights { direction: [xs, ys, zs], weight, cosine, response: [red, green, blue], unit, .. } =
+            &self.lights;
         let residual = |scale: usize, j: usize| {
             let light = dvec3(xs[j].into(), ys[j].into(), zs[j].into());
             let tap = |&(direction, share, variance): &(DVec3, f64, f64)| {

@@ -5,8 +5,8 @@ use crate::error::{Error, Result};
 use crate::method::Method;
 use crate::prepare::check_count;
 use crate::scene::{
-    Background, Camera, EXPOSURE, GAMMA, INTENSITY, MAX_SAMPLES, MAX_SIZE_PX, MAX_SUBPIXELS, MaterialSource, Scene,
-    Source,
+    Background, Camera, EXPOSURE, GAMMA, INTENSITY, MAX_SAMPLES, MAX_SIZE_PX, MAX_SUBPIXELS, MaterialSource, Pattern,
+    Scene, Source,
 };
 use std::fmt::Display;
 use std::ops::RangeInclusive;
@@ -40,6 +40,8 @@ pub enum Change {
     Method(String),
     /// Number of threads or samples; none for as many as suit the method.
     Threads(Option<u32>),
+    /// Where methods that can choose draw their samples.
+    Pattern(Pattern),
     /// Seed of whatever is random.
     Seed(u64),
     /// Columns and rows of the image.
@@ -99,6 +101,7 @@ impl Change {
                 count.map(|count| within("threads", count, &(1..=MAX_SAMPLES))).transpose()?;
                 shading.threads = *count;
             }
+            Self::Pattern(pattern) => shading.pattern = *pattern,
             Self::Seed(seed) => shading.seed = *seed,
             Self::Size(width, height) => {
                 let side = |side| within("size", side, &(1..=MAX_SIZE_PX));

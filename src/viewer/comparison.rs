@@ -116,7 +116,7 @@ fn render(prepared: &Prepared, device: &Arc<Device>, round: &Round) -> Result<Ve
 }
 
 fn name_of(prepared: &Prepared) -> String {
-    format!("{}, {}", prepared.method.name(), prepared.sampling.count)
+    format!("{}, {}", prepared.variant().name(), prepared.sampling.count)
 }
 
 /// Compares `own` with `other`, of which every `step`-th pixel along each axis counts.

@@ -86,12 +86,13 @@ impl Shader {
         VulkanError::Shader { shader: self.name.to_owned(), problem: problem.to_string() }
     }
 
-    /// Whether the shader declares a binding of that name: what no shader declares need not be made.
+    /// Whether the shader declares a binding or a specialisation constant of that name: what no shader declares need not be made.
     ///
     /// # Errors
     /// SPIR-V that cannot be read.
-    pub fn declares(&self, binding: &str) -> Result<bool> {
-        Ok(self.reflect()?.bindings.contains_key(binding))
+    pub fn declares(&self, name: &str) -> Result<bool> {
+        let interface = self.reflect()?;
+        Ok(interface.bindings.contains_key(name) || interface.constants.contains_key(name))
     }
 
     /// Reads the interface out of the SPIR-V.

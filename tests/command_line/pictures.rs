@@ -212,7 +212,7 @@ fn a_saved_scene_renders_to_the_same_bits() {
     let folder = workplace();
     write_two_spheres(&folder);
     // What the flags say, said by a scene that was saved, in the same folder and in another.
-    let flags = "--size 96x72 --threads 8 --environment map.hdr --material copper --method paper --rotation 33.3 --exposure 0.7 --gamma 1.9 --subpixels 3 --seed 5";
+    let flags = "--size 96x72 --threads 8 --environment map.hdr --material copper --method filtered --pattern fixed --rotation 33.3 --exposure 0.7 --gamma 1.9 --subpixels 3 --seed 5";
     printed(&mut render(&folder, &format!("{flags} -o flags.exr")));
     printed(&mut render(&folder, &format!("{flags} -o flags.png")));
     let mut scene = Scene::default();
@@ -221,7 +221,7 @@ fn a_saved_scene_renders_to_the_same_bits() {
     scene.environment.source = Source::File(folder.path().join("map.hdr"));
     scene.environment.rotation_deg = 33.3;
     scene.image = ImageSettings { width: 96, height: 72, subpixels: 3, exposure: 0.7, gamma: 1.9, ..scene.image };
-    scene.shading = ShadingSettings { method: "paper".into(), threads: Some(8), seed: 5 };
+    scene.shading = ShadingSettings { method: "filtered".into(), threads: Some(8), pattern: Pattern::Fixed, seed: 5 };
     let two_spheres = Scene::load(&folder.path().join("scene/scene.toml")).unwrap();
     printed(&mut render(&folder, "scene/scene.toml -o two.exr"));
     fs::create_dir(folder.path().join("elsewhere")).unwrap();

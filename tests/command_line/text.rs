@@ -51,7 +51,7 @@ fn threads_are_written_and_read_back_the_same() {
         let threads = threadlight::low_level::threads::read(&folder.path().join("a.threads")).unwrap();
         assert_eq!((threads.kind().name(), threads.size()), (method, [90, 4]));
         match threads {
-            Threads::Fitted(table) => assert_eq!(table.material, "gold"),
+            Threads::Fitted(table) | Threads::Gaussian(table) => assert_eq!(table.material, "gold"),
             Threads::Paper(table) => assert_eq!((table.material.as_str(), table.seed), ("gold", 3)),
         }
     }

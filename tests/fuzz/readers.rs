@@ -358,7 +358,7 @@ pub fn threads() -> Reader {
             };
             let (isotropic, anisotropic) = (Threads::Fitted(fitted(2, 1)), Threads::Fitted(fitted(1, 10)));
             let file = |threads| written("x.threads", |path| threads::write(&threads, path).expect("a file"));
-            vec![file(Threads::Paper(paper)), file(isotropic), file(anisotropic)]
+            vec![file(Threads::Paper(paper)), file(isotropic), file(anisotropic), file(Threads::Gaussian(fitted(2, 1)))]
         },
         words: &[
             "\"rows\":",

@@ -9,9 +9,9 @@ use std::sync::Arc;
 use threadlight::low_level::environment;
 use threadlight::low_level::evaluate::reference::{Processor, ReferenceSettings};
 use threadlight::low_level::evaluate::sweep::Measured;
-use threadlight::low_level::evaluate::{Cases, Sweep, reference_picture, sweep};
+use threadlight::low_level::evaluate::{Cases, Shard, Sweep, reference_picture, sweep};
 use threadlight::low_level::memo::{Memo, Round};
-use threadlight::low_level::method::Method;
+use threadlight::low_level::method::{Method, Variant};
 use threadlight::low_level::output;
 use threadlight::low_level::progress::Observer;
 use threadlight::low_level::scene::{MAX_SUBPIXELS, MaterialSource, ObjectSettings, Scene, Source, mesh};
@@ -26,7 +26,7 @@ pub struct CasesArguments {
     materials: Vec<String>,
     #[arg(long, help = nameable::environment("Environments, each"), value_name = "LIST", value_delimiter = ',', default_value = "studio")]
     environments: Vec<String>,
-    /// Shading methods.
+    /// Shading methods; `filtered_fixed` and `importance_fixed` are those at one set of points for all pixels.
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     methods: Vec<String>,
     /// Numbers of threads, or of samples of the other estimators, each 1 to 1024.
@@ -63,10 +63,10 @@ pub struct Defaults {
 impl CasesArguments {
     pub fn cases(&self, defaults: &Defaults) -> Result<Cases> {
         let methods = match self.methods.as_slice() {
-            [] => defaults.methods.clone(),
-            names => names.iter().map(|name| Method::from_name(name)).collect::<Result<Vec<_>>>()?,
+            [] => defaults.methods.iter().copied().map(Variant::from).collect(),
+            names => names.iter().map(|name| Variant::from_name(name)).collect::<Result<Vec<_>>>()?,
         };
-        if methods.contains(&Method::Reference) {
+        if methods.contains(&Method::Reference.into()) {
             let remedy = "name others; where errors are measured, it is what they are measured against";
             return Err(Error::input("--methods reference", "is the truth, not a method to measure", remedy));
         }
@@ -91,6 +91,7 @@ impl CasesArguments {
                 .map(|(name, text)| Ok((name, self.scene_of(text, size)?)))
                 .collect::<Result<_>>()?,
             seed: self.seed,
+            shard: Shard::WHOLE,
         })
     }
 

@@ -5,7 +5,7 @@ use clap::value_parser;
 use std::io::Write;
 use threadlight::Error;
 use threadlight::low_level::evaluate::sweep::Measured;
-use threadlight::low_level::evaluate::{Sweep, plots, reference, tables};
+use threadlight::low_level::evaluate::{Row, Shard, Sweep, plots, reference, tables};
 use threadlight::low_level::method::Method;
 
 const EXAMPLES: &str = "\
@@ -15,6 +15,7 @@ Without --materials, gold is measured; without --methods, all of them; without -
 Examples:
   threadlight bench error
   threadlight bench error --materials gold,alumina-oxide.binary --environments studio,lebombo.hdr --counts 4,16,64
+  threadlight bench error --materials gold,clay --environments studio,sky --shard 2/4 --json part_2.json
   threadlight bench error --methods paper --scene sphere,dragon.obj --json errors.json --plot plots
 
 Each picture is compared with the reference picture of its material, environment and scene, over the pixels that see a
@@ -28,6 +29,7 @@ The JSON is a list of rows with these fields, in this order:
   gpu_ms                                            time of the passes that make linear radiance
   frame_ms                                          from recording until the picture is read back
   lookups, covered_pixels                           lookups in the environment, and pixels that see a surface
+  settings                                          width, height, subpixels, seed, repeat and whole_picture of the run
   expected_rms                                      only with --expected: what rms was expected to be
 
 The plots are SVG, log-log, a line a method: rms_over_threads.svg (the paper's figure 12) and rms_over_gpu_ms.svg, and
@@ -40,6 +42,9 @@ expected_over_measured.svg.";
 pub struct BenchError {
     #[command(flatten)]
     cases: CasesArguments,
+    /// Measure only part I, from 1, of N of the combinations of materials and environments; `bench report --from` puts parts together.
+    #[arg(long, value_name = "I/N", value_parser = parse_shard)]
+    shard: Option<Shard>,
     #[command(flatten)]
     truth: TruthArguments,
     /// Count background pixels too; they are equal in all pictures.
@@ -59,12 +64,18 @@ impl BenchError {
     pub fn run(self) -> anyhow::Result<()> {
         // Whatever is wrong with the command is said before the work begins.
         self.output.check()?;
-        let cases = self.cases.cases(&Defaults {
+        let mut cases = self.cases.cases(&Defaults {
             materials: vec!["gold"],
             methods: Method::ALL.iter().copied().filter(|method| method.runs_on_gpu()).collect(),
             counts: &[1, 4, 16, 32, 64, 100, 512],
             size: None,
         })?;
+        cases.shard = self.shard.unwrap_or(Shard::WHOLE);
+        if cases.place_count() == 0 {
+            let most = cases.materials.len() * cases.environments.len();
+            let problem = format!("leaves this part without any of {most} combinations of materials and environments");
+            return Err(Error::input("--shard", problem, format!("use at most {most} parts")).into());
+        }
         let sweep = Sweep {
             cases,
             repeat: self.repeat,
@@ -80,20 +91,35 @@ impl BenchError {
         progress.finish();
         // What took hours is not thrown away because it was interrupted; bad input leaves no files behind.
         if !matches!(result, Err(Error::Input { .. })) && !measured.rows.is_empty() {
-            self.write(&measured)?;
+            write(&measured.rows, Some(measured.reference_error), &self.output)?;
         }
         Ok(result?)
     }
+}
 
-    fn write(&self, Measured { rows, reference_error, .. }: &Measured) -> anyhow::Result<()> {
-        let mut out = std::io::stdout().lock();
-        write!(out, "{}", tables::text(&tables::error_tables(rows)))?;
-        writeln!(out, "The reference is within {reference_error:.1e} by its own estimate.")?;
-        self.output.write_json(rows)?;
-        if let Some(folder) = &self.output.plot {
-            let expectations = plots::expectation_chart(rows);
-            plots::write(&plots::error_charts(rows).into_iter().chain(expectations).collect::<Vec<_>>(), folder)?;
-        }
-        Ok(())
+/// Prints the tables of `rows`, and writes what `output` asks for.
+pub(super) fn write(rows: &[Row], reference_error: Option<f64>, output: &OutputArguments) -> anyhow::Result<()> {
+    let mut out = std::io::stdout().lock();
+    write!(out, "{}", tables::text(&tables::error_tables(rows)))?;
+    if let Some(error) = reference_error {
+        writeln!(out, "The reference is within {error:.1e} by its own estimate.")?;
     }
+    write_files(rows, output)
+}
+
+/// Writes the JSON and the plots of `rows` that `output` asks for.
+pub(super) fn write_files(rows: &[Row], output: &OutputArguments) -> anyhow::Result<()> {
+    output.write_json(&rows)?;
+    if let Some(folder) = &output.plot {
+        let expectations = plots::expectation_chart(rows);
+        plots::write(&plots::error_charts(rows).into_iter().chain(expectations).collect::<Vec<_>>(), folder)?;
+    }
+    Ok(())
+}
+
+/// `2/8`.
+fn parse_shard(text: &str) -> Result<Shard, String> {
+    let numbers = text.split_once('/').and_then(|(number, count)| Some((number.parse().ok()?, count.parse().ok()?)));
+    let shard = numbers.and_then(|(number, count)| Shard::new(number, count));
+    shard.ok_or_else(|| "use part/parts, such as 2/8 for the second of eight".to_owned())
 }

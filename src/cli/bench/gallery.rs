@@ -23,6 +23,7 @@ Examples:
   threadlight bench gallery --plot gallery
   threadlight bench gallery --materials-only --threads 32 --plot gallery
   threadlight bench gallery --materials gold,nickel.binary --compare nickel.binary --environments lebombo.hdr --plot gallery
+  threadlight bench gallery --methods split_sum,filtered_fixed,gaussian,paper,fitted --counts 1,16 --size 320x240 --plot gallery
   threadlight bench gallery --scene dragon.obj --size 320x240 --methods paper,filtered --counts 16,64 --plot gallery
 
 PNG pictures are written into the folder that --plot names:
@@ -30,6 +31,8 @@ PNG pictures are written into the folder that --plot names:
                                         several environments or scenes, materials_ENVIRONMENT_SCENE.png
   MATERIAL_ENVIRONMENT_SCENE.png        a material of --compare by methods and counts, with RMS, and the reference as the last
                                         row (the paper's figures 10 and 11)
+  MATERIAL_ENVIRONMENT_SCENE_side_by_side.png
+                                        the same by each method at the highest of its counts, with time and RMS
 
 The table and the JSON have the errors of the latter, as `threadlight bench error` has them.";
 
@@ -68,7 +71,7 @@ impl BenchGallery {
             counts: &[1, 4, 16, 64, 100],
             size: Some((160, 120)),
         })?;
-        let estimator = Estimator { method: materials.methods[0], count: self.threads };
+        let estimator = Estimator { variant: materials.methods[0], count: self.threads };
         let compared = named("--compare", &self.compare)?;
         let compared = compared.into_iter().map(|(name, text)| (name, MaterialSource::named(text))).collect();
         let sweep = Sweep {
@@ -93,6 +96,7 @@ impl BenchGallery {
         self.truth.sweep(QUICK_TOLERANCE, &sweep, &device, &memo, &progress, &mut measured)?;
         progress.finish();
         sheets.extend(gallery::comparison_sheets(&measured));
+        sheets.extend(gallery::side_by_side_sheets(&measured));
         write_pictures(&sheets, folder)?;
         self.output.write_json(&measured.rows)?;
         write!(std::io::stdout().lock(), "{}", tables::text(&tables::error_tables(&measured.rows)))?;

@@ -1,5 +1,6 @@
 //! `threadlight bench report`: everything measured, on one HTML page.
-use super::arguments::{CasesArguments, Defaults, QUICK_TOLERANCE, TruthArguments, check_folder};
+use super::arguments::{CasesArguments, Defaults, OutputArguments, QUICK_TOLERANCE, TruthArguments, check_folder};
+use super::error;
 use crate::cli::progress::TerminalProgress;
 use clap::value_parser;
 use std::io::Write;
@@ -8,7 +9,7 @@ use threadlight::low_level::brdf::Brdf;
 use threadlight::low_level::evaluate::report::Report;
 use threadlight::low_level::evaluate::speed::{self, Speed};
 use threadlight::low_level::evaluate::sweep::Measured;
-use threadlight::low_level::evaluate::{Cases, Estimator, Row, Sweep, gallery};
+use threadlight::low_level::evaluate::{Cases, Estimator, Row, Sweep, gallery, merged};
 use threadlight::low_level::method::Method;
 use threadlight::low_level::output;
 use threadlight::low_level::progress::Observer;
@@ -25,24 +26,26 @@ Examples:
   threadlight bench report report
   threadlight bench report report --materials alumina-oxide.binary,nickel.binary --environments lebombo.hdr --size 320x240
   threadlight bench report report --from rows.json
+  threadlight bench report --from part_1.json part_2.json --plot plots
 
 Writes DIR/report.html, which needs no other file: machine, device, versions and command; time by threads with the floor and as
 things double (the paper's table 1); errors (tables 2 to 4) over samples and over time (figure 12); methods side by side (figures
 10 and 11); all materials, built-in ones too, by the first of the methods at the highest of the counts (figure 13); and every row.
 Times are of the first material, environment and scene.
 
-With --from, errors are those of an earlier `bench error --json`, and methods are shown side by side for the first material,
-environment and scene only.";
+With --from, errors are those of earlier runs of `bench error --json`, such as all parts of one by --shard, and methods are shown side by side for the first material,
+environment and scene only. Without DIR nothing is measured: the tables of these errors are printed, and --plot and --json write
+what those of `bench error` write. Files that were not measured with the same settings, or that have the same row, are refused.";
 
 /// Measures everything and writes it as one HTML page. Lists are separated by commas.
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES, allow_negative_numbers = true)]
 pub struct BenchReport {
-    /// Folder for report.html; made if it is not there.
-    #[arg(value_name = "DIR")]
-    folder: PathBuf,
-    /// Errors as `bench error --json` wrote them, all of several files, in place of measuring them.
-    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    /// Folder for report.html; made if it is not there. With --from it can be left out: only tables are printed.
+    #[arg(value_name = "DIR", required_unless_present = "from")]
+    folder: Option<PathBuf>,
+    /// Errors as `bench error --json` wrote them, all of several files of one sweep, in place of measuring them.
+    #[arg(long, value_name = "FILES", value_delimiter = ',', num_args = 1..)]
     from: Vec<PathBuf>,
     #[command(flatten)]
     cases: CasesArguments,
@@ -54,12 +57,18 @@ pub struct BenchReport {
     /// Render this often; times are medians.
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = value_parser!(u32).range(1..))]
     repeat: u32,
+    #[command(flatten)]
+    output: OutputArguments,
 }
 
 impl BenchReport {
     pub fn run(self) -> anyhow::Result<()> {
-        check_folder(&self.folder)?;
-        let earlier = self.from.iter().map(|path| read_rows(path)).collect::<Result<Vec<_>>>()?.concat();
+        self.output.check()?;
+        self.folder.as_deref().map_or(Ok(()), check_folder)?;
+        let files = self.from.iter().map(|path| Ok((path.as_path(), read_rows(path)?))).collect::<Result<Vec<_>>>()?;
+        let earlier = merged(files)?;
+        // Without a folder there are earlier rows: clap sees to that.
+        let Some(folder) = &self.folder else { return error::write(&earlier, None, &self.output) };
         let cases = self.cases.cases(&Defaults {
             materials: vec!["gold", "red-plastic"],
             methods: vec![Method::Fitted, Method::Paper, Method::Importance, Method::Filtered],
@@ -76,10 +85,10 @@ impl BenchReport {
         };
         let speed = Speed { cases: only_first.clone(), threads: self.threads, repeat: self.repeat };
         let shown = Cases { materials: with_builtin(&cases.materials), ..only_first };
-        let method = cases.methods[0];
-        let of_method = cases.estimators().into_iter().filter(|estimator| estimator.method == method);
-        let highest = of_method.map(|estimator| estimator.count).max().unwrap_or(method.default_count());
-        let estimator = Estimator { method, count: highest };
+        let variant = cases.methods[0];
+        let of_method = cases.estimators().into_iter().filter(|estimator| estimator.variant == variant);
+        let highest = of_method.map(|estimator| estimator.count).max().unwrap_or(variant.method.default_count());
+        let estimator = Estimator { variant, count: highest };
 
         let device = self.cases.open_device()?;
         let memo = self.cases.memo();
@@ -93,7 +102,7 @@ impl BenchReport {
         let sheets = gallery::material_sheets(&shown, estimator, &device, &memo, &progress)?;
         progress.finish();
         let light = format!("{}, {}", shown.environments[0].0, shown.scenes[0].0);
-        let caption = format!("{light}; method {}, {highest} threads or samples", estimator.method.name());
+        let caption = format!("{light}; method {}, {highest} threads or samples", variant.name());
         report.materials = sheets.into_iter().map(|(_, picture)| (caption.clone(), picture)).collect();
         let captions = measured.references.iter().map(|(place, _)| place.join(", "));
         let pictures = gallery::comparison_sheets(&measured).into_iter().map(|(_, picture)| picture);
@@ -102,11 +111,11 @@ impl BenchReport {
         report.rows = if earlier.is_empty() { measured.rows } else { earlier };
 
         let html = report.html()?;
-        std::fs::create_dir_all(&self.folder).map_err(|cause| Error::unwritable(&self.folder, cause))?;
-        let path = self.folder.join("report.html");
+        std::fs::create_dir_all(folder).map_err(|cause| Error::unwritable(folder, cause))?;
+        let path = folder.join("report.html");
         output::write_whole(&path, html.as_bytes())?;
         writeln!(std::io::stdout(), "{}", path.display())?;
-        Ok(())
+        error::write_files(&report.rows, &self.output)
     }
 }
 

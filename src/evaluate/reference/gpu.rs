@@ -12,6 +12,7 @@ use crate::method::Method;
 use crate::passes::Sampling;
 use crate::pipeline::{DeviceScene, Wanted};
 use crate::prepare::Prepared;
+use crate::scene::Pattern;
 use crate::vulkan::Device;
 
 /// Samples of a frame: with 4 x 4 sub-pixels half of the 65535 iterations after which lavapipe leaves loops. Points of one frame
@@ -29,7 +30,7 @@ pub fn reference_on_gpu(
     round: &Round,
 ) -> Result<ReferenceImage> {
     let start = Instant::now();
-    let sampling = Sampling { count: FRAME_SAMPLES, seed: 0 };
+    let sampling = Sampling { count: FRAME_SAMPLES, seed: 0, pattern: Pattern::PerPixel };
     let objects = Prepared { method: Method::Mis, sampling, show_environment: false, ..prepared.clone() };
     let (mut renderer, observer) = (DeviceScene::new(device, &objects, round)?, round.observer());
     let display = Display::of(&prepared.view);

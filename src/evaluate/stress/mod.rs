@@ -72,7 +72,7 @@ impl Stressed {
 
 /// Whether the method of that name draws samples, which differ where a choice is close.
 fn draws(method: &str) -> bool {
-    Method::from_name(method).is_ok_and(|method| method.threads().is_none() && !method.lookups().split_sums)
+    Method::from_name(method).is_ok_and(|method| method.threads().is_none() && !method.lookups().split_sum)
 }
 
 /// Runs cases on `device`; `found` has what was seen until an error or an interruption.

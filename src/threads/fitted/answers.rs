@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::sync::OnceLock;
 
 use super::kernel::{Kernel, SHARPEST_LEVEL, WIDEST_LEVEL, kappa_of_level};
-use super::lights::{LANES, SCALES, TestLights, light_kappa};
+use super::lights::{LANES, POINTS, TestLights, light_kappa};
 use crate::vector_math::exp;
 
 /// What the overlap of two kernels needs of their kappas a and b.
@@ -63,9 +63,9 @@ impl Pair {
     }
 }
 
-/// Of the kernels of whole levels and the lights of all scales.
-fn pairs() -> &'static [[Pair; SCALES]] {
-    static PAIRS: OnceLock<Vec<[Pair; SCALES]>> = OnceLock::new();
+/// Of the kernels of whole levels and the lights of all scales, those without width among them.
+fn pairs() -> &'static [[Pair; POINTS + 1]] {
+    static PAIRS: OnceLock<Vec<[Pair; POINTS + 1]>> = OnceLock::new();
     PAIRS.get_or_init(|| {
         let levels = SHARPEST_LEVEL as i32..=WIDEST_LEVEL as i32;
         levels
@@ -115,7 +115,7 @@ impl pulp::NullaryFnOnce for Answering<'_> {
     fn call(self) {
         let Answers { value, by_cos, by_level: [below, above] } = self.answers;
         for (k, kernel) in self.kernels.iter().enumerate() {
-            for scale in 0..SCALES {
+            for scale in self.lights.scales.clone() {
                 let Range { start, end } = self.lights.of_scale(scale);
                 let place = k * self.lights.count() + start..k * self.lights.count() + end;
                 let out = Out {
@@ -213,7 +213,17 @@ mod tests {
 
     #[test]
     fn overlap_is_the_integral_of_the_product() {
-        for (a, b) in [(1.0, 1.0), (4.0, 100.0), (300.0, 200.0), (5000.0, 2.0), (kappa_of_level(-1.0), 300.0)] {
+        // The last are the value of a kernel in a direction.
+        let point = light_kappa(POINTS);
+        for (a, b) in [
+            (1.0, 1.0),
+            (4.0, 100.0),
+            (300.0, 200.0),
+            (5000.0, 2.0),
+            (kappa_of_level(-1.0), 300.0),
+            (1.0, point),
+            (65536.0, point),
+        ] {
             for angle in [0.0f64, 0.05, 0.3, 1.0, 3.0, 3.13] {
                 let pair = Pair::new(a, b);
                 let one_minus_cos = (2.0 * (0.5 * angle).sin().powi(2)) as f32;

@@ -13,8 +13,8 @@ use super::table::FittedTable;
 use crate::brdf::{Brdf, SeenBrdf};
 use crate::error::Result;
 use crate::progress::Observer;
-use crate::threads::ThreadSettings;
 use crate::threads::slice::{Resolution, Slice};
+use crate::threads::{ThreadKind, ThreadSettings};
 
 /// Steps of the first row, which starts from cells, and of the others.
 const FIRST: Effort = Effort { steps: 300, least_gain: 1e-5 };
@@ -37,6 +37,9 @@ const MOST_TIED: f64 = 1e-3;
 const FEWEST_LIGHTS: usize = 1000;
 const LIGHTS_A_THREAD: usize = 8;
 const FEWEST_THREADS: usize = 16;
+
+/// Gaussians are fitted to as many times more directions, since each stands for itself alone.
+const DIRECTIONS_A_LIGHT: usize = 2;
 
 /// What a BRDF differs from a diffuse one by at least, relative to the radiance: less is that of the lights' few points, and kernels would be
 /// fitted to it.
@@ -65,17 +68,22 @@ fn light_count(threads: usize) -> usize {
 }
 
 impl Targets {
-    /// Of `rows` rows, for each azimuth that `brdf` needs, with about `lights` lights each. 3 MB for 90 rows and 1128 lights.
+    /// Of as many rows as `settings` says, for each azimuth that `brdf` needs. 3 MB for 90 rows and 1128 lights.
     ///
     /// # Errors
     /// Cancelled by `observer` (noticed within a row).
-    fn new(brdf: &Brdf, rows: usize, lights: usize, observer: &dyn Observer) -> Result<Self> {
+    fn new(brdf: &Brdf, settings: &ThreadSettings, observer: &dyn Observer) -> Result<Self> {
+        let (rows, count) = (settings.rows, light_count(settings.count));
         let azimuths = azimuth_count(brdf);
         let target = |index: usize| -> Result<(TestLights, DVec3)> {
             observer.check()?;
             let View { theta_o, phi_o } = View::of_row(index, rows);
             let slices = Slice::with_lobes(&SeenBrdf::from_azimuth(brdf, phi_o), theta_o, Resolution::FULL);
-            Ok((TestLights::new(&slices, lights, LIGHTS_SEED, Quadrature::FIT), slices[0].albedo()))
+            let lights = match settings.kind {
+                ThreadKind::Gaussian => TestLights::directions(&slices, DIRECTIONS_A_LIGHT * count),
+                _ => TestLights::new(&slices, count, LIGHTS_SEED, Quadrature::FIT),
+            };
+            Ok((lights, slices[0].albedo()))
         };
         let rows = (0..azimuths * rows).into_par_iter().map(target).collect::<Result<_>>()?;
         Ok(Self { azimuths, rows })
@@ -89,13 +97,13 @@ impl Targets {
     }
 }
 
-/// Fits `settings.count` threads to `brdf`, the same to the last bit on any number of cores.
+/// Fits `settings.count` threads to `brdf`, to its answers to lights or, of kind [`ThreadKind::Gaussian`], to f cos itself; the same to the last bit on any number of cores.
 ///
 /// # Errors
 /// No or too many threads, no rows, or cancelled by `observer` (noticed within a step of a row).
 pub fn generate(brdf: &Brdf, settings: &ThreadSettings, observer: &dyn Observer) -> Result<FittedTable> {
     settings.check()?;
-    let targets = Targets::new(brdf, settings.rows, light_count(settings.count), observer)?;
+    let targets = Targets::new(brdf, settings, observer)?;
     let rows = settings.rows;
     let done = AtomicUsize::new(0);
     // Row `index` of all azimuths, from what its neighbours' kernels are there: those of the view angle before and of the azimuth before.
@@ -108,7 +116,9 @@ pub fn generate(brdf: &Brdf, settings: &ThreadSettings, observer: &dyn Observer)
             [] => {
                 let View { theta_o, phi_o } = View::of_row(index, rows);
                 let [_, lobes] = Slice::with_lobes(&SeenBrdf::from_azimuth(brdf, phi_o), theta_o, Resolution::FULL);
-                in_units(&in_sets(&lobes, settings.count, settings.sets))
+                let mut start = in_units(&in_sets(&lobes, settings.count, settings.sets));
+                start.iter_mut().for_each(|kernel| kernel.level = kernel.level.max(lights.sharpest_level()));
+                start
             }
             [one] => one.clone(),
             [a, b, ..] => all_between(a, b, 0.5),

@@ -5,7 +5,7 @@ use std::sync::OnceLock;
 
 use glam::{DVec2, DVec3, Vec3, dvec2};
 
-use super::kernel::{vmf_direction, vmf_peak};
+use super::kernel::{SHARPEST_LEVEL, kappa_of_level, vmf_direction, vmf_peak};
 use crate::brdf::luminance;
 use crate::threads::slice::{Slice, fibonacci_lattice};
 use crate::vector_math::exp;
@@ -27,9 +27,12 @@ const DIM_RESPONSE: f64 = 0.1;
 /// Lights of a scale are a multiple of this, so that loops over them are made of whole vectors.
 pub const LANES: usize = 16;
 
+/// The scale of lights without width, of which no other lights are: directions, to which a kernel's answer is its value there.
+pub const POINTS: usize = SCALES;
+
 /// kappa of the lights of a scale.
 pub fn light_kappa(scale: usize) -> f64 {
-    light_width(scale).powi(-2)
+    if scale == POINTS { kappa_of_level(SHARPEST_LEVEL) } else { light_width(scale).powi(-2) }
 }
 
 fn light_width(scale: usize) -> f64 {
@@ -50,6 +53,8 @@ pub struct TestLights {
     pub cosine: Vec<f32>,
     /// The slice's answer to each: radiance in units, red, green, blue.
     pub response: [Vec<f32>; 3],
+    /// Of which scales they are, as many of each.
+    pub scales: Range<usize>,
 }
 
 /// By how many points a slice is integrated over the lights.
@@ -88,27 +93,43 @@ impl TestLights {
             directions.extend(fibonacci_lattice(per_scale).map(near));
             directions.extend(fibonacci_lattice(per_scale).map(anywhere));
         }
-        let part = |f: fn(&DVec3) -> f64| directions.iter().map(|d| f(d) as f32).collect::<Vec<_>>();
-        let direction = [part(|d| d.x), part(|d| d.y), part(|d| d.z)];
-        let response = quadrature.responses(slice, &directions, &direction);
+        let response = quadrature.responses(slice, &directions, &parts(&directions));
 
-        // Where nothing is reflected any unit will do.
-        let albedo = luminance(slice.albedo());
-        let unit = if albedo > 0.0 { albedo } else { 1.0 } / (2.0 * PI);
+        let unit = unit(slice);
         let scale_of = |j: usize| j / (2 * per_scale);
         let weights = response.iter().enumerate().map(|(j, response)| {
             light_width(scale_of(j)).powf(WIDTH_EXPONENT) / (luminance(*response) / unit + DIM_RESPONSE)
         });
         let weights: Vec<f64> = weights.collect();
+        let cosine = |j: usize| cosine_response(directions[j].z, scale_of(j));
+        Self::weighted(slice, &directions, &weights, &response, 0..SCALES, &cosine)
+    }
+
+    /// Lights of these `scales`, which count by `weights`, with what `slice` and the cosine over pi answer them.
+    pub(super) fn weighted(
+        slice: &Slice,
+        directions: &[DVec3],
+        weights: &[f64],
+        response: &[DVec3],
+        scales: Range<usize>,
+        cosine: &dyn Fn(usize) -> f64,
+    ) -> Self {
+        let unit = unit(slice);
         let weighted =
             |value: &dyn Fn(usize) -> f64| (0..weights.len()).map(|j| (weights[j] * value(j)) as f32).collect();
         Self {
             unit,
-            direction,
+            direction: parts(directions),
             weight: weighted(&|_| 1.0),
-            cosine: weighted(&|j| cosine_response(directions[j].z, scale_of(j))),
+            cosine: weighted(cosine),
             response: std::array::from_fn(|c| weighted(&|j| response[j][c] / unit)),
+            scales,
         }
+    }
+
+    /// The sharpest kernel that they can tell: that of none at all has no value at a direction.
+    pub fn sharpest_level(&self) -> f64 {
+        if self.scales.contains(&POINTS) { 0.0 } else { SHARPEST_LEVEL }
     }
 
     /// How many there are.
@@ -118,9 +139,23 @@ impl TestLights {
 
     /// Those of one scale.
     pub fn of_scale(&self, scale: usize) -> Range<usize> {
-        let each = self.count() / SCALES;
-        each * scale..each * (scale + 1)
+        let each = self.count() / self.scales.len();
+        let first = each * (scale - self.scales.start);
+        first..first + each
     }
+}
+
+/// What responses to `slice` are measured in.
+fn unit(slice: &Slice) -> f64 {
+    // Where nothing is reflected any unit will do.
+    let albedo = luminance(slice.albedo());
+    (if albedo > 0.0 { albedo } else { 1.0 }) / (2.0 * PI)
+}
+
+/// All x, all y, all z.
+fn parts(directions: &[DVec3]) -> [Vec<f32>; 3] {
+    let part = |f: fn(&DVec3) -> f64| directions.iter().map(|d| f(d) as f32).collect();
+    [part(|d| d.x), part(|d| d.y), part(|d| d.z)]
 }
 
 impl Quadrature {

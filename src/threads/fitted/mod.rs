@@ -4,6 +4,7 @@
 //! |---|---|
 //! | kernels, and how they overlap lights | [`kernel`] |
 //! | the lights that they are fitted to | [`lights`] |
+//! | the directions that Gaussians are fitted to instead | `directions` |
 //! | where the fit of the first row starts | [`cells`] |
 //! | how kernels answer them | [`answers`] |
 //! | the fit of one row | [`solve`] |
@@ -16,6 +17,7 @@
 pub mod answers;
 pub mod azimuths;
 pub mod cells;
+mod directions;
 mod draft;
 mod generate;
 pub mod kernel;

@@ -5,7 +5,7 @@ use faer::{Accum, Mat, MatRef, Par, Side};
 use glam::{DVec3, dvec3};
 
 use super::answers::Answers;
-use super::kernel::{Kernel, SHARPEST_LEVEL, WIDEST_LEVEL, scale_rad};
+use super::kernel::{Kernel, WIDEST_LEVEL, scale_rad};
 use super::lights::TestLights;
 use crate::error::{Error, Result};
 use crate::progress::Observer;
@@ -136,7 +136,7 @@ impl<'a> Fit<'a> {
             let whole = kernels[k].level.floor();
             if whole < kernels[k].level || whole < WIDEST_LEVEL && slope(k, 1) < 0.0 {
                 [whole, whole + 1.0]
-            } else if whole > SHARPEST_LEVEL && slope(k, 0) > 0.0 {
+            } else if whole > self.lights.sharpest_level() && slope(k, 0) > 0.0 {
                 [whole - 1.0, whole]
             } else {
                 [whole, whole]

@@ -112,7 +112,11 @@ fn choose(ui: &mut Ui, other: Option<&Other>, seed: u64, inputs: &mut Vec<Input>
             if ui.selectable_label(method.name() == name, method.name()).clicked() {
                 inputs.push(Input::Compare(Some(match method {
                     Method::Reference => Other::Reference,
-                    _ => Other::Shading(ShadingSettings { method: method.name().into(), threads: None, seed }),
+                    _ => Other::Shading(ShadingSettings {
+                        method: method.name().into(),
+                        seed,
+                        ..ShadingSettings::default()
+                    }),
                 })));
             }
         }

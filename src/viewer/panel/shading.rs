@@ -1,11 +1,17 @@
 //! Which method, how many threads, how many sub-pixels.
 use super::{group, on_change};
 use crate::method::Method;
-use crate::scene::{MAX_SAMPLES, MAX_SUBPIXELS};
+use crate::scene::{MAX_SAMPLES, MAX_SUBPIXELS, Pattern};
 use crate::viewer::change::Change;
 use crate::viewer::input::Input;
 use crate::viewer::interaction::Viewer;
 use egui::Ui;
+
+/// What each pattern means, in the order of [`Pattern::ALL`].
+const PATTERN_TOOLTIPS: [&str; 2] = [
+    "Samples at random numbers of each pixel's own: noise.",
+    "Samples at one set of points for all pixels: no noise, but bias.",
+];
 
 pub fn show(ui: &mut Ui, viewer: &Viewer, inputs: &mut Vec<Input>) {
     let scene = viewer.session.wanted();
@@ -24,6 +30,17 @@ pub fn show(ui: &mut Ui, viewer: &Viewer, inputs: &mut Vec<Input>) {
             })
             .response
             .on_hover_text(method.summary());
+        if method.has_pattern() {
+            ui.horizontal(|ui| {
+                for (pattern, tooltip) in Pattern::ALL.into_iter().zip(PATTERN_TOOLTIPS) {
+                    let is_chosen = scene.shading.pattern == pattern;
+                    let label = ui.selectable_label(is_chosen, pattern.name()).on_hover_text(tooltip);
+                    if label.clicked() && !is_chosen {
+                        inputs.push(Input::Set(Change::Pattern(pattern)));
+                    }
+                }
+            });
+        }
         let (what, most, tooltip) = match method.threads() {
             Some(kind) => (
                 "threads",

@@ -1,0 +1,26 @@
+//! Where a method that draws samples draws them.
+use serde::{Deserialize, Serialize};
+
+/// Where `filtered` and `importance` draw the samples of a pixel; other methods have no choice.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Pattern {
+    /// At random numbers of its own: noise.
+    #[default]
+    PerPixel,
+    /// At one low-discrepancy set for all pixels, Sobol's in Owen's scramble: no noise, but bias.
+    Fixed,
+}
+
+impl Pattern {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::PerPixel, Self::Fixed];
+
+    /// What the command line and scene files call it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::PerPixel => "per-pixel",
+            Self::Fixed => "fixed",
+        }
+    }
+}
