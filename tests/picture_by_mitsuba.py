@@ -2,8 +2,7 @@
 
     pip install mitsuba==3.9.1 numpy && python3 tests/picture_by_mitsuba.py
 
-Made with Mitsuba 3.9.1, variant scalar_rgb, in some minutes. The
-unit sphere, `roughconductor` with alpha_u around +y and alpha_v across it, under a smooth environment that both compute by `radiance`; direct
+Made with Mitsuba 3.9.1, variant scalar_rgb, in a minute. The unit sphere, `roughconductor` with alpha_u around +y and alpha_v across it, under a smooth environment that both compute by `radiance`; direct
 light only, one ray through the centre of each pixel, SAMPLES of each of two strategies. A line is a pixel's column and row, its linear radiance,
 and the standard error of the mean of its three channels. Left out are pixels that see the sphere by more than 75 degrees from the normal, where
 a mesh is not a sphere.
