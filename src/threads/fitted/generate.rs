@@ -10,7 +10,7 @@ use super::kernel::{Kernel, all_between, scale_rad};
 use super::lights::{Quadrature, TestLights};
 use super::solve::{Effort, Fit};
 use super::table::FittedTable;
-use crate::brdf::{Brdf, SeenBrdf};
+use crate::brdf::{Brdf, SeenBrdf, luminance};
 use crate::error::Result;
 use crate::progress::Observer;
 use crate::threads::slice::{Resolution, Slice};
@@ -27,8 +27,14 @@ const LIGHTS_SEED: usize = 0;
 /// rows, threads turn from row to row by 2 to 4 times less than without, for errors up to a third larger.
 const TIED: f64 = 1e-6;
 
-/// Between rows of an anisotropic BRDF kernels must not err by more than this part of what the worse of both rows does; where they would,
-/// since some changed places, the row is fitted again, tied ten times as strongly, up to the most.
+/// By [`most_moved`] kernels must not move by more than this between rows a degree apart: what moves by more, since some changed places,
+/// shows as a line, however well each of both rows is fitted. Where they would the row is fitted again, tied ten times as strongly, up to the
+/// most. What carrying misses of a steady motion grows with the square of the step.
+pub(super) const MOST_MOVED: f64 = 0.06;
+const MOST_TIED_BEFORE: f64 = 1e-4;
+
+/// The same for an anisotropic BRDF, whose rows have two neighbours, where kernels err between rows by more than this part of what the
+/// worse of both does.
 const MOST_BETWEEN: f64 = 1.1;
 const MOST_TIED: f64 = 1e-3;
 
@@ -107,11 +113,18 @@ pub fn generate(brdf: &Brdf, settings: &ThreadSettings, observer: &dyn Observer)
     let rows = settings.rows;
     let done = AtomicUsize::new(0);
     // Row `index` of all azimuths, from what its neighbours' kernels are there: those of the view angle before and of the azimuth before.
-    let fit = |index: usize, neighbours: Vec<Vec<Kernel>>| -> Result<Row> {
+    let fit = |index: usize, neighbours: &[(usize, &Row)]| -> Result<Row> {
         observer.check()?;
         let (lights, albedo) = &targets.rows[index];
         let in_units = |kernels: &[Kernel]| scaled(kernels, 1.0 / lights.unit);
-        let neighbours: Vec<_> = neighbours.iter().map(|kernels| in_units(kernels)).collect();
+        let to = View::of_row(index, rows);
+        // What they were, and what becomes of that here.
+        let neighbours = neighbours.iter().map(|(from, (kernels, ..))| {
+            let before = in_units(kernels);
+            let here = carried(&before, View::of_row(*from, rows), to);
+            (before, here)
+        });
+        let (before, neighbours): (Vec<_>, Vec<_>) = neighbours.unzip();
         let start = match &neighbours[..] {
             [] => {
                 let View { theta_o, phi_o } = View::of_row(index, rows);
@@ -135,7 +148,14 @@ pub fn generate(brdf: &Brdf, settings: &ThreadSettings, observer: &dyn Observer)
                 let between = fit.relative_error(&all_between(neighbour, &kernels, 0.5));
                 between < MOST_BETWEEN * error.max(fit.relative_error(neighbour))
             };
-            if targets.azimuths == 1 || tied >= MOST_TIED || neighbours.iter().all(is_near) {
+            let (is_steady, most_tied) = match (&before[..], targets.azimuths) {
+                ([before], 1) => {
+                    let moved = most_moved([before, &start], &kernels, *albedo / lights.unit);
+                    (moved < MOST_MOVED * (90.0 / rows as f64).powi(2), MOST_TIED_BEFORE)
+                }
+                _ => (neighbours.iter().all(is_near), MOST_TIED),
+            };
+            if is_steady || tied >= most_tied {
                 break (kernels, error);
             }
             tied *= 10.0;
@@ -146,14 +166,11 @@ pub fn generate(brdf: &Brdf, settings: &ThreadSettings, observer: &dyn Observer)
     let mut fitted: Vec<Row> = Vec::with_capacity(targets.rows.len());
     for azimuth in 0..targets.azimuths {
         let first = azimuth * rows;
-        let carry = |(kernels, ..): &Row, from: usize, to: usize| {
-            carried(kernels, View::of_row(from, rows), View::of_row(to, rows))
-        };
         let column = from_the_middle(rows, &|row, neighbour| {
             let index = first + row;
-            let before = neighbour.map(|(before, kernels)| carry(kernels, first + before, index));
-            let beside = index.checked_sub(rows).map(|beside| carry(&fitted[beside], beside, index));
-            fit(index, before.into_iter().chain(beside).collect())
+            let before = neighbour.map(|(before, row)| (first + before, row));
+            let beside = index.checked_sub(rows).map(|beside| (beside, &fitted[beside]));
+            fit(index, &before.into_iter().chain(beside).collect::<Vec<_>>())
         })?;
         fitted.extend(column);
     }
@@ -162,6 +179,19 @@ pub fn generate(brdf: &Brdf, settings: &ThreadSettings, observer: &dyn Observer)
         fitted.iter_mut().for_each(|(kernels, ..)| *kernels = scaled(kernels, 0.0));
     }
     Ok(FittedTable::pack(&fitted, targets.azimuths, settings.sets))
+}
+
+/// How far kernels have moved, at most, from where they were `before` or where they are carried to, whichever is nearer: in widths and in
+/// levels, times their part of the `albedo`, and by how much that part has changed.
+pub(super) fn most_moved([before, carried]: [&[Kernel]; 2], kernels: &[Kernel], albedo: DVec3) -> f64 {
+    let share = |kernel: &Kernel| luminance(kernel.weight) / luminance(albedo);
+    let moved = |((a, carried), b): ((&Kernel, &Kernel), &Kernel)| {
+        let away = a.direction.distance(b.direction).min(carried.direction.distance(b.direction));
+        let away = away / scale_rad(a.level.min(b.level)) + (a.level - b.level).abs();
+        let [before, after] = [share(a), share(b)];
+        before.min(after) * away + (before - after).abs()
+    };
+    before.iter().zip(carried).zip(kernels).map(moved).fold(0.0, f64::max)
 }
 
 /// `fit` of each of `count` rows: of the middle one, then of the others one after the other outwards, each with the number of its neighbour
