@@ -20,7 +20,7 @@ pub use camera::Camera;
 pub use mesh::Mesh;
 pub use pattern::Pattern;
 pub use tangent_rule::TangentRule;
-pub use texture_tangents::TexturedMesh;
+pub use obj_file::TexturedMesh;
 
 file_formats!(Mesh: obj_file);
 

@@ -6,9 +6,17 @@ use std::path::Path;
 use glam::{DVec3, Vec2, Vec3};
 
 use super::Mesh;
-use super::texture_tangents::TexturedMesh;
 use crate::error::{Error, Result};
 use crate::file_format::FileFormat;
+
+/// A mesh and where its vertices are on a texture.
+#[derive(Clone, Debug, Default)]
+pub struct TexturedMesh {
+    /// Without tangents. Vertices are split where their texture coordinates differ.
+    pub mesh: Mesh,
+    /// One a position, not finite where there is none; or empty.
+    pub uvs: Vec<Vec2>,
+}
 
 pub(super) const FORMAT: FileFormat<Mesh> =
     FileFormat { extension: "obj", name: "a Wavefront .obj", is_of_format: |_| true, parse };
@@ -46,7 +54,8 @@ fn parse_parts(path: &Path, bytes: &[u8], is_textured: bool) -> Result<TexturedM
 }
 
 /// The triangles in the text of an OBJ, each corner with an index into the positions and one into the normals; a corner
-/// without a normal has one of length 0. If `is_textured` each has an index into the texture coordinates too, which are NaN where it has none. The error is what is wrong.
+/// without a normal has one of length 0. If `is_textured` each has an index into the texture coordinates too, which are NaN where it has
+/// none. The error is what is wrong.
 fn read_obj(text: &str, is_textured: bool) -> Result<tobj::Mesh, String> {
     let options = tobj::LoadOptions { triangulate: true, ..Default::default() };
     let no_materials = |_: &Path| Ok(Default::default());
@@ -65,8 +74,8 @@ fn read_obj(text: &str, is_textured: bool) -> Result<tobj::Mesh, String> {
 ///
 /// The rest goes since tobj takes polylines (`l`) for faces, wants colours for all vertices or none, and begins a new mesh at
 /// every group and material, whose vertices then are no longer shared. Corners without a normal get one of length 0,
-/// the last in the file, as from tobj they would get that of the corner before; those without texture coordinates get NaN in the same way. Indices
-/// of both are checked here: unlike those of positions, tobj takes 0 for none, and multiplies absurd ones until they overflow.
+/// the last in the file, as from tobj they would get that of the corner before; those without texture coordinates get NaN in the same way.
+/// Indices of both are checked here: unlike those of positions, tobj takes 0 for none, and multiplies absurd ones until they overflow.
 fn geometry_lines(text: &str, is_textured: bool) -> Result<String, String> {
     let count_of = |keyword: &str| {
         let is_one = |line: &&str| line.split_ascii_whitespace().next() == Some(keyword);

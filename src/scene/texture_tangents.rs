@@ -7,24 +7,16 @@ use std::collections::HashMap;
 use bevy_mikktspace::{Geometry, TangentSpace, generate_tangents};
 use glam::{Vec2, Vec3};
 
-use super::{Mesh, TangentRule, mesh, obj_file};
+use super::obj_file::{TEXTURED_FORMAT, TexturedMesh};
+use super::{Mesh, TangentRule, mesh};
 use crate::file_format::FileKind;
 use crate::tangent::tangent_along;
-
-/// A mesh and where its vertices are on a texture.
-#[derive(Clone, Debug, Default)]
-pub struct TexturedMesh {
-    /// Without tangents. Vertices are split where their texture coordinates differ.
-    pub mesh: Mesh,
-    /// One a position, not finite where there is none; or empty.
-    pub uvs: Vec<Vec2>,
-}
 
 impl TexturedMesh {
     /// The formats of mesh files, with their texture coordinates.
     pub const FILES: FileKind<Self> = FileKind {
         what: "mesh",
-        formats: &[obj_file::TEXTURED_FORMAT],
+        formats: &[TEXTURED_FORMAT],
         builtin_names: || mesh::builtin_names().to_vec(),
     };
 
