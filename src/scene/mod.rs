@@ -18,9 +18,9 @@ mod texture_tangents;
 
 pub use camera::Camera;
 pub use mesh::Mesh;
+pub use obj_file::TexturedMesh;
 pub use pattern::Pattern;
 pub use tangent_rule::TangentRule;
-pub use obj_file::TexturedMesh;
 
 file_formats!(Mesh: obj_file);
 

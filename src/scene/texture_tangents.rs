@@ -14,11 +14,8 @@ use crate::tangent::tangent_along;
 
 impl TexturedMesh {
     /// The formats of mesh files, with their texture coordinates.
-    pub const FILES: FileKind<Self> = FileKind {
-        what: "mesh",
-        formats: &[TEXTURED_FORMAT],
-        builtin_names: || mesh::builtin_names().to_vec(),
-    };
+    pub const FILES: FileKind<Self> =
+        FileKind { what: "mesh", formats: &[TEXTURED_FORMAT], builtin_names: || mesh::builtin_names().to_vec() };
 
     /// The mesh with its tangents, or without if no triangle has texture coordinates with an area. Vertices are split where tangents differ.
     /// Where others have none, tangents go by [`TangentRule::DEFAULT`], and a warning says so.
