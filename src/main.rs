@@ -58,7 +58,10 @@ fn is_broken_pipe(error: &anyhow::Error) -> bool {
 fn exit_code(error: &anyhow::Error) -> u8 {
     match error.downcast_ref::<Error>() {
         Some(Error::Input { .. }) => 2,
-        Some(Error::Vulkan(cause)) if matches!(cause.downcast_ref(), Some(VulkanError::NoSuchDevice { .. })) => 2,
+        Some(Error::Vulkan(cause)) => match cause.downcast_ref() {
+            Some(VulkanError::NoSuchDevice { .. } | VulkanError::NoStatistics { .. }) => 2,
+            _ => 1,
+        },
         Some(Error::Cancelled) => 130,
         _ => 1,
     }

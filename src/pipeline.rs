@@ -1,6 +1,6 @@
 //! The method on one screen: the frame as a graph of passes, and the renderer that runs it.
 use crate::graph::{BufferHandle, Executable, FrameGraph, ImageHandle};
-use crate::light::finest_level;
+use crate::light::{KernelNeeds, finest_level};
 use crate::memo::{Held, Keyed, Round};
 use crate::output::ExrHeader;
 use crate::passes::*;
@@ -63,6 +63,26 @@ pub struct DeviceScene {
     _held: Held,
 }
 
+/// What `classify` is specialised by for `prepared`.
+pub(crate) fn classify_constants(prepared: &Prepared) -> [(&'static str, u32); 2] {
+    [("SUBPIXELS", prepared.view.subpixels), ("HAS_TANGENTS", prepared.has_tangents().into())]
+}
+
+/// What the shader of its method is, if kernels `need` that of its environment.
+pub(crate) fn shade_constants(
+    prepared: &Prepared,
+    models_used: u32,
+    needs: Option<KernelNeeds>,
+) -> Vec<(&'static str, u32)> {
+    let mut constants = classify_constants(prepared).to_vec();
+    constants.push(("MODELS_USED", models_used));
+    if prepared.method.has_pattern() {
+        constants.push(("FIXED_PATTERN", (prepared.sampling.pattern == Pattern::Fixed).into()));
+    }
+    constants.extend(needs.into_iter().flat_map(KernelNeeds::constants));
+    constants
+}
+
 /// Results of a rendering, as far as they were wanted.
 #[derive(Clone, Debug, Default)]
 pub struct Rendering {
@@ -109,13 +129,8 @@ impl DeviceScene {
         let finest_level = light.blurred.as_ref().map(|blurred| finest_level(&blurred.rest));
         let upload = UploadMaterials { device, method, materials: &materials, evaluates_brdf, finest_level };
         let materials = round.ask(&upload)?;
-        let subpixels = ("SUBPIXELS", view.subpixels);
-        let has_tangents = ("HAS_TANGENTS", prepared.has_tangents().into());
-        let mut constants = vec![subpixels, has_tangents, ("MODELS_USED", materials.models_used)];
-        if method.has_pattern() {
-            constants.push(("FIXED_PATTERN", (sampling.pattern == Pattern::Fixed).into()));
-        }
-        constants.extend(light.blurred.iter().flat_map(|blurred| blurred.needs.constants()));
+        let needs = light.blurred.as_ref().map(|blurred| blurred.needs);
+        let constants = shade_constants(prepared, materials.models_used, needs);
         let light = round.ask(&UploadLight { device, method, environment, light: &light, way_around })?;
         let pipeline = compile(shader, &constants)?;
         let background = match prepared.show_environment {
@@ -129,7 +144,7 @@ impl DeviceScene {
             view: view.clone(),
             geometry_cache,
             classify: Classify {
-                pipeline: compile(&compiled::CLASSIFY, &[subpixels, has_tangents])?,
+                pipeline: compile(&compiled::CLASSIFY, &classify_constants(prepared))?,
                 smooth_variance: smooth_variance(method),
             },
             shade: Shade { pipeline, materials, light, sampling },

@@ -80,6 +80,39 @@ fn speed_prints_tables_and_writes_json_and_plots() {
     assert_eq!(files(&folder, "plots"), plots);
 }
 
+/// Where Debian and Ubuntu have Mesa's driver for AMD's GPUs.
+const RADV: &str = "/usr/share/vulkan/icd.d/radeon_icd.x86_64.json";
+
+#[test]
+fn shaders_are_compiled_for_a_gpu_that_is_not_there_and_spill_nothing() {
+    if !std::path::Path::new(RADV).exists() {
+        println!("skipped: there is no {RADV}");
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_threadlight"));
+    command.current_dir(&folder).env("THREADLIGHT_CACHE", folder.path().join("cache")).env_remove("RUST_LOG");
+    command.envs([("RADV_FORCE_FAMILY", "navi21"), ("VK_DRIVER_FILES", RADV), ("VK_ICD_FILENAMES", RADV)]);
+    let arguments = "bench shaders --method fitted --threads 4 --material clay --environment white --json shaders.json";
+    let output = command.args(arguments.split(' ')).output().unwrap();
+    let said = String::from_utf8_lossy(&output.stdout);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert!(["NAVI21", "VGPRs", "shade_fitted"].iter().all(|text| said.contains(text)), "{said}");
+    let costs = json(&folder, "shaders.json");
+    let costs = costs.as_array().unwrap();
+    assert_eq!(keys(&costs[0]).len(), 5);
+    let figure = |cost: &Value, name: &str| -> f64 {
+        let figures = cost["statistics"].as_array().unwrap();
+        figures.iter().find(|figure| figure[0] == name).unwrap()[1].as_f64().unwrap()
+    };
+    for cost in costs {
+        assert!(figure(cost, "VGPRs") > 0.0 && figure(cost, "Spilled VGPRs") == 0.0, "{cost}");
+    }
+    let fitted: Vec<_> = costs.iter().filter(|cost| cost["shader"] == "shade_fitted").collect();
+    // What the scene does not need is left out.
+    assert!(fitted.len() == 2 && figure(fitted[0], "Instructions") < figure(fitted[1], "Instructions"));
+}
+
 #[test]
 fn a_gallery_has_all_materials_and_the_methods_on_one() {
     let folder = tempfile::tempdir().unwrap();

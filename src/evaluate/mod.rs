@@ -10,6 +10,7 @@
 //! | error and time of all of these: tables 2 to 4, figures 10 to 12 | [`sweep`] |
 //! | time of a frame beside its floor, and as things double: table 1 | [`speed`] |
 //! | what threads cost to make, beside what they are worth | [`fit`] |
+//! | what a driver's compiler makes of the shaders | [`shaders`] |
 //! | what drafts of threads are worth while a parameter is dragged | [`live`] |
 //! | what a device's lookups by coarse fractions cost | [`fractions`] |
 //! | whether hard cases are shaded as on the CPU | [`stress`] |
@@ -35,6 +36,7 @@ pub mod plots;
 pub mod reference;
 mod reference_picture;
 pub mod report;
+pub mod shaders;
 pub mod sheet;
 pub mod speed;
 pub mod ssim;

@@ -23,8 +23,14 @@ pub struct DeviceMaterials {
     measured_tables: vulkan::Image,
     made_tables: vulkan::Image,
     table_sampler: Sampler,
-    /// Bit i: the BRDF of model i is evaluated.
+    /// [`models_used`] of them.
     pub models_used: u32,
+}
+
+/// Bit i: a material has the BRDF of model i, and it is evaluated.
+pub fn models_used<'a>(brdfs: impl IntoIterator<Item = &'a Brdf>, evaluates_brdf: bool) -> u32 {
+    let bits = brdfs.into_iter().filter(|_| evaluates_brdf).map(|brdf| 1 << brdf.model_index());
+    bits.fold(0, |all, bit| all | bit)
 }
 
 /// A material as shading needs it.
@@ -60,11 +66,11 @@ impl DeviceMaterials {
         let mut slices: Vec<f32> = Vec::new();
         let mut measured = BrdfAtlas::new([merl::PHI_D_BINS, merl::THETA_D_BINS]);
         let mut made = BrdfAtlas::new(Tabulated::NODES);
-        let mut models_used = 0;
+        let materials: Vec<_> = materials.into_iter().collect();
+        let models_used = models_used(materials.iter().map(|material| material.brdf), evaluates_brdf);
         for ShadedMaterial { brdf, threads: own_threads, table } in materials {
             let mut record = MaterialRecord::new(brdf);
             if evaluates_brdf {
-                models_used |= 1 << record.model;
                 if let Brdf::MerlTable(table) = brdf {
                     record = record.with_measured_table_at(measured.add(device, table.texels())?);
                 } else if !brdf.has_twin() {

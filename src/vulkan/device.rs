@@ -66,6 +66,21 @@ fn memory_limit() -> Result<u64> {
     bytes.ok_or_else(|| VulkanError::unfit(MEMORY_LIMIT, format!("{text:?} is no number of MiB")))
 }
 
+/// The one that `asked` names, or the best one; it may lack what the renderer needs.
+pub(super) fn choose(mut candidates: Vec<Candidate>, asked: Option<&str>) -> Result<Candidate> {
+    if let Some(asked) = asked {
+        let list = candidates.iter().map(|c| format!("{} \"{}\"", c.description.index, c.description.name));
+        let available = list.collect::<Vec<_>>().join(", ");
+        candidates.retain(|candidate| candidate.description.answers_to(asked));
+        if candidates.is_empty() {
+            return Err(VulkanError::NoSuchDevice { asked: asked.to_owned(), available });
+        }
+    }
+    // Stable sort: among equals the loader's order decides, which VK_LOADER_* and the user's settings shape.
+    candidates.sort_by_key(|candidate| (!candidate.description.lacks.is_empty(), candidate.description.kind));
+    candidates.into_iter().next().ok_or(VulkanError::NoDriver)
+}
+
 /// What every device has of its own from the start.
 fn allocator_and_timeline(
     instance: &Instance,
@@ -116,18 +131,8 @@ impl Device {
         Self::choose(instance, candidates, asked)
     }
 
-    fn choose(instance: &Arc<Instance>, mut candidates: Vec<Candidate>, asked: Option<&str>) -> Result<Arc<Self>> {
-        if let Some(asked) = asked {
-            let list = candidates.iter().map(|c| format!("{} \"{}\"", c.description.index, c.description.name));
-            let available = list.collect::<Vec<_>>().join(", ");
-            candidates.retain(|candidate| candidate.description.answers_to(asked));
-            if candidates.is_empty() {
-                return Err(VulkanError::NoSuchDevice { asked: asked.to_owned(), available });
-            }
-        }
-        // Stable sort: among equals the loader's order decides, which VK_LOADER_* and the user's settings shape.
-        candidates.sort_by_key(|candidate| (!candidate.description.lacks.is_empty(), candidate.description.kind));
-        let chosen = candidates.into_iter().next().ok_or(VulkanError::NoDriver)?;
+    fn choose(instance: &Arc<Instance>, candidates: Vec<Candidate>, asked: Option<&str>) -> Result<Arc<Self>> {
+        let chosen = choose(candidates, asked)?;
         if !chosen.description.lacks.is_empty() {
             let feature = chosen.description.lacks.join(" and ");
             return Err(VulkanError::Unsuitable { device: chosen.description.name, feature });

@@ -46,6 +46,14 @@ pub enum VulkanError {
         /// What is missing.
         feature: String,
     },
+    /// The driver tells nothing of the shaders that it compiles.
+    #[error(
+        "{device}: its driver does not say what shaders compile to (it lacks VK_KHR_pipeline_executable_properties); choose another with --device"
+    )]
+    NoStatistics {
+        /// Device name.
+        device: String,
+    },
     /// A Vulkan call failed.
     #[error("{call} failed for {object}: {result}{}", remedy(*result))]
     Call {

@@ -13,6 +13,7 @@
 //! memory, image                buffers; images and samplers
 //! shader                       SPIR-V and what it declares (reflection)
 //! pipeline_cache, pipeline     compiled ones on disk; layouts from reflection
+//! shader_statistics            what compilers say of shaders, on devices that only compile
 //! commands, copies, frames     one recorded pass after another; frames in flight, timestamps
 //! upload, triangles, render    contents of buffers and images; meshes; drawing them
 //! swapchain, ui                images of a window; what egui has laid out
@@ -40,6 +41,7 @@ mod pipeline;
 mod pipeline_cache;
 mod render;
 mod shader;
+mod shader_statistics;
 #[cfg(feature = "viewer")]
 mod surface;
 #[cfg(feature = "viewer")]
@@ -60,6 +62,7 @@ pub use physical_device::{DeviceDescription, DeviceKind, describe_devices};
 pub use pipeline::{ComputePipeline, GraphicsPipeline};
 pub use pipeline_cache::PipelineCache;
 pub use shader::{Shader, ShaderStage, compiled};
+pub use shader_statistics::{CompiledShader, CompilingDevice};
 #[cfg(feature = "viewer")]
 pub use surface::{Surface, Window};
 #[cfg(feature = "viewer")]

@@ -130,11 +130,8 @@ fn extensions(
     name: &str,
     lacks: &mut Vec<&'static str>,
 ) -> Result<Vec<&'static CStr>> {
-    // SAFETY: `physical` comes from this instance.
-    let available = call("vkEnumerateDeviceExtensionProperties", name, || unsafe {
-        instance.raw.enumerate_device_extension_properties(physical)
-    })?;
-    let has = |wanted: &CStr| available.iter().any(|extension| extension.extension_name_as_c_str() == Ok(wanted));
+    let available = available_extensions(instance, physical, name)?;
+    let has = |wanted: &CStr| contains(&available, wanted);
     // These are asked for even where Vulkan 1.3 has them in its core: their entry points are the same ones.
     let needed = [
         (khr::synchronization2::NAME, "VK_KHR_synchronization2"),
@@ -150,6 +147,31 @@ fn extensions(
     }
     wanted.retain(|extension| has(extension));
     Ok(wanted)
+}
+
+fn available_extensions(
+    instance: &Instance,
+    physical: vk::PhysicalDevice,
+    name: &str,
+) -> Result<Vec<vk::ExtensionProperties>> {
+    // SAFETY: `physical` comes from this instance.
+    call("vkEnumerateDeviceExtensionProperties", name, || unsafe {
+        instance.raw.enumerate_device_extension_properties(physical)
+    })
+}
+
+fn contains(available: &[vk::ExtensionProperties], wanted: &CStr) -> bool {
+    available.iter().any(|extension| extension.extension_name_as_c_str() == Ok(wanted))
+}
+
+/// Whether the device of this `name` has the extension that is `wanted`.
+pub(super) fn has_extension(
+    instance: &Instance,
+    physical: vk::PhysicalDevice,
+    name: &str,
+    wanted: &CStr,
+) -> Result<bool> {
+    Ok(contains(&available_extensions(instance, physical, name)?, wanted))
 }
 
 /// The family of the queue for everything, and how many bits of its timestamps count.

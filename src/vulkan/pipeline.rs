@@ -39,20 +39,13 @@ impl Pipeline {
             }
             shader.check_bindings(&bindings)?;
         }
-        let set_layouts = [set_layout(device, name, &bindings, stages)?];
+        let set_layout = set_layout(&device.raw, name, &bindings, stages)?;
         let (raw, layout, identity) = (vk::Pipeline::null(), vk::PipelineLayout::null(), Identity::new());
-        let (set_layout, owner) = (set_layouts[0], device.clone());
+        let owner = device.clone();
         // Destroyed with this from here on, whatever fails.
         let mut pipeline =
             Self { raw, layout, set_layout, bindings, push_constant_bytes, stages, name, identity, device: owner };
-        let ranges: Vec<_> = (push_constant_bytes > 0)
-            .then(|| vk::PushConstantRange::default().stage_flags(stages).size(push_constant_bytes))
-            .into_iter()
-            .collect();
-        let info = vk::PipelineLayoutCreateInfo::default().set_layouts(&set_layouts).push_constant_ranges(&ranges);
-        // SAFETY: plain creation; destroyed through the deletion queue.
-        pipeline.layout =
-            call("vkCreatePipelineLayout", name, || unsafe { device.raw.create_pipeline_layout(&info, None) })?;
+        pipeline.layout = layout_of(&device.raw, name, set_layout, push_constant_bytes, stages)?;
         Ok(pipeline)
     }
 
@@ -62,8 +55,8 @@ impl Pipeline {
     }
 }
 
-fn set_layout(
-    device: &Device,
+pub(super) fn set_layout(
+    device: &ash::Device,
     name: &str,
     bindings: &BTreeMap<String, Binding>,
     stages: vk::ShaderStageFlags,
@@ -74,8 +67,25 @@ fn set_layout(
     };
     let bindings: Vec<_> = bindings.values().map(of_binding).collect();
     let info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&bindings);
-    // SAFETY: plain creation; destroyed through the deletion queue.
-    call("vkCreateDescriptorSetLayout", name, || unsafe { device.raw.create_descriptor_set_layout(&info, None) })
+    // SAFETY: plain creation; the caller destroys it.
+    call("vkCreateDescriptorSetLayout", name, || unsafe { device.create_descriptor_set_layout(&info, None) })
+}
+
+pub(super) fn layout_of(
+    device: &ash::Device,
+    name: &str,
+    set_layout: vk::DescriptorSetLayout,
+    push_constant_bytes: u32,
+    stages: vk::ShaderStageFlags,
+) -> Result<vk::PipelineLayout> {
+    let set_layouts = [set_layout];
+    let ranges: Vec<_> = (push_constant_bytes > 0)
+        .then(|| vk::PushConstantRange::default().stage_flags(stages).size(push_constant_bytes))
+        .into_iter()
+        .collect();
+    let info = vk::PipelineLayoutCreateInfo::default().set_layouts(&set_layouts).push_constant_ranges(&ranges);
+    // SAFETY: plain creation; the caller destroys it.
+    call("vkCreatePipelineLayout", name, || unsafe { device.create_pipeline_layout(&info, None) })
 }
 
 impl Drop for Pipeline {
@@ -116,8 +126,43 @@ impl Drop for Module {
 }
 
 /// An error for a shader that is not of the stage it is wanted for.
-fn check_stage(shader: &Shader, wanted: ShaderStage) -> Result<()> {
+pub(super) fn check_stage(shader: &Shader, wanted: ShaderStage) -> Result<()> {
     if shader.stage == wanted { Ok(()) } else { Err(shader.refuse(format!("it is not a {wanted:?} shader"))) }
+}
+
+/// Values of a shader's specialisation constants.
+pub(super) struct Constants {
+    entries: Vec<vk::SpecializationMapEntry>,
+    data: Vec<u8>,
+}
+
+impl Constants {
+    /// An error for a constant that the shader does not have.
+    pub fn new(shader: &Shader, interface: &Interface, constants: &[(&str, u32)]) -> Result<Self> {
+        let mut entries = Vec::new();
+        let mut data = Vec::new();
+        for (name, value) in constants {
+            let id = interface.constants.get(*name);
+            let id = id.ok_or_else(|| shader.refuse(format!("it has no specialisation constant {name}")))?;
+            let offset = data.len() as u32;
+            entries.push(vk::SpecializationMapEntry { constant_id: *id, offset, size: 4 });
+            data.extend_from_slice(&value.to_ne_bytes());
+        }
+        Ok(Self { entries, data })
+    }
+
+    pub fn info(&self) -> vk::SpecializationInfo<'_> {
+        vk::SpecializationInfo::default().map_entries(&self.entries).data(&self.data)
+    }
+}
+
+/// The stage of a compute pipeline.
+pub(super) fn compute_stage<'a>(
+    module: vk::ShaderModule,
+    constants: &'a vk::SpecializationInfo<'a>,
+) -> vk::PipelineShaderStageCreateInfo<'a> {
+    let stage = vk::PipelineShaderStageCreateInfo::default().stage(vk::ShaderStageFlags::COMPUTE).module(module);
+    stage.name(c"main").specialization_info(constants)
 }
 
 /// A compute shader, ready to dispatch.
@@ -139,17 +184,9 @@ impl ComputePipeline {
         let interface = shader.reflect()?;
         let mut pipeline = Pipeline::new(device, shader.name, &[(shader, &interface)])?;
         let module = Module::new(device, shader)?;
-        let mut entries = Vec::new();
-        let mut data = Vec::new();
-        for (name, value) in constants {
-            let id = interface.constants.get(*name);
-            let id = id.ok_or_else(|| shader.refuse(format!("it has no specialisation constant {name}")))?;
-            let offset = data.len() as u32;
-            entries.push(vk::SpecializationMapEntry { constant_id: *id, offset, size: 4 });
-            data.extend_from_slice(&value.to_ne_bytes());
-        }
-        let specialization = vk::SpecializationInfo::default().map_entries(&entries).data(&data);
-        let stage = module.stage(shader).specialization_info(&specialization);
+        let constants = Constants::new(shader, &interface, constants)?;
+        let specialization = constants.info();
+        let stage = compute_stage(module.raw, &specialization);
         let info = [vk::ComputePipelineCreateInfo::default().stage(stage).layout(pipeline.layout)];
         // SAFETY: `info` and all it points to outlive the call.
         pipeline.raw = call("vkCreateComputePipelines", shader.name, || unsafe {

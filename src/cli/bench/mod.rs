@@ -6,6 +6,7 @@ mod fractions;
 mod gallery;
 mod live;
 mod report;
+mod shaders;
 mod speed;
 mod stress;
 
@@ -23,6 +24,7 @@ enum What {
     Error(Box<error::BenchError>),
     Speed(Box<speed::BenchSpeed>),
     Fit(fit::BenchFit),
+    Shaders(Box<shaders::BenchShaders>),
     Fractions(fractions::BenchFractions),
     Live(Box<live::BenchLive>),
     Stress(stress::BenchStress),
@@ -36,6 +38,7 @@ impl Bench {
             What::Error(bench) => bench.run(),
             What::Speed(bench) => bench.run(),
             What::Fit(bench) => bench.run(),
+            What::Shaders(bench) => bench.run(),
             What::Fractions(bench) => bench.run(),
             What::Live(bench) => bench.run(),
             What::Stress(bench) => bench.run(),
