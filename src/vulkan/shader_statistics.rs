@@ -42,8 +42,8 @@ impl CompilingDevice {
             .queue_family_index(chosen.queue_family)
             .queue_priorities(&priorities)];
         let extensions = [khr::pipeline_executable_properties::NAME.as_ptr()];
-        let mut tells = vk::PhysicalDevicePipelineExecutablePropertiesFeaturesKHR::default();
-        tells.pipeline_executable_info = vk::TRUE;
+        let mut tells =
+            vk::PhysicalDevicePipelineExecutablePropertiesFeaturesKHR::default().pipeline_executable_info(true);
         let info = vk::DeviceCreateInfo::default()
             .queue_create_infos(&queues)
             .enabled_extension_names(&extensions)
