@@ -9,7 +9,6 @@ use crate::environment::sources::{CLEAR, clearance};
 use crate::environment::{LightMap, SourceRecord};
 use crate::light::{BlurredLight, finest_level};
 use crate::packing::stereographic_decode;
-use crate::threads::Threads;
 use crate::threads::fitted::azimuths::fold_azimuth;
 use crate::threads::fitted::kernel::{FINEST_WIDTH_RAD, level_of_variance, sharp_part, variance_of_level};
 use crate::threads::fitted::{FittedTable, UnpackedKernel};
@@ -81,7 +80,7 @@ impl<'a> Lobe<'a> {
     /// Twin of `away_from`.
     fn away(&self, direction: Vec3) -> f32 {
         let (surface, record) = (&self.point.surface, self.point.record());
-        let is_isotropic = self.point.threads().and_then(Threads::fitted).is_some_and(|table| table.azimuths == 1);
+        let is_isotropic = self.point.fitted_threads().is_some_and(|table| table.azimuths == 1);
         if is_isotropic {
             return direction.distance(self.mirror);
         }
@@ -221,7 +220,7 @@ fn between(a: UnpackedKernel, b: UnpackedKernel, t: f32) -> UnpackedKernel {
 /// # Panics
 /// A scene prepared for another method has other threads.
 pub(super) fn estimate(point: &Point) -> Vec3 {
-    let threads = point.threads().and_then(Threads::fitted).expect("fitted threads or Gaussians are there");
+    let threads = point.fitted_threads().expect("fitted threads or Gaussians are there");
     let surface = &point.surface;
     let light = blurred_light(point.twin);
     let sources = &point.twin.sources;
