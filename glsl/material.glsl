@@ -17,7 +17,8 @@ struct Material {
     float lobe_width;  // half_vector_width in src/brdf/lobe.rs, in radians
     float narrowness;  // the lobe's width across its long axis over the one along it: 1 of an isotropic BRDF
     vec2 long_axis;    // of the lobe, from the tangent; across it the lobe has lobe_width
-    ThreadTable threads;
+    ThreadTable threads;          // of a pixel whose sub-pixels share one sum
+    ThreadTable subpixel_threads; // of each sub-pixel of another pixel
 };
 
 layout(set = 0, binding = 5, std430) readonly buffer Materials {

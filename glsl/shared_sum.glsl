@@ -1,5 +1,5 @@
 // For methods by which the sub-pixels of a pixel that lies on one smooth surface share one sum over all threads, at their mean normal. Of
-// another pixel, each covered sub-pixel is a sum of its own, over one set of the threads: the partition of the paper's section 4.2, for
+// another pixel, each covered sub-pixel is a sum of its own, over one set of other threads: the partition of the paper's section 4.2, for
 // threads that are made such that each set does alone. Twin: shade_shared in src/shading/mod.rs.
 
 // The mean over threads first, first + stride, ... of the material of what each makes of the environment, as if there were no others.
@@ -46,7 +46,11 @@ vec4 shade_pixel(uvec2 pixel, bool interior) {
                 surface = surface_of_subpixel(place, texel);
             }
             Material material = materials[geometry_material(texel)];
-            uint set_count = shares ? 1 : material.threads.set_count;
+            uint set_count = 1;
+            if (!shares) {
+                material.threads = material.subpixel_threads;
+                set_count = material.threads.set_count;
+            }
             sum += vec4(estimate(surface, material, j % set_count, set_count), 1.0);
         }
     } while (++j < parts);

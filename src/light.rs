@@ -65,7 +65,9 @@ impl KernelNeeds {
             sources.iter().any(|source| clearance(0.0, source.width_rad() as f32, lobe_width) < CLEAR[1])
         };
         let is_sharp = |threads: Option<&Threads>| {
-            threads.and_then(Threads::fitted).is_some_and(|table| table.sharp_count(finest_level) > 0)
+            threads.and_then(Threads::fitted).is_some_and(|table| {
+                [table, table.for_subpixels()].iter().any(|table| table.sharp_count(finest_level) > 0)
+            })
         };
         Self {
             map: materials.iter().any(|(_, threads)| is_sharp(*threads)),

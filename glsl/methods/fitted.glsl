@@ -80,16 +80,16 @@ struct AtSources {
     vec3 cosine;
 };
 
-// Of a square of light around a direction of this z, whose standard deviation along z is this: the mean of max(z, 0), and the mean
-// of z with that as weight.
+// Of a square of light around a direction of this z, whose standard deviation along z is this: what part of it has risen above the
+// horizon, times z in the middle of that part; and that z.
 vec2 risen(float z, float deviation) {
     // Light straight above has none.
     float half_side = max(sqrt(3.0) * deviation, 1e-6);
     if (z >= half_side) {
-        return vec2(z, z + half_side * half_side / (3.0 * z));
+        return vec2(z);
     }
     float above = max(z + half_side, 0.0);
-    return vec2(above * above / (4.0 * half_side), 2.0 / 3.0 * above);
+    return vec2(above * above / (4.0 * half_side), 0.5 * above);
 }
 
 AtSources at_sources(Surface surface, Material material, Lobe lobe) {

@@ -3,7 +3,7 @@ use super::{Brdf, LobeAxes, Tabulated, half_vector_width, lobe_axes};
 
 /// `ThreadTable` in glsl/material.glsl.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct ThreadTableRecord {
     /// Where its threads start in the buffer of threads, in elements of that.
     pub first: u32,
@@ -17,6 +17,11 @@ pub struct ThreadTableRecord {
     pub set_count: u32,
     /// Azimuths of the view for which there are rows: 1 of an isotropic BRDF.
     pub azimuth_count: u32,
+}
+
+impl ThreadTableRecord {
+    /// No threads, in one set, of one azimuth.
+    pub const NONE: Self = Self { first: 0, count: 0, row_count: 0, sharp_count: 0, set_count: 1, azimuth_count: 1 };
 }
 
 /// `Material` in glsl/material.glsl.
@@ -37,6 +42,10 @@ pub struct MaterialRecord {
     pub long_axis: [f32; 2],
     /// Its threads.
     pub threads: ThreadTableRecord,
+    /// Those of a sub-pixel that does not share a sum with the others.
+    pub subpixel_threads: ThreadTableRecord,
+    /// The size of a structure in the buffer is a multiple of 16 bytes.
+    pub padding: [u32; 2],
 }
 
 impl MaterialRecord {
@@ -50,7 +59,9 @@ impl MaterialRecord {
             lobe_width: half_vector_width(brdf) as f32,
             narrowness: (narrow_rad / wide_rad) as f32,
             long_axis: wide_azimuth.as_vec2().to_array(),
-            threads: ThreadTableRecord { set_count: 1, azimuth_count: 1, ..ThreadTableRecord::default() },
+            threads: ThreadTableRecord::NONE,
+            subpixel_threads: ThreadTableRecord::NONE,
+            padding: [0; 2],
         }
     }
 

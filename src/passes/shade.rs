@@ -7,7 +7,7 @@ use crate::graph::{BufferDesc, BufferHandle, FrameGraph, ImageDesc, ImageHandle}
 use crate::memo::Keyed;
 use crate::method::Method;
 use crate::scene::Pattern;
-use crate::threads::{SliceTable, SplitSum, Threads};
+use crate::threads::{FittedTable, SliceTable, SplitSum, ThreadTable, Threads};
 use crate::vulkan::{self, Bound, Buffer, ComputePipeline, Device, Sampler, SamplerKind};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
@@ -82,7 +82,7 @@ impl DeviceMaterials {
                 assert_eq!(own_threads.map(Threads::kind), Some(kind), "threads of method {}", method.name());
             }
             if let Some(own_threads) = own_threads {
-                record.threads = threads.add(own_threads);
+                [record.threads, record.subpixel_threads] = threads.add(own_threads);
             }
             record.first_slice = slices.len() as u32;
             records.push(record);
@@ -127,14 +127,34 @@ struct ThreadWords {
 }
 
 impl ThreadWords {
-    fn add(&mut self, threads: &Threads) -> ThreadTableRecord {
-        let (row_count, count) = (threads.size()[0] as u32, threads.device_count() as u32);
-        let first = (self.words.len() / threads.device_element_words()) as u32;
-        self.words.extend(threads.device_words());
-        let table = threads.fitted();
-        let sharp_count = table.zip(self.finest_level).map_or(0, |(table, level)| table.sharp_count(level) as u32);
-        let [set_count, azimuth_count] = table.map_or([1; 2], |table| [table.sets as u32, table.azimuths as u32]);
-        ThreadTableRecord { first, count, row_count, sharp_count, set_count, azimuth_count }
+    /// Those of whole pixels, and of sub-pixels that do not share a sum.
+    fn add(&mut self, threads: &Threads) -> [ThreadTableRecord; 2] {
+        match threads {
+            Threads::Fitted(table) | Threads::Gaussian(table) => {
+                let of_pixels = self.add_kernels(table);
+                let of_subpixels = table.of_subpixels.as_ref().map(|table| self.add_kernels(table));
+                [of_pixels, of_subpixels.unwrap_or(of_pixels)]
+            }
+            Threads::Paper(table) => {
+                let first = (self.words.len() / ThreadTable::DEVICE_ELEMENT_WORDS) as u32;
+                self.words.extend(table.device_words());
+                let (count, row_count) = (table.count as u32, table.rows as u32);
+                [ThreadTableRecord { first, count, row_count, ..ThreadTableRecord::NONE }; 2]
+            }
+        }
+    }
+
+    fn add_kernels(&mut self, table: &FittedTable) -> ThreadTableRecord {
+        let first = self.words.len() as u32;
+        self.words.extend(table.device_words());
+        ThreadTableRecord {
+            first,
+            count: table.used_count() as u32,
+            row_count: table.rows as u32,
+            sharp_count: self.finest_level.map_or(0, |level| table.sharp_count(level) as u32),
+            set_count: table.sets as u32,
+            azimuth_count: table.azimuths as u32,
+        }
     }
 }
 

@@ -90,7 +90,7 @@ impl Scene {
 
     /// A scene from the text of a file whose relative paths start at `base_dir`; see [`Self::load`].
     pub fn parse(text: &str, base_dir: &Path) -> Result<Self> {
-        parse(text, base_dir).map_err(|problem| Error::input("scene", problem, "see the scene file in the README"))
+        parse(text, base_dir).map_err(|problem| Error::input("scene", problem, REMEDY))
     }
 
     /// Writes a scene file that [`Self::load`] reads as this scene: `render` makes the same picture of it, to the bit. Paths of files in
@@ -116,12 +116,15 @@ impl Scene {
     }
 }
 
+/// Of a scene that cannot be used.
+const REMEDY: &str = "the guide shows a scene file with every key, in src/guide/usage.md";
+
 const FORMAT: FileFormat<Scene> =
     FileFormat { extension: "toml", name: "a scene .toml", is_of_format: |_| true, parse: parse_file };
 
 fn parse_file(path: &Path, bytes: &[u8]) -> Result<Scene> {
     parse(text(path, bytes)?, path.parent().unwrap_or(Path::new("")))
-        .map_err(|problem| Error::in_file(path, problem, "see the scene file in the README"))
+        .map_err(|problem| Error::in_file(path, problem, REMEDY))
 }
 
 /// Parses and checks a scene; an error is one line that names line and key.

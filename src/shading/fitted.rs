@@ -9,7 +9,6 @@ use crate::environment::sources::{CLEAR, clearance};
 use crate::environment::{LightMap, SourceRecord};
 use crate::light::{BlurredLight, finest_level};
 use crate::packing::stereographic_decode;
-use crate::threads::Threads;
 use crate::threads::fitted::azimuths::fold_azimuth;
 use crate::threads::fitted::kernel::{FINEST_WIDTH_RAD, level_of_variance, sharp_part, variance_of_level};
 use crate::threads::fitted::{FittedTable, UnpackedKernel};
@@ -81,7 +80,7 @@ impl<'a> Lobe<'a> {
     /// Twin of `away_from`.
     fn away(&self, direction: Vec3) -> f32 {
         let (surface, record) = (&self.point.surface, self.point.record());
-        let is_isotropic = self.point.threads().and_then(Threads::fitted).is_some_and(|table| table.azimuths == 1);
+        let is_isotropic = self.point.fitted_threads().is_some_and(|table| table.azimuths == 1);
         if is_isotropic {
             return direction.distance(self.mirror);
         }
@@ -115,10 +114,10 @@ pub(super) fn needs_subpixels(point: &Point) -> bool {
 fn risen(z: f32, deviation: f32) -> [f32; 2] {
     let half_side = (3.0_f32.sqrt() * deviation).max(1e-6);
     if z >= half_side {
-        return [z, z + half_side * half_side / (3.0 * z)];
+        return [z, z];
     }
     let above = (z + half_side).max(0.0);
-    [above * above / (4.0 * half_side), 2.0 / 3.0 * above]
+    [above * above / (4.0 * half_side), 0.5 * above]
 }
 
 /// Twin of `at_sources`: powers of all sources times f cos, and times cos.
@@ -221,7 +220,7 @@ fn between(a: UnpackedKernel, b: UnpackedKernel, t: f32) -> UnpackedKernel {
 /// # Panics
 /// A scene prepared for another method has other threads.
 pub(super) fn estimate(point: &Point) -> Vec3 {
-    let threads = point.threads().and_then(Threads::fitted).expect("fitted threads or Gaussians are there");
+    let threads = point.fitted_threads().expect("fitted threads or Gaussians are there");
     let surface = &point.surface;
     let light = blurred_light(point.twin);
     let sources = &point.twin.sources;
@@ -245,4 +244,22 @@ pub(super) fn estimate(point: &Point) -> Vec3 {
     sum = share * sum + cosine_part * light.irradiance.lookup_by(surface.frame.z_axis, 0.0, point.twin.fractions);
     sum += f_cos.lerp(cosine * cosine_part / PI, of_kernels);
     sum.max(Vec3::ZERO)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_setting_light_is_integrated_exactly_where_f_or_f_times_the_cosine_is_constant() {
+        let half_side = 0.1;
+        for z in [-0.12_f32, -0.1, -0.05, 0.0, 0.03, 0.09, 0.1, 0.2, 0.9] {
+            let [cos, middle] = risen(z, half_side / 3.0_f32.sqrt());
+            let (low, high) = ((z - half_side).max(0.0), (z + half_side).max(0.0));
+            // The means of f z over a uniform z, with f = 1 and with f = 1 / z.
+            let [mean, part] = [high * high - low * low, 2.0 * (high - low)].map(|sum| sum / (4.0 * half_side));
+            assert!((cos - mean).abs() < 1e-6, "{z}: {cos} instead of {mean}");
+            assert!(cos == 0.0 || (cos / middle - part).abs() < 1e-5, "{z}: {} instead of {part}", cos / middle);
+        }
+    }
 }

@@ -14,7 +14,7 @@ use crate::prepare::{Prepared, PreparedMaterial};
 use crate::scene::Pattern;
 use crate::steps::{Tabulate, light};
 use crate::tangent::any_tangent;
-use crate::threads::{SliceTable, SplitSum, Threads};
+use crate::threads::{FittedTable, SliceTable, SplitSum, Threads};
 use glam::{Mat3, UVec2, Vec2, Vec3, Vec4};
 use low_discrepancy::Stream;
 use random::random_bits;
@@ -227,12 +227,13 @@ impl<'a> CpuShader<'a> {
             point.surface = self.surface_at(position, normal_sum(texels).normalize(), tangent_sum(texels));
             point.surface.normal_variance = normal_variance(texels);
             if !fitted::needs_subpixels(&point) {
+                point.is_pixel = true;
                 return point.estimate().extend(1.0);
             }
         }
         let points = texels.iter().enumerate().filter_map(|(j, texel)| {
             let mut point = self.subpixel(pixel, j, *texel)?;
-            let sets = point.threads().and_then(Threads::fitted).map_or(1, |table| table.sets);
+            let sets = point.fitted_threads().map_or(1, |table| table.sets);
             (point.first, point.stride) = ((j % sets) as u32, sets);
             Some(point)
         });
@@ -264,7 +265,7 @@ impl<'a> CpuShader<'a> {
         let position = (subpixel.as_vec2() + 0.5) / size.as_vec2();
         let surface = self.surface_at(position, normal, tangent.unwrap_or_default());
         let axis = self.to_environment(view.camera_rays().right());
-        Some(Point { twin: self, surface, axis, material, subpixel, first: 0, stride: 1 })
+        Some(Point { twin: self, surface, axis, material, subpixel, first: 0, stride: 1, is_pixel: false })
     }
 }
 
@@ -279,6 +280,8 @@ struct Point<'a> {
     /// Threads or samples `first`, `first + stride`, ...
     first: u32,
     stride: usize,
+    /// Whether it stands for all sub-pixels.
+    is_pixel: bool,
 }
 
 impl Point<'_> {
@@ -293,6 +296,12 @@ impl Point<'_> {
     /// The threads by which it is shaded, for methods that have any.
     fn threads(&self) -> Option<&Threads> {
         self.material().threads.as_deref()
+    }
+
+    /// These, if they are kernels: a sub-pixel that shares no sum has its own.
+    fn fitted_threads(&self) -> Option<&FittedTable> {
+        let table = self.threads()?.fitted()?;
+        Some(if self.is_pixel { table } else { table.for_subpixels() })
     }
 
     fn record(&self) -> &MaterialRecord {

@@ -69,7 +69,7 @@ impl Step for UploadMaterials<'_> {
             let threads = self.materials.iter().filter_map(|(_, threads)| *threads);
             threads
                 .filter_map(|threads| threads.fitted())
-                .map(|table| table.sharp_count(level) as u64)
+                .flat_map(|table| [table, table.for_subpixels()].map(|table| table.sharp_count(level) as u64))
                 .collect::<Vec<_>>()
         });
         Ok(sharp.into_iter().flatten().fold(key, |key, count| key.number(count)).build())

@@ -162,30 +162,6 @@ impl Threads {
         }
     }
 
-    /// The words of the shader's buffer of threads: see [`FittedTable::device_words`] and [`ThreadTable::device_words`].
-    pub fn device_words(&self) -> Vec<u32> {
-        match self {
-            Self::Fitted(table) | Self::Gaussian(table) => table.device_words(),
-            Self::Paper(table) => table.device_words(),
-        }
-    }
-
-    /// How many threads of a row that buffer holds: all but those that have no weight.
-    pub fn device_count(&self) -> usize {
-        match self {
-            Self::Fitted(table) | Self::Gaussian(table) => table.used_count(),
-            Self::Paper(table) => table.count,
-        }
-    }
-
-    /// Words of an element of that buffer, as the shader declares it.
-    pub fn device_element_words(&self) -> usize {
-        match self {
-            Self::Fitted(_) | Self::Gaussian(_) => FittedTable::DEVICE_ELEMENT_WORDS,
-            Self::Paper(_) => ThreadTable::DEVICE_ELEMENT_WORDS,
-        }
-    }
-
     /// The same, with this name of the material.
     pub fn of_material(mut self, name: &str) -> Self {
         match &mut self {
@@ -219,7 +195,8 @@ pub struct ThreadSettings {
     pub rows: usize,
     /// Where the first row's points start.
     pub seed: u64,
-    /// How many sets fitted threads and Gaussians are made in, each of which does alone: thread k is of set k % `sets`. The paper's need none.
+    /// How many sets the fitted threads or Gaussians of sub-pixels are made in, each of which does alone: thread k is of set k % `sets`.
+    /// Whole pixels have others, except of an anisotropic BRDF. The paper's need no sets.
     pub sets: usize,
 }
 

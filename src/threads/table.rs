@@ -82,7 +82,7 @@ impl ThreadTable {
     }
 
     /// Words of an element of the shader's buffer: a vec4.
-    pub(super) const DEVICE_ELEMENT_WORDS: usize = 4;
+    pub const DEVICE_ELEMENT_WORDS: usize = 4;
 
     /// The buffer of the shader. Row by row: the albedo, then the threads as [`Sample::device_vector`].
     pub fn device_words(&self) -> Vec<u32> {

@@ -355,10 +355,14 @@ pub fn threads() -> Reader {
                 albedo: vec![[0.1, 0.2, 0.4]; rows * azimuths],
                 relative_error: vec![1e-3; rows * azimuths],
                 kernels: vec![PackedKernel([0x1234_5678, 0x3800_4000, 0x3400_3000]); 2 * rows * azimuths],
+                of_subpixels: None,
             };
-            let (isotropic, anisotropic) = (Threads::Fitted(fitted(2, 1)), Threads::Fitted(fitted(1, 10)));
+            // Those of sub-pixels have no name, and a row where whole pixels have two.
+            let of_subpixels = Some(Box::new(FittedTable { material: String::new(), ..fitted(1, 1) }));
+            let of_both = FittedTable { sets: 1, of_subpixels, ..fitted(2, 1) };
+            let (isotropic, anisotropic) = (Threads::Fitted(of_both.clone()), Threads::Fitted(fitted(1, 10)));
             let file = |threads| written("x.threads", |path| threads::write(&threads, path).expect("a file"));
-            vec![file(Threads::Paper(paper)), file(isotropic), file(anisotropic), file(Threads::Gaussian(fitted(2, 1)))]
+            vec![file(Threads::Paper(paper)), file(isotropic), file(anisotropic), file(Threads::Gaussian(of_both))]
         },
         words: &[
             "\"rows\":",

@@ -7,7 +7,7 @@ use super::kernel::{FINEST_WIDTH_RAD, Kernel, SHARPEST_LEVEL, WIDEST_LEVEL, scal
 use crate::threads::slice::Slice;
 
 /// Sets of fewer kernels than this start from the same cells: dealt out, single cells leave kernels where no step brings them to the others.
-pub(super) const FEWEST_DEALT: usize = 4;
+const FEWEST_DEALT: usize = 4;
 
 /// How far such sets start apart, in widths of their kernels: where they are the same, no step would part them.
 const APART: f64 = 0.25;

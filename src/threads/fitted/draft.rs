@@ -36,6 +36,14 @@ const LIGHTS_A_THREAD: usize = 16;
 /// # Errors
 /// Cancelled by `observer`.
 pub fn draft(brdf: &Brdf, before: &FittedTable, observer: &dyn Observer) -> Result<FittedTable> {
+    let Some(of_subpixels) = &before.of_subpixels else { return continued(brdf, before, observer) };
+    let (of_pixels, of_subpixels) =
+        rayon::join(|| continued(brdf, before, observer), || continued(brdf, of_subpixels, observer));
+    Ok(FittedTable { of_subpixels: Some(Box::new(of_subpixels?)), ..of_pixels? })
+}
+
+/// The threads of `before`, but not those of its sub-pixels.
+fn continued(brdf: &Brdf, before: &FittedTable, observer: &dyn Observer) -> Result<FittedTable> {
     let FittedTable { rows, count, sets, .. } = *before;
     let mut places: Vec<usize> = (0..rows).step_by(ROW_STEP).collect();
     if !places.contains(&(rows - 1)) {

@@ -5,7 +5,6 @@ use faer::{Accum, Mat, MatRef, Par, Side};
 use glam::{DVec3, dvec3};
 
 use super::answers::Answers;
-use super::cells::FEWEST_DEALT;
 use super::kernel::{Kernel, WIDEST_LEVEL, scale_rad};
 use super::lights::TestLights;
 use crate::error::{Error, Result};
@@ -27,10 +26,6 @@ const LEAST_DAMPING: f32 = 1e-6;
 /// so far apart that their errors do not cancel err more; with more, all others do. Of ten measured materials in three maps, with 16 threads
 /// and at 80 x 60, a dragon has 0.0018, 0.0016 and 0.0015 with 0.5, 0.7 and 1.5, a sphere 0.0016, 0.0015 and 0.0017.
 const SHARE_OF_SETS: f32 = 0.7;
-
-/// The same for sets of fewer than [`FEWEST_DEALT`] kernels: with 0.7 sets of one kernel are all the same one, and 4 threads are as good as 1.
-/// Of four materials in two maps, 4 threads at 160 x 120, a sphere has 0.0140 with this instead of 0.0159, a dragon 0.0112 instead of 0.0105.
-const SHARE_OF_SMALL_SETS: f32 = 0.2;
 
 /// What kernels leave.
 struct Rest {
@@ -98,24 +93,18 @@ impl<'a> Fit<'a> {
         })
     }
 
-    /// How much the squared residuals of sets alone count: see [`SHARE_OF_SETS`].
-    fn share_of_sets(&self, kernels: &[Kernel]) -> f32 {
-        if kernels.len() / self.sets >= FEWEST_DEALT { SHARE_OF_SETS } else { SHARE_OF_SMALL_SETS }
-    }
-
     /// What is left to answer, with the cost of that.
     fn rest(&self, kernels: &[Kernel], answers: &Answers) -> Rest {
         let together = self.residuals(kernels, answers, None);
         let mut cost = squares(&together) + self.prior_cost(kernels);
-        let share = self.share_of_sets(kernels);
         if self.sets == 1 {
             return Rest { cost, of_sets: vec![together] };
         }
         let of_set = |set: usize| {
             let mut alone = self.residuals(kernels, answers, Some(set));
-            cost += f64::from(share) / self.sets as f64 * squares(&alone);
+            cost += f64::from(SHARE_OF_SETS) / self.sets as f64 * squares(&alone);
             for (alone, together) in alone.iter_mut().zip(&together) {
-                alone.iter_mut().zip(together).for_each(|(a, t)| *a = t + share * *a);
+                alone.iter_mut().zip(together).for_each(|(a, t)| *a = t + SHARE_OF_SETS * *a);
             }
             alone
         };
@@ -228,7 +217,7 @@ impl<'a> Fit<'a> {
         let m = kernels.len();
         let weights: Vec<_> = kernels.iter().map(|kernel| kernel.weight.as_vec3()).collect();
         // Kernels of a set are in its residuals too, with as many times the weights as there are sets.
-        let within = if self.sets == 1 { 1.0 } else { 1.0 + self.share_of_sets(kernels) * self.sets as f32 };
+        let within = if self.sets == 1 { 1.0 } else { 1.0 + SHARE_OF_SETS * self.sets as f32 };
         let coupling = |k: usize, l: usize| if k % self.sets == l % self.sets { within } else { 1.0 };
         let mut hessian = Mat::zeros(6 * m, 6 * m);
         let mut gradient = vec![0.0; 6 * m];

@@ -91,9 +91,21 @@ pub struct FittedTable {
     pub relative_error: Vec<f32>,
     /// Row by row: thread k of row r of azimuth a is `kernels[(a * rows + r) * count + k]`.
     pub kernels: Vec<PackedKernel>,
+    /// As many threads in sets, for sub-pixels that do not share a sum, where whole pixels have threads of their own. It bears no name.
+    pub of_subpixels: Option<Box<Self>>,
 }
 
 impl FittedTable {
+    /// The threads of sub-pixels that do not share a sum.
+    pub fn for_subpixels(&self) -> &Self {
+        self.of_subpixels.as_deref().unwrap_or(self)
+    }
+
+    /// How many tables there are, of as many threads each: one of isotropic BRDFs for whole pixels, and one in sets.
+    pub(in super::super) fn table_count(azimuths: usize, sets: usize) -> usize {
+        if azimuths == 1 && sets > 1 { 2 } else { 1 }
+    }
+
     /// The kernels of `row`, one per thread; rows of the second azimuth follow those of the first.
     pub fn row(&self, row: usize) -> &[PackedKernel] {
         &self.kernels[row * self.count..][..self.count]
@@ -166,9 +178,6 @@ impl FittedTable {
         self.used().iter().rposition(is_sharp).map_or(0, |last| last + 1)
     }
 
-    /// Words of an element of the shader's buffer: its array is of words.
-    pub(in super::super) const DEVICE_ELEMENT_WORDS: usize = 1;
-
     /// The buffer of the shader. Row by row: the albedo, then the kernels that are used, those of threads that are sharp anywhere first.
     pub fn device_words(&self) -> Vec<u32> {
         let used = &self.used();
@@ -182,11 +191,12 @@ impl FittedTable {
     /// Words of a row in a file, besides its threads.
     pub(in super::super) const FILE_ROW_WORDS: usize = 4;
 
-    /// The words of a file: albedo and relative error of each row, then the kernels.
+    /// The words of a file: albedo and relative error of each row, then the kernels; then the same of sub-pixels' own threads.
     pub(in super::super) fn file_words(&self) -> Vec<u32> {
         let rows = self.albedo.iter().zip(&self.relative_error);
         let rows = rows.flat_map(|([red, green, blue], error)| [*red, *green, *blue, *error]).map(f32::to_bits);
-        rows.chain(self.kernels.iter().flat_map(|kernel| kernel.0)).collect()
+        let words = rows.chain(self.kernels.iter().flat_map(|kernel| kernel.0));
+        words.chain(self.of_subpixels.iter().flat_map(|table| table.file_words())).collect()
     }
 
     /// Rows and kernels of such words. A foreign writer can get the checksum right and a number wrong.
@@ -201,7 +211,17 @@ impl FittedTable {
         if !kernels.iter().all(|kernel| kernel.is_usable()) {
             return Err("holds a thread whose level or weight is none".into());
         }
-        Ok(Self { rows: 0, azimuths: 0, count: 0, sets: 0, material: String::new(), albedo, relative_error, kernels })
+        Ok(Self {
+            rows: 0,
+            azimuths: 0,
+            count: 0,
+            sets: 0,
+            material: String::new(),
+            albedo,
+            relative_error,
+            kernels,
+            of_subpixels: None,
+        })
     }
 
     /// Packs rows of kernels, with the albedo and the relative error of each; as many rows for each of `azimuths`.
@@ -216,6 +236,7 @@ impl FittedTable {
             albedo: rows.iter().map(|(_, albedo, _)| albedo.as_vec3().to_array()).collect(),
             relative_error: rows.iter().map(|&(.., error)| error as f32).collect(),
             kernels,
+            of_subpixels: None,
         }
     }
 }

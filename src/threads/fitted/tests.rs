@@ -177,11 +177,15 @@ fn alone(table: &FittedTable, set: usize) -> FittedTable {
 fn each_set_of_threads_does_alone_and_all_do_better() {
     for (name, brdf) in test_materials::all().into_iter().filter(|(name, _)| *name != "lambert") {
         let error = |table: &FittedTable| validation_error(table, &brdf);
-        let table = generate(&brdf, &ThreadSettings { sets: 4, ..small(16, 30) }, &()).unwrap();
-        let [few, many] = [4, 16].map(|count| error(&generate(&brdf, &small(count, 30), &()).unwrap()));
-        let each: Vec<_> = (0..4).map(|set| error(&alone(&table, set))).collect();
-        let all = error(&table);
-        println!("{name}: {few:.4} with 4 threads, {each:.4?} with sets of 4, {all:.4} with all 16, {many:.4} if free");
+        let table = generate(&brdf, &ThreadSettings { sets: 4, ..small(16, 90) }, &()).unwrap();
+        let [few, free] = [4, 16].map(|count| generate(&brdf, &small(count, 90), &()).unwrap());
+        assert!(table.kernels == free.kernels && table.sets == 1, "{name}: whole pixels have free threads");
+        let [few, free] = [few, free].map(|table| error(&table));
+        let table = table.for_subpixels();
+        assert_eq!((table.sets, table.rows), (4, 45));
+        let each: Vec<_> = (0..4).map(|set| error(&alone(table, set))).collect();
+        let all = error(table);
+        println!("{name}: {few:.4} with 4 threads, {each:.4?} with sets of 4, {all:.4} with all 16, {free:.4} if free");
         // Of a lobe of 0.3 degrees, which 4 threads answer as 16 do, one set has 2.5 times the error of the others.
         assert!(each.iter().all(|&each| each < 3.0 * few), "{name}: {few} {each:?}");
         assert!(all < few && all < each.iter().sum::<f64>() / 4.0, "{name}: {all} {few} {each:?}");
