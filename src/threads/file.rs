@@ -15,8 +15,8 @@
 //! cos theta_o). Colours are linear Rec. 709. Thread k of row r is the (r count + k)-th. Of an anisotropic BRDF there are as many rows for
 //! each of 10, 19 or 37 azimuths of w_o from the tangent, every 10 degrees; then those of the second azimuth follow those of the first.
 //! Of fitted threads and Gaussians in several sets thread k is of set k % sets: each set does alone, with as many times the weights as there are sets.
-//! With sets but without azimuths these are the threads of sub-pixels, in every second row if the number of rows is even. As many threads in one
-//! set come before them, in all rows: those of pixels whose sub-pixels share one sum.
+//! With sets but without azimuths these are the threads of sub-pixels. As many rows and threads, of one set, come before them: those of pixels
+//! whose sub-pixels share one sum.
 //!
 //! | method | a row | a thread |
 //! |---|---|---|
@@ -32,7 +32,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::fitted::{FittedTable, rows_of_subpixels};
+use super::fitted::FittedTable;
 use super::{ThreadKind, ThreadTable, Threads};
 use crate::error::{Error, Result};
 use crate::file_format;
@@ -130,28 +130,26 @@ fn decode(bytes: &[u8]) -> Result<Threads, String> {
         ThreadKind::Fitted | ThreadKind::Gaussian => FittedTable::FILE_ROW_WORDS,
         ThreadKind::Paper => ThreadTable::FILE_ROW_WORDS,
     };
-    let in_two = kind.are_kernels() && FittedTable::table_count(azimuths, sets) == 2;
-    let second_rows = if in_two { rows_of_subpixels(rows) } else { 0 };
+    let tables = FittedTable::table_count(azimuths, sets);
     let per_row = count.checked_mul(3).and_then(|words| words.checked_add(words_a_row));
-    let words_of = |rows: usize| per_row?.checked_mul(rows.checked_mul(azimuths)?);
-    let first_words = words_of(rows);
-    let expected = first_words.and_then(|words| words.checked_add(words_of(second_rows)?)?.checked_mul(4));
+    let all_rows = rows.checked_mul(azimuths);
+    let expected = per_row.and_then(|words| words.checked_mul(all_rows?)?.checked_mul(4 * tables));
     let is_possible = (azimuths, sets) == (1, 1)
         || kind.are_kernels() && [1, 10, 19, 37].contains(&azimuths) && (1..=count).contains(&sets);
     if count == 0 || rows == 0 || !is_possible || expected != Some(payload.len()) {
         return Err("has a header that does not fit its content".into());
     }
     let words: Vec<u32> = payload.as_chunks().0.iter().map(|&word| u32::from_le_bytes(word)).collect();
-    let (first, second) = words.split_at(first_words.unwrap_or(0));
+    let (first, second) = words.split_at(words.len() / tables);
     Ok(match kind {
         ThreadKind::Fitted | ThreadKind::Gaussian => {
-            let table = |words: &[u32], rows: usize, sets| -> Result<_, String> {
+            let table = |words: &[u32], sets| -> Result<_, String> {
                 let (of_rows, of_threads) = words.split_at(words_a_row * rows * azimuths);
                 let table = FittedTable::from_file_words(of_rows, of_threads)?;
                 Ok(FittedTable { rows, azimuths, count, sets, ..table })
             };
-            let of_subpixels = in_two.then(|| table(second, second_rows, sets).map(Box::new)).transpose()?;
-            let table = table(first, rows, if in_two { 1 } else { sets })?;
+            let of_subpixels = (tables == 2).then(|| table(second, sets).map(Box::new)).transpose()?;
+            let table = table(first, if tables == 2 { 1 } else { sets })?;
             let table = FittedTable { material, of_subpixels, ..table };
             if kind == ThreadKind::Fitted { Threads::Fitted(table) } else { Threads::Gaussian(table) }
         }
@@ -193,10 +191,8 @@ mod tests {
         let of_subpixels = FittedTable {
             sets: 2,
             material: String::new(),
-            rows: 1,
-            albedo: vec![[0.1, 0.2, 0.4]],
-            relative_error: vec![2e-3],
-            kernels: vec![PackedKernel([0x4321_8765, 0x3000_3800, 0x3000_3400]); 2],
+            relative_error: vec![2e-3; 2],
+            kernels: vec![PackedKernel([0x4321_8765, 0x3000_3800, 0x3000_3400]); 4],
             ..two.clone()
         };
         FittedTable { of_subpixels: Some(Box::new(of_subpixels)), ..two }

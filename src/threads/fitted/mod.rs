@@ -32,7 +32,7 @@ mod validate;
 pub use azimuths::azimuth_count;
 pub use draft::draft;
 pub use generate::generate;
-pub(super) use sets::{rows_of_subpixels, set_count};
+pub(super) use sets::set_count;
 pub use table::{FittedTable, PackedKernel, UnpackedKernel};
 pub use validate::validation_error;
 
