@@ -1,6 +1,7 @@
 #version 450
 // Puts the environment behind what the surface does not cover.
 #extension GL_GOOGLE_include_directive : require
+#include "bounded.glsl"
 #include "camera.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
@@ -29,6 +30,6 @@ void main() {
     // Lat-long: phi from -z towards +x, theta from +y. At the poles any phi will do, but atan(0, 0) is undefined.
     float phi = abs(d.x) + abs(d.z) > 0.0 ? atan(d.x, -d.z) : 0.0;
     vec2 uv = vec2(phi / radians(360.0), acos(clamp(d.y, -1.0, 1.0)) / radians(180.0));
-    vec3 behind = textureLod(environment_map, uv, 0.0).rgb * push.radiance_scale;
-    imageStore(radiance, pixel, vec4(surface.rgb + (1.0 - surface.a) * behind, 1.0));
+    vec3 behind = bounded(textureLod(environment_map, uv, 0.0).rgb * push.radiance_scale);
+    imageStore(radiance, pixel, vec4(bounded(surface.rgb + (1.0 - surface.a) * behind), 1.0));
 }

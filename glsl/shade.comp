@@ -3,6 +3,7 @@
 #extension GL_EXT_control_flow_attributes : require
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_samplerless_texture_functions : require
+#include "bounded.glsl"
 #include "camera.glsl"
 #include "geometry_texel.glsl"
 #include "surface.glsl"
@@ -45,6 +46,7 @@ layout(push_constant) uniform Push {
     uint sample_count;      // threads, or samples, of a pixel
     uvec2 seed;             // low and high half
     float finest_level;     // the level of a kernel that is level 0 of the blurred environment
+    float intensity;        // of the environment: apart from radiance_scale, since the product of the two may be infinite
 } push;
 
 #include "material.glsl"
@@ -84,7 +86,7 @@ vec3 brdf_at(Surface surface, Material material, vec3 w_i, vec3 w_o) {
 }
 
 // A method defines what a surface's `estimate` is, and includes partition.glsl or shared_sum.glsl, which say what that is to a pixel:
-// `vec4 shade_pixel(uvec2 pixel, bool interior)` is its radiance times coverage, over radiance_scale, and its coverage. It includes what
+// `vec4 shade_pixel(uvec2 pixel, bool interior)` is its radiance times coverage, over radiance_scale and intensity, and its coverage. It includes what
 // it looks up; nothing else of the scene is made or uploaded.
 #include "method.glsl"
 
@@ -107,7 +109,8 @@ void main() {
             uint place = pixel_list.pixels[tile * TILE_PIXELS + slot];
             uvec2 pixel = uvec2(tile % tiles.x, tile / tiles.x) * TILE_SIDE + uvec2(place % TILE_SIDE, place / TILE_SIDE);
             vec4 shaded = shade_pixel(pixel, interior);
-            imageStore(radiance, ivec2(pixel), vec4(shaded.rgb * push.radiance_scale, shaded.a));
+            vec3 scaled = bounded(bounded(shaded.rgb * push.radiance_scale) * push.intensity);
+            imageStore(radiance, ivec2(pixel), vec4(scaled, shaded.a));
         }
         t += gl_NumWorkGroups.x;
     } while (t < counters.classes[push.kind].tile_count);

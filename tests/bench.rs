@@ -237,13 +237,15 @@ fn live_measures_the_drafts_of_a_dragged_parameter() {
 }
 
 #[test]
-fn a_hard_case_is_shaded_as_on_the_cpu() {
+fn hard_cases_are_shaded_as_on_the_cpu() {
     let folder = tempfile::tempdir().unwrap();
-    let text = bench(&folder, "stress --only angles --json rows.json");
+    // Two meshes, one after the other in the same file.
+    let text = bench(&folder, "stress --only angles --only slivers --json rows.json");
     assert!(text.contains("normals at all angles to the view") && !text.contains("broken"), "{text}");
     let rows = json(&folder, "rows.json");
     let methods: Vec<_> = rows.as_array().unwrap().iter().map(|row| row["method"].as_str().unwrap()).collect();
-    assert_eq!(methods, ["fitted", "paper", "gaussian"]);
+    assert_eq!(methods, ["fitted", "paper", "gaussian", "fitted", "paper", "gaussian"]);
+    assert!(rows[0]["covered"] != rows[3]["covered"], "{rows}");
     let fields = ["bright", "case", "covered", "method", "most", "not_finite", "rms", "wrongly_shown"];
     assert_eq!(keys(&rows[0]), fields);
     assert!(rows[0]["covered"].as_u64() > Some(1000) && rows[0]["rms"].as_f64() < Some(2e-3), "{rows}");

@@ -5,13 +5,17 @@ use super::{Environment, FORMATS, RepairCounts, procedural};
 use crate::error::{Error, Result};
 use crate::file_format::FileKind;
 
+/// The most radiance that a pixel of an environment has: sums over all pixels of a map, and BRDFs of up to 1e8 times it, are then numbers
+/// of single precision.
+const MOST_RADIANCE: f32 = 1e30;
+
 impl Environment {
     /// The formats of environment files.
     pub const FILES: FileKind<Self> =
         FileKind { what: "environment", formats: FORMATS, builtin_names: || procedural::builtin_names().to_vec() };
 
-    /// Reads a lat-long picture of any size: see [`Self::FILES`]. Pixels that are NaN, infinite or negative are repaired and reported as
-    /// a warning.
+    /// Reads a lat-long picture of any size: see [`Self::FILES`]. Pixels that are NaN, infinite, above 1e30 or negative are repaired and
+    /// reported as a warning.
     ///
     /// # Errors
     /// What cannot be read or is no picture.
@@ -32,7 +36,9 @@ impl Environment {
         let repaired = repair(width, height, &mut texels);
         if repaired != RepairCounts::default() {
             let RepairCounts { nan, infinite, negative } = repaired;
-            tracing::warn!("{name}: repaired pixels: {nan} NaN, {infinite} infinite, {negative} negative");
+            tracing::warn!(
+                "{name}: repaired pixels: {nan} NaN, {infinite} infinite or above 1e30, {negative} negative"
+            );
         }
         Self::new(name, width, height, texels, repaired)
     }
@@ -42,6 +48,7 @@ impl Environment {
 fn repair(width: usize, height: usize, texels: &mut [[f32; 3]]) -> RepairCounts {
     let mut counts = RepairCounts::default();
     let largest = texels.iter().flatten().copied().filter(|value| value.is_finite()).fold(0.0, f32::max);
+    let largest = largest.min(MOST_RADIANCE);
     let mut holes = Vec::new();
     let mut deficits = Vec::new();
     for (index, texel) in texels.iter_mut().enumerate() {
@@ -51,7 +58,7 @@ fn repair(width: usize, height: usize, texels: &mut [[f32; 3]]) -> RepairCounts 
             continue;
         }
         // Minus infinity counts as infinite, and is then as black as any negative value.
-        counts.infinite += usize::from(texel.iter().any(|value| value.is_infinite()));
+        counts.infinite += usize::from(texel.iter().any(|value| value.is_infinite() || *value > MOST_RADIANCE));
         if texel.iter().all(|value| value.is_finite()) && texel.iter().any(|&value| value < 0.0) {
             counts.negative += 1;
             deficits.extend((0..3).filter(|&channel| texel[channel] < 0.0).map(|c| (index, c, -f64::from(texel[c]))));
@@ -163,6 +170,14 @@ mod tests {
         assert_eq!(environment.texels[8], [50.0, 1.0, 0.0]);
         assert_eq!(environment.texels[30], [0.0, 1.0, 1.0]);
         assert_eq!(environment.texels[17], [0.0, 50.0, 1.0]);
+    }
+
+    #[test]
+    fn light_is_not_brighter_than_sums_of_it_can_be() {
+        let environment =
+            Environment::repaired(String::new(), 2, 1, vec![[f32::MAX, 1.0, 0.0], [f32::INFINITY, 1.0, 0.0]]);
+        assert_eq!(environment.texels, [[MOST_RADIANCE, 1.0, 0.0]; 2]);
+        assert_eq!(environment.repaired, RepairCounts { infinite: 2, ..RepairCounts::default() });
     }
 
     #[test]

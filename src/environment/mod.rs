@@ -32,7 +32,7 @@ file_formats!(Environment: hdr_file, exr_file);
 pub struct RepairCounts {
     /// Pixels with a NaN: replaced by the mean of those of their eight neighbours that were whole, or by black.
     pub nan: usize,
-    /// Pixels with an infinite channel: set to the largest finite value in the file.
+    /// Pixels with a channel that is infinite or above 1e30: set to the largest finite value in the file, but at most to 1e30.
     pub infinite: usize,
     /// Pixels with a negative channel (colours outside Rec. 709, or ringing): set to 0, and what they lacked taken from
     /// their surroundings, so that the light stays the same as a whole.

@@ -1,7 +1,7 @@
 //! Outputs on disk: a file each, named by its key.
 use super::Key;
 use crate::error::{Error, Result};
-use crate::output::make_way;
+use crate::output::keep_file;
 use std::path::{Path, PathBuf};
 
 /// Reads an output from the file at a path.
@@ -46,13 +46,9 @@ impl<T> Stored<'_, T> {
         output.inspect_err(|error| tracing::warn!("what was kept on disk is useless: {error}")).ok()
     }
 
-    /// Keeps `output` under `key`. A folder that cannot be written to costs time later, nothing else, so it only warns.
+    /// Keeps `output` under `key`, if that can be.
     pub(super) fn write(&self, folder: &Path, key: Key, output: &T) {
         let path = self.path(folder, key);
-        let made = std::fs::create_dir_all(folder).map_err(|cause| Error::unwritable(folder, cause));
-        let written = made.and_then(|()| make_way(&path)).and_then(|()| (self.write)(&path, output));
-        if let Err(error) = written {
-            tracing::warn!("what was made is not kept on disk: {error}");
-        }
+        keep_file(&path, || (self.write)(&path, output));
     }
 }

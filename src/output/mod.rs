@@ -4,14 +4,15 @@ use std::path::Path;
 use crate::error::{Error, Result};
 use crate::file_format;
 
+mod cache_file;
 mod exr_file;
 mod png_file;
 mod whole_file;
 
+pub(crate) use cache_file::keep_file;
 pub(crate) use exr_file::parse_exr;
 pub use exr_file::{ExrHeader, write_exr};
 pub use png_file::write_png;
-pub(crate) use whole_file::make_way;
 pub use whole_file::{check_writable, write_whole};
 
 /// The file formats of a picture, told apart by the extension of the file's name.

@@ -194,6 +194,7 @@ struct Push {
     sample_count: u32,
     seed: [u32; 2],
     finest_level: f32,
+    intensity: f32,
 }
 
 impl Push {
@@ -204,10 +205,11 @@ impl Push {
             kind,
             face_size: light.face_size(),
             rotation: view.rotation(),
-            radiance_scale: view.intensity as f32 * light.radiance_scale(),
+            radiance_scale: light.radiance_scale(),
             sample_count: sampling.count,
             seed: [sampling.seed as u32, (sampling.seed >> 32) as u32],
             finest_level: light.finest_level,
+            intensity: view.intensity as f32,
         }
     }
 }

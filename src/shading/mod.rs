@@ -200,7 +200,7 @@ impl<'a> CpuShader<'a> {
             true => self.shade_shared(pixel, texels, interior),
             false => self.shade_partition(pixel, texels, interior),
         };
-        (shaded.truncate() * self.prepared.view.intensity as f32).extend(shaded.w)
+        bounded(shaded.truncate() * self.prepared.view.intensity as f32).extend(shaded.w)
     }
 
     /// Twin of `shade_pixel` in glsl/partition.glsl.
@@ -367,6 +367,12 @@ impl Point<'_> {
     fn slices(&self) -> &SliceTable {
         &self.twin.slices[self.material]
     }
+}
+
+/// Radiance that is finite: what would be more is the largest number of single precision. What is no number stays so. Twin of
+/// glsl/bounded.glsl.
+fn bounded(radiance: Vec3) -> Vec3 {
+    Vec3::select(radiance.cmpgt(Vec3::MAX), Vec3::MAX, radiance)
 }
 
 /// Display value in [0, 1] of linear radiance. Twin of glsl/tone_map.comp.

@@ -30,12 +30,12 @@ impl WeightedSum {
     }
 }
 
-/// Where a view angle lies among the rows.
+/// Where a view lies among the rows.
 struct Rows {
     below: usize,
     above: usize,
     t: f32,
-    theta_o: f32,
+    w_o: Vec3,
 }
 
 /// The point with the threads of its material.
@@ -54,12 +54,17 @@ pub(super) fn estimate(point: &Point) -> Vec3 {
 }
 
 impl Paper<'_> {
-    fn rows_at(&self, theta_o: f32) -> Rows {
+    fn rows_at(&self, surface: &Surface) -> Rows {
         let count = self.threads.rows;
-        let row = (theta_o * (count as f32 / FRAC_PI_2)).min((count - 1) as f32);
+        let last = (count - 1) as f32;
+        let mut row = surface.theta_o * (count as f32 / FRAC_PI_2);
+        let mut w_o = surface.view_direction();
+        if row > last {
+            let (sin, cos) = (last * (FRAC_PI_2 / count as f32)).sin_cos();
+            (row, w_o) = (last, Vec3::new(sin, 0.0, cos));
+        }
         let below = row as usize;
-        let above = (below + 1).min(count - 1);
-        Rows { below, above, t: row - below as f32, theta_o: row * (FRAC_PI_2 / count as f32) }
+        Rows { below, above: (below + 1).min(count - 1), t: row - below as f32, w_o }
     }
 
     fn thread(&self, row: usize, k: usize) -> Vec4 {
@@ -86,11 +91,10 @@ impl Paper<'_> {
     }
 
     fn threads_following_view(&self, surface: &Surface, rows: &Rows) -> Vec3 {
-        let w_o = Vec3::new(rows.theta_o.sin(), 0.0, rows.theta_o.cos());
         let mut sum = WeightedSum::default();
         for k in self.partition() {
             let between = self.thread(rows.below, k).lerp(self.thread(rows.above, k), rows.t);
-            self.add_term(&mut sum, surface.frame, between.truncate().normalize(), w_o, between.w);
+            self.add_term(&mut sum, surface.frame, between.truncate().normalize(), rows.w_o, between.w);
         }
         sum.weighted_mean()
     }
@@ -112,7 +116,7 @@ impl Paper<'_> {
     }
 
     fn estimate(&self, surface: &Surface, axis: Vec3) -> Vec3 {
-        let rows = self.rows_at(surface.theta_o);
+        let rows = self.rows_at(surface);
         let (from, to) = (FACING_DEG.to_radians(), TURNING_DEG.to_radians());
         let x = ((surface.theta_o - from) / (to - from)).clamp(0.0, 1.0);
         let following = x * x * (3.0 - 2.0 * x);

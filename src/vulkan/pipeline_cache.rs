@@ -1,7 +1,7 @@
 //! The driver's cache of compiled pipelines, on disk.
 use super::device::Device;
 use super::error::{Result, call};
-use crate::output::{make_way, write_whole};
+use crate::output::{keep_file, write_whole};
 use ash::vk;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -34,7 +34,7 @@ impl PipelineCache {
         Ok(Self { raw, file, device: device.clone() })
     }
 
-    /// Writes the file. A folder that cannot be written costs time at the next start, nothing else, so it only warns.
+    /// Writes the file, if that can be.
     fn save(&self) {
         let Some(file) = &self.file else { return };
         // SAFETY: plain query of a live cache.
@@ -46,11 +46,7 @@ impl PipelineCache {
         if crate::file_format::read(file).is_ok_and(|old| old == contents) {
             return;
         }
-        // If the folder cannot be made, neither can the file, and that is what to say.
-        let _ = file.parent().map(std::fs::create_dir_all);
-        if let Err(cause) = make_way(file).and_then(|()| write_whole(file, &contents)) {
-            tracing::warn!("the pipeline cache was not saved: {cause}");
-        }
+        keep_file(file, || write_whole(file, &contents));
     }
 }
 

@@ -11,12 +11,13 @@ fn assert_refused(output: &Output, code: i32, words: &[&str]) {
     assert!(words.iter().all(|word| reasons[0].contains(word)) && !said.contains("panicked"), "{said}");
 }
 
-/// Checks that `command` makes the `picture`.
-fn assert_made(place: &Place, mut command: Command, picture: &[u8]) {
+/// Checks that `command` makes the `picture`; what it said.
+fn assert_made(place: &Place, mut command: Command, picture: &[u8]) -> String {
     let output = command.output().unwrap();
     assert!(output.status.success() && !said(&output).contains("panicked"), "{command:?}: {}", said(&output));
     assert!(std::fs::read(place.path("picture.png")).unwrap() == picture, "{command:?}");
     std::fs::remove_file(place.path("picture.png")).unwrap();
+    said(&output)
 }
 
 #[test]
@@ -71,7 +72,9 @@ fn a_cache_that_is_of_no_use_costs_time_and_nothing_else() {
     };
     // A file, a folder in which nobody may make one, a device.
     for cache in ["light.hdr", "/proc/self", "/dev/full"] {
-        assert_made(&place, with_cache(cache), picture);
+        let said = assert_made(&place, with_cache(cache), picture);
+        assert_eq!(said.matches("is not kept on disk").count(), 1, "{said}");
+        assert_eq!(said.lines().count(), 1, "{said}");
     }
     // Nobody is root for whom a folder is read-only.
     std::fs::create_dir(place.path("locked")).unwrap();

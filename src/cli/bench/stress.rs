@@ -15,7 +15,7 @@ const EXAMPLES: &str = "\
 Examples:
   threadlight bench stress
   threadlight bench stress --device swiftshader --json stress.json
-  threadlight bench stress --all --only table
+  threadlight bench stress --all --only table --only lamps
 
 Materials, surfaces, light, views and pictures at the ends of what they may be, by fitted threads and by the paper's: 8 of them,
 64 x 48 pixels. With --all also what takes long, by all methods, and all once more under light so bright that pyramids are in
@@ -39,9 +39,9 @@ pub struct BenchStress {
     /// All cases, by all methods, with pyramids in both of their formats: takes many minutes on a CPU.
     #[arg(long)]
     all: bool,
-    /// Only the cases whose names have this in them.
+    /// Only the cases whose names have this in them, or another TEXT of another --only.
     #[arg(long, value_name = "TEXT")]
-    only: Option<String>,
+    only: Vec<String>,
     /// Write all measurements as JSON.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,

@@ -37,8 +37,8 @@ const BRIGHT: f64 = 1e9;
 pub struct Extent {
     /// All of them, by all methods, with pyramids in both formats; else those that take little time, by the methods that have threads.
     pub all: bool,
-    /// Only those that have this in their names.
-    pub only: Option<String>,
+    /// Only those that have one of these in their names; none of these are all.
+    pub only: Vec<String>,
 }
 
 /// What became of a case.
@@ -88,7 +88,8 @@ pub fn run(
 ) -> Result<()> {
     let folder = tempfile::tempdir().map_err(|cause| Error::unwritable(std::env::temp_dir(), cause))?;
     let is_asked = |case: &Case| {
-        (extent.all || !case.is_slow) && extent.only.as_ref().is_none_or(|only| case.name.contains(only.as_str()))
+        let is_named = extent.only.is_empty() || extent.only.iter().any(|only| case.name.contains(only.as_str()));
+        (extent.all || !case.is_slow) && is_named
     };
     let cases: Vec<Case> = cases::cases(folder.path()).into_iter().filter(is_asked).collect();
     let methods = || Method::ALL.iter().filter(|method| method.runs_on_gpu());
@@ -98,6 +99,8 @@ pub fn run(
     let mut done = 0;
     for case in &cases {
         let file = case.write_file()?;
+        // Another case had another file there.
+        file.iter().for_each(|path| memo.look_again(path));
         // What the methods have in common is made once.
         let mut held = Held::default();
         for &method in &methods {
@@ -142,7 +145,8 @@ fn stress(
         twin.shade(pixel, &texels_of_pixel(&prepared.view, &rendering.geometry, pixel))
     };
     let expected: Vec<Vec4> = (0..rendering.radiance.len()).into_par_iter().map(expected).collect();
-    let least = 1e-6 * prepared.view.intensity * prepared.environment.max_radiance();
+    let most = (prepared.view.intensity * prepared.environment.max_radiance()).min(f32::MAX.into());
+    let least = 1e-6 * most;
     let display = Display::of(&prepared.view);
     let is_wrong = |(radiance, shown): &(&[f32; 4], &[u8])| {
         let off = |channel: usize| 255.0 * display.value(radiance[channel].into()) - f64::from(shown[channel]);

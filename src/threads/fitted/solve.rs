@@ -66,10 +66,12 @@ impl<'a> Fit<'a> {
         squares(&self.lights.response)
     }
 
-    /// The square root of the sum over lights and channels of squared weighted residuals, over that of squared weighted responses.
+    /// The square root of the sum over lights and channels of squared weighted residuals, over that of squared weighted responses; in units of
+    /// `lights` where nothing is answered, so that threads that are carried there have an error of finite size.
     pub fn relative_error(&self, kernels: &[Kernel]) -> f64 {
         let residuals = self.residuals(kernels, &Answers::new(kernels, self.lights), None);
-        (squares(&residuals) / self.squared_responses().max(f64::MIN_POSITIVE)).sqrt()
+        let responses = self.squared_responses();
+        (squares(&residuals) / if responses > 0.0 { responses } else { 1.0 }).sqrt()
     }
 
     /// Weighted, of all kernels or of a set alone: red, green, blue.

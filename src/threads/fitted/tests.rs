@@ -35,6 +35,17 @@ fn check(name: &str, table: &FittedTable) {
 }
 
 #[test]
+fn a_material_that_is_black_at_some_angles_only_has_numbers_in_all_rows() {
+    // Glass as thin as air mirrors nothing but at the horizon.
+    let parameters = "alpha = 0.3\neta = [1.0, 1.0, 1.0]\nk = [0.0, 0.0, 0.0]\ndistribution = 'beckmann'";
+    let brdf = Brdf::from_parameters("conductor", parameters.parse().unwrap()).unwrap();
+    for kind in [ThreadKind::Fitted, ThreadKind::Gaussian] {
+        let table = generate(&brdf, &ThreadSettings { kind, ..small(8, 90) }, &()).unwrap();
+        check(&format!("{kind:?}"), &table);
+    }
+}
+
+#[test]
 fn kernels_do_not_jump_between_rows() {
     // The default picture has this material and these threads. Fitted without that bound, one moves by 8 degrees from row 53 to 54.
     let gold = Brdf::builtin("gold").unwrap();
