@@ -85,12 +85,14 @@ impl DeviceMaterials {
                 record.threads = threads.add(own_threads);
             }
             record.first_slice = slices.len() as u32;
-            records.push(record);
             if lookups.slices {
-                slices.extend(SliceTable::new(brdf).cdfs);
+                let table = SliceTable::new(brdf);
+                record.threads.azimuth_count = table.azimuths as u32;
+                slices.extend(table.cdfs);
             } else if lookups.split_sum {
                 slices.extend(SplitSum::new(brdf).device_floats());
             }
+            records.push(record);
         }
         let storage =
             |name, contents: &[u8]| Buffer::with_contents(device, name, vk::BufferUsageFlags::STORAGE_BUFFER, contents);

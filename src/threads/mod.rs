@@ -8,6 +8,7 @@
 //! | 3.2.2, smoothing | [`smoothing`] |
 //! | 3.2.3, peaks | [`peaks`] |
 //! | the whole | [`generate()`] |
+//! | beyond it: azimuths of the view, for anisotropic BRDFs | [`azimuths`] |
 //! | beyond it: threads fitted to the BRDF | [`fitted`] |
 //! | beside it: the split sum of engines | [`split_sum`] |
 //!
@@ -19,6 +20,7 @@ use crate::brdf::{Brdf, luminance};
 use crate::error::{Error, Result};
 use crate::progress::Observer;
 
+pub mod azimuths;
 pub mod cones;
 mod file;
 pub mod fitted;
