@@ -5,7 +5,7 @@
 #include "azimuths.glsl"
 
 const uint SLICE_ROWS = 90;     // theta_o = row 90 deg / SLICE_ROWS
-const uint AZIMUTH_ROWS = 30;   // the same of each azimuth of an anisotropic BRDF
+const uint AZIMUTH_ROWS = 45;   // the same of each azimuth of an anisotropic BRDF
 const uint SLICE_RINGS = 96;    // theta_h = 90 deg x^2, x in steps of 1 / SLICE_RINGS
 const uint SLICE_AZIMUTHS = 64; // phi_h from -180 deg, against the view, or of an anisotropic BRDF against the tangent
 const uint AZIMUTHS_START = SLICE_RINGS + 1;

@@ -135,7 +135,7 @@ impl ThreadWords {
         self.words.extend(threads.device_words());
         let table = threads.fitted();
         let sharp_count = table.zip(self.finest_level).map_or(0, |(table, level)| table.sharp_count(level) as u32);
-        let [set_count, azimuth_count] = table.map_or([1; 2], |table| [table.sets as u32, table.azimuths as u32]);
+        let (set_count, azimuth_count) = (table.map_or(1, |table| table.sets as u32), threads.azimuths() as u32);
         ThreadTableRecord { first, count, row_count, sharp_count, set_count, azimuth_count }
     }
 }
