@@ -5,7 +5,7 @@
 //! | bytes | content |
 //! |---|---|
 //! | 8 | magic `THREADS\0` |
-//! | 4 | u32 format version, now 12 |
+//! | 4 | u32 format version, now 14 |
 //! | 4 | u32 length H of the header |
 //! | H | header, JSON: `method` ("fitted", "paper" or "gaussian"), `material`, `count`, `rows`, `seed`, and `azimuths` and `sets` if there is more than one |
 //! | ... | the rows, then the threads, see below |
@@ -39,7 +39,7 @@ use crate::file_format;
 use crate::output::write_whole;
 
 /// Version of the file format and of the threads in it: to be raised when either changes, since caches depend on it.
-pub const FORMAT_VERSION: u32 = 12;
+pub const FORMAT_VERSION: u32 = 14;
 
 const MAGIC: &[u8; 8] = b"THREADS\0";
 const DIGEST_BYTES: usize = blake3::OUT_LEN;
@@ -86,11 +86,10 @@ pub fn parse(path: &Path, bytes: &[u8]) -> Result<Threads> {
 fn encode(threads: &Threads) -> Vec<u8> {
     let [rows, count] = threads.size();
     let method = threads.kind().name().to_owned();
-    let (material, seed, azimuths, sets) = match threads {
-        Threads::Fitted(table) | Threads::Gaussian(table) => {
-            (table.material.clone(), 0, table.azimuths, table.for_subpixels().sets)
-        }
-        Threads::Paper(table) => (table.material.clone(), table.seed, 1, 1),
+    let azimuths = threads.azimuths();
+    let (material, seed, sets) = match threads {
+        Threads::Fitted(table) | Threads::Gaussian(table) => (table.material.clone(), 0, table.for_subpixels().sets),
+        Threads::Paper(table) => (table.material.clone(), table.seed, 1),
     };
     let header = serde_json::to_vec(&Header { method, material, count, rows, seed, azimuths, sets });
     let header = header.expect("a header of strings and numbers is always JSON");
@@ -134,8 +133,8 @@ fn decode(bytes: &[u8]) -> Result<Threads, String> {
     let per_row = count.checked_mul(3).and_then(|words| words.checked_add(words_a_row));
     let all_rows = rows.checked_mul(azimuths);
     let expected = per_row.and_then(|words| words.checked_mul(all_rows?)?.checked_mul(4 * tables));
-    let is_possible = (azimuths, sets) == (1, 1)
-        || kind.are_kernels() && [1, 10, 19, 37].contains(&azimuths) && (1..=count).contains(&sets);
+    let most_sets = if kind.are_kernels() { count } else { 1 };
+    let is_possible = [1, 10, 19, 37].contains(&azimuths) && (1..=most_sets).contains(&sets);
     if count == 0 || rows == 0 || !is_possible || expected != Some(payload.len()) {
         return Err("has a header that does not fit its content".into());
     }
@@ -154,9 +153,9 @@ fn decode(bytes: &[u8]) -> Result<Threads, String> {
             if kind == ThreadKind::Fitted { Threads::Fitted(table) } else { Threads::Gaussian(table) }
         }
         ThreadKind::Paper => {
-            let (of_rows, of_threads) = first.split_at(words_a_row * rows);
+            let (of_rows, of_threads) = first.split_at(words_a_row * rows * azimuths);
             let table = ThreadTable::from_file_words(of_rows, of_threads)?;
-            Threads::Paper(ThreadTable { rows, count, material, seed, ..table })
+            Threads::Paper(ThreadTable { rows, azimuths, count, material, seed, ..table })
         }
     })
 }
@@ -168,7 +167,14 @@ mod tests {
 
     fn table() -> ThreadTable {
         let samples = (0..6).map(|i| Sample { theta: 0.2 * i as f32, phi: i as f32 - 3.0, p: 0.5 }).collect();
-        ThreadTable { rows: 3, count: 2, seed: 9, material: "a \"name\"".into(), albedo: vec![[0.5; 3]; 3], samples }
+        let material = "a \"name\"".into();
+        ThreadTable { rows: 3, azimuths: 1, count: 2, seed: 9, material, albedo: vec![[0.5; 3]; 3], samples }
+    }
+
+    /// The same of an anisotropic material.
+    fn brushed() -> ThreadTable {
+        let one = table();
+        ThreadTable { azimuths: 10, albedo: one.albedo.repeat(10), samples: one.samples.repeat(10), ..one }
     }
 
     fn fitted() -> FittedTable {
@@ -202,12 +208,9 @@ mod tests {
     fn a_table_is_read_as_it_was_written() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.threads");
-        for threads in [
-            Threads::Paper(table()),
-            Threads::Fitted(fitted()),
-            Threads::Gaussian(fitted()),
-            Threads::Fitted(in_sets()),
-        ] {
+        let paper = [table(), brushed()].map(Threads::Paper);
+        let fitted = [fitted(), in_sets()].map(Threads::Fitted);
+        for threads in paper.into_iter().chain(fitted).chain([Threads::Gaussian(in_sets())]) {
             write(&threads, &path).unwrap();
             assert_eq!(read(&path).unwrap(), threads);
         }

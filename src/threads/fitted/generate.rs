@@ -4,7 +4,6 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use glam::{DVec2, DVec3, dvec3};
 use rayon::prelude::*;
 
-use super::azimuths::{View, azimuth_count};
 use super::cells::in_sets;
 use super::kernel::{Kernel, all_between, scale_rad};
 use super::lights::{Quadrature, TestLights};
@@ -13,6 +12,7 @@ use super::table::FittedTable;
 use crate::brdf::{Brdf, SeenBrdf, luminance};
 use crate::error::Result;
 use crate::progress::Observer;
+use crate::threads::azimuths::{View, azimuth_count};
 use crate::threads::slice::{Resolution, Slice};
 use crate::threads::{ThreadKind, ThreadSettings};
 

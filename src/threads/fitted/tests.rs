@@ -3,13 +3,13 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use glam::DVec3;
 
-use super::azimuths::View;
 use super::generate::{MOST_MOVED, carried, most_moved};
 use super::kernel::{Kernel, SHARPEST_LEVEL, WIDEST_LEVEL, kappa_of_level, scale_rad, vmf_peak};
 use super::{FittedTable, MAX_COUNT, PackedKernel, draft, generate, validation_error};
 use crate::brdf::{Brdf, CustomBrdf, SeenBrdf};
 use crate::error::Error;
 use crate::progress::Observer;
+use crate::threads::azimuths::View;
 use crate::threads::slice::{Slice, fibonacci_lattice};
 use crate::threads::{ThreadKind, ThreadSettings, Threads, read, test_materials, theta_o, write};
 
