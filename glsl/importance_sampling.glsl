@@ -1,11 +1,13 @@
 // Incident directions in proportion to f cos, from a table of 2D CDFs (Matusik et al. 2003, Efficient Isotropic BRDF
 // Measurement, for tables; here for every BRDF): for each view angle of a row a CDF over rings of the half vector, and within
-// each ring one over azimuths.
+// each ring one over azimuths. Of an anisotropic BRDF there are such rows for several azimuths of the view.
 // Twin: src/shading/importance_sampling.rs; the table: src/threads/slice_table.rs.
+#include "azimuths.glsl"
 
 const uint SLICE_ROWS = 90;     // theta_o = row 90 deg / SLICE_ROWS
+const uint AZIMUTH_ROWS = 45;   // the same of each azimuth of an anisotropic BRDF
 const uint SLICE_RINGS = 96;    // theta_h = 90 deg x^2, x in steps of 1 / SLICE_RINGS
-const uint SLICE_AZIMUTHS = 64; // phi_h from -180 deg
+const uint SLICE_AZIMUTHS = 64; // phi_h from -180 deg, against the view, or of an anisotropic BRDF against the tangent
 const uint AZIMUTHS_START = SLICE_RINGS + 1;
 const uint SLICE_SIZE = AZIMUTHS_START + SLICE_RINGS * (SLICE_AZIMUTHS + 1);
 
@@ -24,14 +26,47 @@ struct SliceRows {
     uint below; // starts of the two rows
     uint above;
     float t;
+    // Of an anisotropic BRDF, how far it is to the rows of the next azimuth, this many numbers on; 0 of an isotropic one.
+    uint next_azimuth;
+    float towards_next;
+    vec2 phi_o; // cosine and sine of the view's azimuth, or of that of its mirror image
+    float side; // 1, or -1 where it is the mirror image that there are rows for
 };
 
-SliceRows slice_rows(Material material, vec3 w_o) {
-    float row = min(atan(w_o.x, w_o.z) * (float(SLICE_ROWS) / radians(90.0)), float(SLICE_ROWS - 1));
+SliceRows slice_rows(Surface surface, Material material, vec3 w_o) {
+    uint azimuths = material.threads.azimuth_count;
+    bool is_anisotropic = HAS_TANGENTS != 0 && azimuths > 1;
+    uint row_count = is_anisotropic ? AZIMUTH_ROWS : SLICE_ROWS;
+    float row = min(atan(w_o.x, w_o.z) * (float(row_count) / radians(90.0)), float(row_count - 1));
     uint below = uint(row);
-    uint above = min(below + 1, SLICE_ROWS - 1);
-    return SliceRows(material.first_slice + below * SLICE_SIZE, material.first_slice + above * SLICE_SIZE,
-                     row - float(below));
+    uint above = min(below + 1, row_count - 1);
+    SliceRows rows = SliceRows(material.first_slice + below * SLICE_SIZE, material.first_slice + above * SLICE_SIZE,
+                               row - float(below), 0, 0.0, vec2(1.0, 0.0), 1.0);
+    if (is_anisotropic) {
+        vec2 folded = fold_azimuth(surface.phi_o, azimuths);
+        uint before = min(uint(folded.x), azimuths - 2);
+        rows.next_azimuth = AZIMUTH_ROWS * SLICE_SIZE;
+        rows.below += before * rows.next_azimuth;
+        rows.above += before * rows.next_azimuth;
+        rows.towards_next = folded.x - float(before);
+        rows.phi_o = vec2(cos(folded.x * AZIMUTH_STEP), sin(folded.x * AZIMUTH_STEP));
+        rows.side = folded.y;
+    }
+    return rows;
+}
+
+// A half vector of the shading frame, with its azimuth as that of the rows.
+vec3 to_rows(SliceRows rows, vec3 h) {
+    return HAS_TANGENTS != 0 ? turned(vec3(h.x, rows.side * h.y, h.z), rows.phi_o) : h;
+}
+
+// The inverse of to_rows.
+vec3 to_view(SliceRows rows, vec3 h) {
+    if (HAS_TANGENTS == 0) {
+        return h;
+    }
+    vec3 seen = turned(h, vec2(rows.phi_o.x, -rows.phi_o.y));
+    return vec3(seen.x, rows.side * seen.y, seen.z);
 }
 
 // sin^2(theta_h / 2) at the inner edge of a ring: even steps of it are even steps of solid angle, without cancellation.
@@ -95,8 +130,13 @@ float cell_mass(uint start, SliceCell cell) {
 
 // Density in 1/sr of sample_brdf at w_i above the horizon, of which h is the half vector.
 float brdf_pdf(SliceRows rows, vec3 w_i, vec3 w_o, vec3 h) {
-    SliceCell cell = slice_cell(h);
+    SliceCell cell = slice_cell(to_rows(rows, h));
     float mass = mix(cell_mass(rows.below, cell), cell_mass(rows.above, cell), rows.t);
+    if (HAS_TANGENTS != 0 && rows.next_azimuth != 0) {
+        uint next = rows.next_azimuth;
+        float of_next = mix(cell_mass(rows.below + next, cell), cell_mass(rows.above + next, cell), rows.t);
+        mass = mix(mass, of_next, rows.towards_next);
+    }
     // dw_i = 4 (w_o . h) dw_h. Where w_i and w_o are above the horizon the product is at least their cosines' mean.
     float of_table = mass / (4.0 * cell.solid_angle_sr * dot(w_o, h));
     return mix(of_table, w_i.z * 0.318309886, DIFFUSE_SHARE);
@@ -108,7 +148,7 @@ struct DirectionSample {
     float p;
 };
 
-// The rows below and above are drawn in proportion, so the density is exactly the blend of theirs at every view angle.
+// The rows below and above, and those of both azimuths, are drawn in proportion, so the density is exactly the blend of theirs at every view angle.
 DirectionSample sample_brdf(SliceRows rows, vec3 w_o, uvec4 bits) {
     vec4 u = to_unit(bits);
     vec3 w_i;
@@ -119,7 +159,11 @@ DirectionSample sample_brdf(SliceRows rows, vec3 w_o, uvec4 bits) {
         h = normalize(w_i + w_o);
     } else {
         bool is_above = u.x - DIFFUSE_SHARE < rows.t * (1.0 - DIFFUSE_SHARE);
-        h = sample_half_vector(is_above ? rows.above : rows.below, u.yz);
+        uint drawn = is_above ? rows.above : rows.below;
+        if (HAS_TANGENTS != 0 && u.w < rows.towards_next) {
+            drawn += rows.next_azimuth;
+        }
+        h = to_view(rows, sample_half_vector(drawn, u.yz));
         w_i = 2.0 * dot(w_o, h) * h - w_o;
     }
     if (!(w_i.z > 0.0 && dot(w_o, h) > 0.0)) {

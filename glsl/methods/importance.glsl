@@ -7,7 +7,7 @@
 
 vec3 estimate(Surface surface, Material material, uint first, uint stride) {
     vec3 w_o = view_direction(surface);
-    SliceRows rows = slice_rows(material, w_o);
+    SliceRows rows = slice_rows(surface, material, w_o);
     Stream fixed_set = fixed_stream();
     vec3 sum = vec3(0.0);
     for (uint k = first; k < push.sample_count; k += stride) {

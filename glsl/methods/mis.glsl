@@ -9,7 +9,7 @@
 
 vec3 estimate(Surface surface, Material material, uint first, uint stride) {
     vec3 w_o = view_direction(surface);
-    SliceRows rows = slice_rows(material, w_o);
+    SliceRows rows = slice_rows(surface, material, w_o);
     uvec2 pixel = subpixel / SUBPIXELS;
     Stream streams[2] = Stream[](point_stream(pixel, 0), point_stream(pixel, 1));
     vec3 sum = vec3(0.0);

@@ -12,7 +12,7 @@ const int CANDIDATES = 8; // even
 
 vec3 estimate(Surface surface, Material material, uint first, uint stride) {
     vec3 w_o = view_direction(surface);
-    SliceRows rows = slice_rows(material, w_o);
+    SliceRows rows = slice_rows(surface, material, w_o);
     vec3 sum = vec3(0.0);
     for (uint k = first; k < push.sample_count; k += stride) {
         float weight_sum = 0.0;

@@ -15,7 +15,7 @@ pub struct ThreadTableRecord {
     pub sharp_count: u32,
     /// Number of sets of its threads, each of which does alone: thread k is of set k % `set_count`.
     pub set_count: u32,
-    /// Azimuths of the view for which there are rows: 1 of an isotropic BRDF.
+    /// Azimuths of the view for which there are rows or CDFs: 1 of an isotropic BRDF.
     pub azimuth_count: u32,
 }
 

@@ -85,12 +85,14 @@ impl DeviceMaterials {
                 [record.threads, record.subpixel_threads] = threads.add(own_threads);
             }
             record.first_slice = slices.len() as u32;
-            records.push(record);
             if lookups.slices {
-                slices.extend(SliceTable::new(brdf).cdfs);
+                let table = SliceTable::new(brdf);
+                record.threads.azimuth_count = table.azimuths as u32;
+                slices.extend(table.cdfs);
             } else if lookups.split_sum {
                 slices.extend(SplitSum::new(brdf).device_floats());
             }
+            records.push(record);
         }
         let storage =
             |name, contents: &[u8]| Buffer::with_contents(device, name, vk::BufferUsageFlags::STORAGE_BUFFER, contents);
@@ -139,7 +141,8 @@ impl ThreadWords {
                 let first = (self.words.len() / ThreadTable::DEVICE_ELEMENT_WORDS) as u32;
                 self.words.extend(table.device_words());
                 let (count, row_count) = (table.count as u32, table.rows as u32);
-                [ThreadTableRecord { first, count, row_count, ..ThreadTableRecord::NONE }; 2]
+                let azimuth_count = table.azimuths as u32;
+                [ThreadTableRecord { first, count, row_count, azimuth_count, ..ThreadTableRecord::NONE }; 2]
             }
         }
     }

@@ -9,7 +9,7 @@ use crate::environment::sources::{CLEAR, clearance};
 use crate::environment::{LightMap, SourceRecord};
 use crate::light::{BlurredLight, finest_level};
 use crate::packing::stereographic_decode;
-use crate::threads::fitted::azimuths::fold_azimuth;
+use crate::threads::azimuths::Azimuths;
 use crate::threads::fitted::kernel::{FINEST_WIDTH_RAD, level_of_variance, sharp_part, variance_of_level};
 use crate::threads::fitted::{FittedTable, UnpackedKernel};
 
@@ -178,10 +178,9 @@ impl Rows {
         if threads.azimuths == 1 {
             return Self { below, above, t, next_azimuth: 0, towards_next: 0.0, side: 1.0 };
         }
-        let (at, is_mirrored) = fold_azimuth(surface.phi_o.to_angle().into(), threads.azimuths);
-        let before = (at as usize).min(threads.azimuths - 2);
-        let first = before * threads.rows;
-        let (towards_next, side) = ((at - before as f64) as f32, if is_mirrored { -1.0 } else { 1.0 });
+        let azimuths = Azimuths::around(surface.phi_o.to_angle().into(), threads.azimuths);
+        let first = azimuths.before * threads.rows;
+        let (towards_next, side) = (azimuths.towards_next as f32, azimuths.side() as f32);
         Self { below: first + below, above: first + above, t, next_azimuth: threads.rows, towards_next, side }
     }
 

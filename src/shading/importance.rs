@@ -6,7 +6,7 @@ use super::{Point, importance_sampling::SliceRows};
 /// Twin of `estimate`.
 pub(super) fn estimate(point: &Point) -> Vec3 {
     let w_o = point.surface.view_direction();
-    let rows = SliceRows::new(point.slices(), w_o);
+    let rows = SliceRows::new(point.slices(), w_o, point.surface.phi_o);
     let fixed_set = point.fixed_stream();
     let mut sum = Vec3::ZERO;
     for k in point.partition() {

@@ -4,8 +4,10 @@ use std::f32::consts::{FRAC_1_PI, FRAC_PI_2, FRAC_PI_4, PI, TAU};
 use glam::{Vec2, Vec3};
 
 use super::random::to_unit;
+use super::turned;
 use crate::threads::SliceTable;
-use crate::threads::slice_table::{AZIMUTHS, RINGS, ROW_SIZE, ROWS};
+use crate::threads::azimuths::Azimuths;
+use crate::threads::slice_table::{AZIMUTHS, RINGS, ROW_SIZE};
 
 const DIFFUSE_SHARE: f32 = 0.05;
 
@@ -14,6 +16,16 @@ pub(super) struct SliceRows<'a> {
     below: &'a [f32],
     above: &'a [f32],
     t: f32,
+    next: Option<NextAzimuth<'a>>,
+}
+
+/// The same rows of the next azimuth of the view, and where between both azimuths the view is.
+struct NextAzimuth<'a> {
+    below: &'a [f32],
+    above: &'a [f32],
+    towards_next: f32,
+    phi_o: Vec2,
+    side: f32,
 }
 
 /// sin^2(theta_h / 2) at the inner edge of a ring. Twin of `ring_edge`.
@@ -60,19 +72,57 @@ fn cell_mass(row: &[f32], ring: usize, azimuth: usize) -> f32 {
 
 impl<'a> SliceRows<'a> {
     /// Twin of `slice_rows`.
-    pub(super) fn new(table: &'a SliceTable, w_o: Vec3) -> Self {
-        let position = (w_o.x.atan2(w_o.z) * (ROWS as f32 / FRAC_PI_2)).min((ROWS - 1) as f32);
+    pub(super) fn new(table: &'a SliceTable, w_o: Vec3, phi_o: Vec2) -> Self {
+        let count = table.rows;
+        let position = (w_o.x.atan2(w_o.z) * (count as f32 / FRAC_PI_2)).min((count - 1) as f32);
         let below = position as usize;
-        let row = |row: usize| &table.cdfs[row * ROW_SIZE..][..ROW_SIZE];
-        Self { below: row(below), above: row((below + 1).min(ROWS - 1)), t: position - below as f32 }
+        let rows = |azimuth: usize| {
+            let rows = [below, (below + 1).min(count - 1)].map(|row| azimuth * count + row);
+            rows.map(|row| &table.cdfs[row * ROW_SIZE..][..ROW_SIZE])
+        };
+        let t = position - below as f32;
+        if table.azimuths == 1 {
+            let [below, above] = rows(0);
+            return Self { below, above, t, next: None };
+        }
+        let azimuths = Azimuths::around(phi_o.to_angle().into(), table.azimuths);
+        let [[below, above], [next_below, next_above]] = [azimuths.before, azimuths.before + 1].map(rows);
+        let next = NextAzimuth {
+            below: next_below,
+            above: next_above,
+            towards_next: azimuths.towards_next as f32,
+            phi_o: Vec2::from_angle(azimuths.folded_rad() as f32),
+            side: azimuths.side() as f32,
+        };
+        Self { below, above, t, next: Some(next) }
+    }
+
+    /// Twin of `to_rows`.
+    fn to_rows(&self, h: Vec3) -> Vec3 {
+        self.next.as_ref().map_or(h, |next| turned(h.with_y(next.side * h.y), next.phi_o))
+    }
+
+    /// Twin of `to_view`.
+    fn to_view(&self, h: Vec3) -> Vec3 {
+        self.next.as_ref().map_or(h, |next| {
+            let seen = turned(h, Vec2::new(next.phi_o.x, -next.phi_o.y));
+            seen.with_y(next.side * seen.y)
+        })
     }
 
     /// Density in 1/sr of [`Self::sample_brdf`] at `w_i` above the horizon, of which `h` is the half vector.
     /// Twin of `brdf_pdf`.
     pub(super) fn brdf_pdf(&self, w_i: Vec3, w_o: Vec3, h: Vec3) -> f32 {
-        let (ring, azimuth, solid_angle) = slice_cell(h);
-        let (below, above) = (cell_mass(self.below, ring, azimuth), cell_mass(self.above, ring, azimuth));
-        let of_table = (below + (above - below) * self.t) / (4.0 * solid_angle * w_o.dot(h));
+        let (ring, azimuth, solid_angle) = slice_cell(self.to_rows(h));
+        let between = |below: &[f32], above: &[f32]| {
+            let (below, above) = (cell_mass(below, ring, azimuth), cell_mass(above, ring, azimuth));
+            below + (above - below) * self.t
+        };
+        let mut mass = between(self.below, self.above);
+        if let Some(next) = &self.next {
+            mass += (between(next.below, next.above) - mass) * next.towards_next;
+        }
+        let of_table = mass / (4.0 * solid_angle * w_o.dot(h));
         of_table + (w_i.z * FRAC_1_PI - of_table) * DIFFUSE_SHARE
     }
 
@@ -84,7 +134,11 @@ impl<'a> SliceRows<'a> {
             (w_i, (w_i + w_o).normalize())
         } else {
             let is_above = u.x - DIFFUSE_SHARE < self.t * (1.0 - DIFFUSE_SHARE);
-            let h = sample_half_vector(if is_above { self.above } else { self.below }, Vec2::new(u.y, u.z));
+            let [below, above] = match &self.next {
+                Some(next) if u.w < next.towards_next => [next.below, next.above],
+                _ => [self.below, self.above],
+            };
+            let h = self.to_view(sample_half_vector(if is_above { above } else { below }, Vec2::new(u.y, u.z)));
             (2.0 * w_o.dot(h) * h - w_o, h)
         };
         (w_i.z > 0.0 && w_o.dot(h) > 0.0).then(|| (w_i, self.brdf_pdf(w_i, w_o, h)))
@@ -94,14 +148,29 @@ impl<'a> SliceRows<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::brdf::{Brdf, SeenBrdf, luminance};
     use crate::shading::random::random_bits;
     use crate::threads::test_materials;
     use glam::{DVec3, UVec2, dvec3};
 
     /// The hard ones: a lobe of 0.3 degrees, a lobe on a diffuse base, a measured table.
-    fn materials() -> impl Iterator<Item = (&'static str, crate::brdf::Brdf)> {
+    fn materials() -> impl Iterator<Item = (&'static str, Brdf)> {
         let hard = ["conductor 0.005", "plastic", "alumina-oxide"];
-        test_materials::all().into_iter().filter(move |(name, _)| hard.contains(name))
+        test_materials::all()
+            .into_iter()
+            .filter(move |(name, _)| hard.contains(name))
+            .chain(test_materials::anisotropic())
+    }
+
+    /// Azimuths of the view at which `brdf` is drawn from, in degrees: on rows, between them, and where its mirror image is seen.
+    fn azimuths_deg(brdf: &Brdf) -> &'static [f32] {
+        if brdf.is_isotropic() { &[0.0] } else { &[0.0, 33.0, 128.0, 251.0] }
+    }
+
+    /// All pairs of these angles of the view and its azimuths.
+    fn views<'a>(brdf: &Brdf, theta_o_deg: &'a [f32]) -> impl Iterator<Item = (f32, f32)> + use<'a> {
+        let azimuths = azimuths_deg(brdf);
+        theta_o_deg.iter().flat_map(move |theta_o| azimuths.iter().map(move |phi_o| (*theta_o, *phi_o)))
     }
 
     /// Directions drawn for `theta_o_deg`, with their densities, and how many draws were made.
@@ -120,9 +189,9 @@ mod tests {
         // The mean of g / p is the integral of g, for g of any shape: moments of the cosine lobe, wide against cells.
         for (name, brdf) in materials() {
             let table = SliceTable::new(&brdf);
-            for theta_o_deg in [0.0, 33.3, 70.6, 89.7] {
+            for (theta_o_deg, phi_o_deg) in views(&brdf, &[0.0, 33.3, 70.6, 89.7]) {
                 let w_o = view(theta_o_deg);
-                let rows = SliceRows::new(&table, w_o);
+                let rows = SliceRows::new(&table, w_o, Vec2::from_angle(phi_o_deg.to_radians()));
                 let draws = 100_000;
                 let directions = drawn(&rows, w_o, draws);
                 let mirror = dvec3(-f64::from(w_o.x), 0.0, f64::from(w_o.z));
@@ -145,7 +214,7 @@ mod tests {
                     let deviation = (mean - expected) / error;
                     assert!(
                         deviation.abs() < 4.5,
-                        "{name}, {theta_o_deg}: integral {index} {mean} {expected} {deviation}"
+                        "{name}, {theta_o_deg}, {phi_o_deg}: integral {index} {mean} {expected} {deviation}"
                     );
                 }
             }
@@ -189,13 +258,13 @@ mod tests {
     #[test]
     fn directions_fall_where_the_density_says_by_the_chi_square_test() {
         use statrs::distribution::{ChiSquared, ContinuousCDF};
-        let all = test_materials::all();
-        assert!(all.len() >= 5);
+        let all = [test_materials::all(), test_materials::anisotropic()].concat();
+        assert!(all.len() >= 8);
         for (name, brdf) in all {
             let table = SliceTable::new(&brdf);
-            for theta_o_deg in [0.0, 33.3, 70.6] {
+            for (theta_o_deg, phi_o_deg) in views(&brdf, &[0.0, 33.3, 70.6]) {
                 let w_o = view(theta_o_deg);
-                let rows = SliceRows::new(&table, w_o);
+                let rows = SliceRows::new(&table, w_o, Vec2::from_angle(phi_o_deg.to_radians()));
                 const DRAWS: u32 = 20_000;
                 let masses = bin_masses(&rows, w_o);
                 let mut counts = vec![0.0; masses.len()];
@@ -220,8 +289,8 @@ mod tests {
                     bins += 1.0;
                 }
                 let p = ChiSquared::new(bins - 1.0).unwrap().sf(square);
-                println!("{name}, {theta_o_deg}: chi square {square:.1} of {bins} bins, p = {p:.3}");
-                assert!(p > 1e-4, "{name}, {theta_o_deg}: chi square {square} of {bins} bins, p = {p}");
+                println!("{name}, {theta_o_deg}, {phi_o_deg}: chi square {square:.1} of {bins} bins, p = {p:.3}");
+                assert!(p > 1e-4, "{name}, {theta_o_deg}, {phi_o_deg}: chi square {square} of {bins} bins, p = {p}");
             }
         }
     }
@@ -231,17 +300,35 @@ mod tests {
         // What importance sampling is for: the spread of f cos / p, in a white furnace all of the noise, is small.
         for (name, brdf) in materials() {
             let table = SliceTable::new(&brdf);
-            for theta_o_deg in [0.0, 33.3, 70.6] {
-                let w_o = view(theta_o_deg);
-                let rows = SliceRows::new(&table, w_o);
-                let draws = 20_000;
-                let weight =
-                    |(w, p): &(DVec3, f64)| crate::brdf::luminance(brdf.evaluate(*w, w_o.as_dvec3())) * w.z / p;
-                let weights: Vec<f64> = drawn(&rows, w_o, draws).iter().map(weight).collect();
-                let mean = weights.iter().sum::<f64>() / f64::from(draws);
-                let square = weights.iter().map(|weight| weight * weight).sum::<f64>() / f64::from(draws);
-                let spread = (square / (mean * mean) - 1.0).max(0.0).sqrt();
-                assert!(spread < 0.35, "{name}, {theta_o_deg}: standard deviation {spread} of the mean");
+            for (theta_o_deg, phi_o_deg) in views(&brdf, &[0.0, 33.3, 70.6, 85.5]) {
+                let spread = spread(&brdf, &table, theta_o_deg, phi_o_deg);
+                println!("{name}, {theta_o_deg}, {phi_o_deg}: standard deviation {spread:.3} of the mean");
+                assert!(spread < 0.35, "{name}, {theta_o_deg}, {phi_o_deg}: standard deviation {spread} of the mean");
+            }
+        }
+    }
+
+    /// The standard deviation of f cos / p over the mean, of directions drawn by `table`.
+    fn spread(brdf: &Brdf, table: &SliceTable, theta_o_deg: f32, phi_o_deg: f32) -> f64 {
+        let (w_o, phi_o) = (view(theta_o_deg), Vec2::from_angle(phi_o_deg.to_radians()));
+        let rows = SliceRows::new(table, w_o, phi_o);
+        let draws = 20_000;
+        let seen = SeenBrdf::from_azimuth(brdf, f64::from(phi_o_deg.to_radians()));
+        let weight = |(w, p): &(DVec3, f64)| luminance(seen.evaluate(*w, w_o.as_dvec3())) * w.z / p;
+        let weights: Vec<f64> = drawn(&rows, w_o, draws).iter().map(weight).collect();
+        let mean = weights.iter().sum::<f64>() / f64::from(draws);
+        let square = weights.iter().map(|weight| weight * weight).sum::<f64>() / f64::from(draws);
+        (square / (mean * mean) - 1.0).max(0.0).sqrt()
+    }
+
+    #[test]
+    fn rows_of_the_views_own_azimuth_leave_a_part_of_the_noise_of_the_mean_over_azimuths() {
+        for (name, brdf) in test_materials::anisotropic() {
+            let (own, mean) = (SliceTable::new(&brdf), SliceTable::of_mean(&brdf));
+            for (theta_o_deg, phi_o_deg) in views(&brdf, &[5.0, 33.3, 70.6]) {
+                let [own, mean] = [&own, &mean].map(|table| spread(&brdf, table, theta_o_deg, phi_o_deg));
+                println!("{name}, {theta_o_deg}, {phi_o_deg}: {own:.3} of the mean, {mean:.3}");
+                assert!(own < 0.3 * mean, "{name}, {theta_o_deg}, {phi_o_deg}: {own} {mean}");
             }
         }
     }

@@ -7,7 +7,7 @@ use super::{Point, importance_sampling::SliceRows, light_sampling::light_pdf, lo
 pub(super) fn estimate(point: &Point) -> Vec3 {
     let frame = point.surface.frame;
     let w_o = point.surface.view_direction();
-    let rows = SliceRows::new(point.slices(), w_o);
+    let rows = SliceRows::new(point.slices(), w_o, point.surface.phi_o);
     let [by_brdf, by_light] = [0, 1].map(|index| point.stream(index));
     let mut sum = Vec3::ZERO;
     for k in point.partition() {

@@ -9,7 +9,7 @@ const CANDIDATES: u32 = 8;
 pub(super) fn estimate(point: &Point) -> Vec3 {
     let frame = point.surface.frame;
     let w_o = point.surface.view_direction();
-    let rows = SliceRows::new(point.slices(), w_o);
+    let rows = SliceRows::new(point.slices(), w_o, point.surface.phi_o);
     let mut sum = Vec3::ZERO;
     for k in point.partition() {
         let mut weight_sum = 0.0;

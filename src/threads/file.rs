@@ -5,7 +5,7 @@
 //! | bytes | content |
 //! |---|---|
 //! | 8 | magic `THREADS\0` |
-//! | 4 | u32 format version, now 12 |
+//! | 4 | u32 format version, now 14 |
 //! | 4 | u32 length H of the header |
 //! | H | header, JSON: `method` ("fitted", "paper" or "gaussian"), `material`, `count`, `rows`, `seed`, and `azimuths` and `sets` if there is more than one |
 //! | ... | the rows, then the threads, see below |
@@ -15,8 +15,8 @@
 //! cos theta_o). Colours are linear Rec. 709. Thread k of row r is the (r count + k)-th. Of an anisotropic BRDF there are as many rows for
 //! each of 10, 19 or 37 azimuths of w_o from the tangent, every 10 degrees; then those of the second azimuth follow those of the first.
 //! Of fitted threads and Gaussians in several sets thread k is of set k % sets: each set does alone, with as many times the weights as there are sets.
-//! With sets but without azimuths these are the threads of sub-pixels, in every second row if the number of rows is even. As many threads in one
-//! set come before them, in all rows: those of pixels whose sub-pixels share one sum.
+//! With sets but without azimuths these are the threads of sub-pixels. As many rows and threads, of one set, come before them: those of pixels
+//! whose sub-pixels share one sum.
 //!
 //! | method | a row | a thread |
 //! |---|---|---|
@@ -32,14 +32,14 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::fitted::{FittedTable, rows_of_subpixels};
+use super::fitted::FittedTable;
 use super::{ThreadKind, ThreadTable, Threads};
 use crate::error::{Error, Result};
 use crate::file_format;
 use crate::output::write_whole;
 
 /// Version of the file format and of the threads in it: to be raised when either changes, since caches depend on it.
-pub const FORMAT_VERSION: u32 = 12;
+pub const FORMAT_VERSION: u32 = 14;
 
 const MAGIC: &[u8; 8] = b"THREADS\0";
 const DIGEST_BYTES: usize = blake3::OUT_LEN;
@@ -86,11 +86,10 @@ pub fn parse(path: &Path, bytes: &[u8]) -> Result<Threads> {
 fn encode(threads: &Threads) -> Vec<u8> {
     let [rows, count] = threads.size();
     let method = threads.kind().name().to_owned();
-    let (material, seed, azimuths, sets) = match threads {
-        Threads::Fitted(table) | Threads::Gaussian(table) => {
-            (table.material.clone(), 0, table.azimuths, table.for_subpixels().sets)
-        }
-        Threads::Paper(table) => (table.material.clone(), table.seed, 1, 1),
+    let azimuths = threads.azimuths();
+    let (material, seed, sets) = match threads {
+        Threads::Fitted(table) | Threads::Gaussian(table) => (table.material.clone(), 0, table.for_subpixels().sets),
+        Threads::Paper(table) => (table.material.clone(), table.seed, 1),
     };
     let header = serde_json::to_vec(&Header { method, material, count, rows, seed, azimuths, sets });
     let header = header.expect("a header of strings and numbers is always JSON");
@@ -130,35 +129,33 @@ fn decode(bytes: &[u8]) -> Result<Threads, String> {
         ThreadKind::Fitted | ThreadKind::Gaussian => FittedTable::FILE_ROW_WORDS,
         ThreadKind::Paper => ThreadTable::FILE_ROW_WORDS,
     };
-    let in_two = kind.are_kernels() && FittedTable::table_count(azimuths, sets) == 2;
-    let second_rows = if in_two { rows_of_subpixels(rows) } else { 0 };
+    let tables = FittedTable::table_count(azimuths, sets);
     let per_row = count.checked_mul(3).and_then(|words| words.checked_add(words_a_row));
-    let words_of = |rows: usize| per_row?.checked_mul(rows.checked_mul(azimuths)?);
-    let first_words = words_of(rows);
-    let expected = first_words.and_then(|words| words.checked_add(words_of(second_rows)?)?.checked_mul(4));
-    let is_possible = (azimuths, sets) == (1, 1)
-        || kind.are_kernels() && [1, 10, 19, 37].contains(&azimuths) && (1..=count).contains(&sets);
+    let all_rows = rows.checked_mul(azimuths);
+    let expected = per_row.and_then(|words| words.checked_mul(all_rows?)?.checked_mul(4 * tables));
+    let most_sets = if kind.are_kernels() { count } else { 1 };
+    let is_possible = [1, 10, 19, 37].contains(&azimuths) && (1..=most_sets).contains(&sets);
     if count == 0 || rows == 0 || !is_possible || expected != Some(payload.len()) {
         return Err("has a header that does not fit its content".into());
     }
     let words: Vec<u32> = payload.as_chunks().0.iter().map(|&word| u32::from_le_bytes(word)).collect();
-    let (first, second) = words.split_at(first_words.unwrap_or(0));
+    let (first, second) = words.split_at(words.len() / tables);
     Ok(match kind {
         ThreadKind::Fitted | ThreadKind::Gaussian => {
-            let table = |words: &[u32], rows: usize, sets| -> Result<_, String> {
+            let table = |words: &[u32], sets| -> Result<_, String> {
                 let (of_rows, of_threads) = words.split_at(words_a_row * rows * azimuths);
                 let table = FittedTable::from_file_words(of_rows, of_threads)?;
                 Ok(FittedTable { rows, azimuths, count, sets, ..table })
             };
-            let of_subpixels = in_two.then(|| table(second, second_rows, sets).map(Box::new)).transpose()?;
-            let table = table(first, rows, if in_two { 1 } else { sets })?;
+            let of_subpixels = (tables == 2).then(|| table(second, sets).map(Box::new)).transpose()?;
+            let table = table(first, if tables == 2 { 1 } else { sets })?;
             let table = FittedTable { material, of_subpixels, ..table };
             if kind == ThreadKind::Fitted { Threads::Fitted(table) } else { Threads::Gaussian(table) }
         }
         ThreadKind::Paper => {
-            let (of_rows, of_threads) = first.split_at(words_a_row * rows);
+            let (of_rows, of_threads) = first.split_at(words_a_row * rows * azimuths);
             let table = ThreadTable::from_file_words(of_rows, of_threads)?;
-            Threads::Paper(ThreadTable { rows, count, material, seed, ..table })
+            Threads::Paper(ThreadTable { rows, azimuths, count, material, seed, ..table })
         }
     })
 }
@@ -170,7 +167,14 @@ mod tests {
 
     fn table() -> ThreadTable {
         let samples = (0..6).map(|i| Sample { theta: 0.2 * i as f32, phi: i as f32 - 3.0, p: 0.5 }).collect();
-        ThreadTable { rows: 3, count: 2, seed: 9, material: "a \"name\"".into(), albedo: vec![[0.5; 3]; 3], samples }
+        let material = "a \"name\"".into();
+        ThreadTable { rows: 3, azimuths: 1, count: 2, seed: 9, material, albedo: vec![[0.5; 3]; 3], samples }
+    }
+
+    /// The same of an anisotropic material.
+    fn brushed() -> ThreadTable {
+        let one = table();
+        ThreadTable { azimuths: 10, albedo: one.albedo.repeat(10), samples: one.samples.repeat(10), ..one }
     }
 
     fn fitted() -> FittedTable {
@@ -193,10 +197,8 @@ mod tests {
         let of_subpixels = FittedTable {
             sets: 2,
             material: String::new(),
-            rows: 1,
-            albedo: vec![[0.1, 0.2, 0.4]],
-            relative_error: vec![2e-3],
-            kernels: vec![PackedKernel([0x4321_8765, 0x3000_3800, 0x3000_3400]); 2],
+            relative_error: vec![2e-3; 2],
+            kernels: vec![PackedKernel([0x4321_8765, 0x3000_3800, 0x3000_3400]); 4],
             ..two.clone()
         };
         FittedTable { of_subpixels: Some(Box::new(of_subpixels)), ..two }
@@ -206,12 +208,9 @@ mod tests {
     fn a_table_is_read_as_it_was_written() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.threads");
-        for threads in [
-            Threads::Paper(table()),
-            Threads::Fitted(fitted()),
-            Threads::Gaussian(fitted()),
-            Threads::Fitted(in_sets()),
-        ] {
+        let paper = [table(), brushed()].map(Threads::Paper);
+        let fitted = [fitted(), in_sets()].map(Threads::Fitted);
+        for threads in paper.into_iter().chain(fitted).chain([Threads::Gaussian(in_sets())]) {
             write(&threads, &path).unwrap();
             assert_eq!(read(&path).unwrap(), threads);
         }

@@ -56,7 +56,7 @@ struct Cell {
 }
 
 /// The direction that the facet `h` mirrors `w_o` into.
-fn reflect(w_o: DVec3, h: DVec3) -> DVec3 {
+pub(super) fn reflect(w_o: DVec3, h: DVec3) -> DVec3 {
     (2.0 * w_o.dot(h) * h - w_o).normalize()
 }
 
@@ -105,7 +105,12 @@ impl<'a> Slice<'a> {
     /// Tabulates `brdf` seen from `theta_o` (radians, less than pi / 2). Where it reflects nothing the pdf is that of a
     /// diffuse surface, cos / pi: a thread then still has a direction, and its samples add up to the zero they should.
     pub fn new(brdf: &SeenBrdf<'a>, theta_o: f64) -> Self {
-        let w_o = dvec3(theta_o.sin(), 0.0, theta_o.cos());
+        Self::of_view(brdf, dvec3(theta_o.sin(), 0.0, theta_o.cos()))
+    }
+
+    /// The same seen from `w_o`, unit and above the horizon, which need not be in the plane of x and z if `brdf` is that of no azimuth: x and y
+    /// are then the surface's own axes.
+    pub fn of_view(brdf: &SeenBrdf<'a>, w_o: DVec3) -> Self {
         Self::above(brdf, w_o, &cells(brdf, w_o, Resolution::FULL), Resolution::FULL, 0.0)
     }
 
@@ -145,7 +150,7 @@ impl<'a> Slice<'a> {
         let mut ring_cdf = vec![0.0];
         let mut azimuth_cdf = Vec::with_capacity(theta * (phi + 1));
         // The mirror direction is where sharp lobes have their maximum, and no cell has it as its centre.
-        let mirror = dvec3(-w_o.x, 0.0, w_o.z);
+        let mirror = dvec3(-w_o.x, 0.0 - w_o.y, w_o.z);
         let mut peak = (luminance(density(mirror)), 0.0, DVec3::Z);
         for i in 0..theta {
             let x = (i as f64 + 0.5) / theta as f64;
@@ -188,9 +193,19 @@ impl<'a> Slice<'a> {
         }
     }
 
+    /// The same without its CDF, nearly all of its 200 KB: it knows densities, but neither directions nor coordinates.
+    pub(super) fn without_cdf(self) -> Self {
+        Self { ring_cdf: Vec::new(), azimuth_cdf: Vec::new(), ..self }
+    }
+
     /// The integral of f cos per channel: the directional albedo.
     pub fn albedo(&self) -> DVec3 {
         self.albedo
+    }
+
+    /// Where it is seen from.
+    pub fn w_o(&self) -> DVec3 {
+        self.w_o
     }
 
     /// Equation (4): p(w_i) in 1/sr.

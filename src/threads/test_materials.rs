@@ -2,7 +2,9 @@
 use std::path::PathBuf;
 use std::sync::LazyLock;
 
-use crate::brdf::{Brdf, MerlTable};
+use glam::{DVec3, dvec2};
+
+use crate::brdf::{Brdf, CustomBrdf, MerlTable};
 
 static NARROW: LazyLock<Brdf> = LazyLock::new(|| conductor("ggx", 0.005));
 static ALUMINA_OXIDE: LazyLock<Option<Brdf>> = LazyLock::new(|| {
@@ -45,6 +47,35 @@ pub fn narrow() -> &'static Brdf {
 pub fn glossy_plastic() -> Brdf {
     let parameters = "distribution = 'ggx'\nalpha = 0.05\nior = 1.5\ndiffuse = [0.3, 0.3, 0.6]";
     Brdf::from_parameters("plastic", parameters.parse().unwrap()).unwrap()
+}
+
+/// A lobe that leans to one side of the normal: no turn and no mirror leaves it as it is.
+struct Leaning;
+
+impl CustomBrdf for Leaning {
+    fn name(&self) -> &str {
+        "leaning"
+    }
+    fn key(&self) -> Vec<u8> {
+        Vec::new()
+    }
+    fn evaluate(&self, w_i: DVec3, w_o: DVec3) -> DVec3 {
+        let away = (w_i + w_o).normalize().truncate() - dvec2(0.15, 0.1);
+        DVec3::new(1.0, 0.8, 0.5) * (-(away.x / 0.1).powi(2) - (away.y / 0.2).powi(2)).exp()
+    }
+}
+
+/// Anisotropic ones of each symmetry, by name: of 10, 19 and 37 azimuths of the view.
+pub fn anisotropic() -> Vec<(&'static str, Brdf)> {
+    let brushed = |text: &str| Brdf::from_parameters("conductor", text.parse().unwrap()).unwrap();
+    vec![
+        ("brushed", brushed("distribution = 'ggx'\nmetal = 'Al'\nalpha_x = 0.05\nalpha_y = 0.3")),
+        (
+            "brushed aslant",
+            brushed("distribution = 'beckmann'\nmetal = 'Au'\nalpha_x = 0.4\nalpha_y = 0.1\nrotation_deg = 30"),
+        ),
+        ("leaning", Brdf::custom(Leaning)),
+    ]
 }
 
 /// The kinds of material that threads have to work for, by name.

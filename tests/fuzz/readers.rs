@@ -340,6 +340,7 @@ pub fn threads() -> Reader {
             let material = "m".to_owned();
             let paper = ThreadTable {
                 rows: 3,
+                azimuths: 1,
                 count: 2,
                 seed: 9,
                 material: material.clone(),
@@ -357,8 +358,7 @@ pub fn threads() -> Reader {
                 kernels: vec![PackedKernel([0x1234_5678, 0x3800_4000, 0x3400_3000]); 2 * rows * azimuths],
                 of_subpixels: None,
             };
-            // Those of sub-pixels have no name, and a row where whole pixels have two.
-            let of_subpixels = Some(Box::new(FittedTable { material: String::new(), ..fitted(1, 1) }));
+            let of_subpixels = Some(Box::new(FittedTable { material: String::new(), ..fitted(2, 1) }));
             let of_both = FittedTable { sets: 1, of_subpixels, ..fitted(2, 1) };
             let (isotropic, anisotropic) = (Threads::Fitted(of_both.clone()), Threads::Fitted(fitted(1, 10)));
             let file = |threads| written("x.threads", |path| threads::write(&threads, path).expect("a file"));

@@ -1,7 +1,6 @@
 //! Threads of an edited material at once: a few steps from those that are on screen, in few rows.
 use glam::DVec3;
 
-use super::azimuths::View;
 use super::generate::{Neighbour, Row, carried, from_the_middle, scaled};
 use super::kernel::{Kernel, all_between};
 use super::lights::{Quadrature, TestLights};
@@ -10,6 +9,7 @@ use super::table::FittedTable;
 use crate::brdf::{Brdf, SeenBrdf};
 use crate::error::Result;
 use crate::progress::Observer;
+use crate::threads::azimuths::View;
 use crate::threads::slice::{Resolution, Slice};
 use crate::threads::theta_o;
 

@@ -4,16 +4,15 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use glam::{DVec2, DVec3, dvec3};
 use rayon::prelude::*;
 
-use super::azimuths::{View, azimuth_count};
 use super::cells::in_sets;
 use super::kernel::{Kernel, all_between, scale_rad};
 use super::lights::{Quadrature, TestLights};
-use super::sets::rows_of_subpixels;
 use super::solve::{Effort, Fit};
 use super::table::FittedTable;
 use crate::brdf::{Brdf, SeenBrdf, luminance};
 use crate::error::Result;
 use crate::progress::Observer;
+use crate::threads::azimuths::{View, azimuth_count};
 use crate::threads::slice::{Resolution, Slice};
 use crate::threads::{ThreadKind, ThreadSettings};
 
@@ -114,21 +113,16 @@ pub fn generate(brdf: &Brdf, settings: &ThreadSettings, observer: &dyn Observer)
     let targets = Targets::new(brdf, settings, observer)?;
     let done = AtomicUsize::new(0);
     let tables = FittedTable::table_count(targets.azimuths, settings.sets);
-    let rows_of_subpixels = if tables == 1 { 0 } else { rows_of_subpixels(settings.rows) };
-    let total = targets.rows.len() + rows_of_subpixels;
-    let row_is_done = || observer.progress(done.fetch_add(1, Ordering::Relaxed) + 1, total);
-    let fit = |settings: ThreadSettings| fit_all(brdf, &targets, &settings, observer, &row_is_done);
+    let row_is_done = || observer.progress(done.fetch_add(1, Ordering::Relaxed) + 1, tables * targets.rows.len());
+    let fit = |sets| fit_all(brdf, &targets, &ThreadSettings { sets, ..*settings }, observer, &row_is_done);
     if tables == 1 {
-        return fit(*settings);
+        return fit(settings.sets);
     }
-    let (of_pixels, of_subpixels) = rayon::join(
-        || fit(ThreadSettings { sets: 1, ..*settings }),
-        || fit(ThreadSettings { rows: rows_of_subpixels, ..*settings }),
-    );
+    let (of_pixels, of_subpixels) = rayon::join(|| fit(1), || fit(settings.sets));
     Ok(FittedTable { of_subpixels: Some(Box::new(of_subpixels?)), ..of_pixels? })
 }
 
-/// The fit of `settings.rows`, all threads of which are in `settings.sets`, to as many of `targets`, or to every second of them.
+/// The fit of all rows, all threads of which are in `settings.sets`.
 fn fit_all(
     brdf: &Brdf,
     targets: &Targets,
@@ -137,11 +131,10 @@ fn fit_all(
     row_is_done: &(impl Fn() + Sync),
 ) -> Result<FittedTable> {
     let rows = settings.rows;
-    let targets_a_row = targets.rows.len() / (targets.azimuths * rows);
     // Row `index` of all azimuths, from what its neighbours' kernels are there: those of the view angle before and of the azimuth before.
     let fit = |index: usize, neighbours: &[(usize, &Row)]| -> Result<Row> {
         observer.check()?;
-        let (lights, albedo) = &targets.rows[index * targets_a_row];
+        let (lights, albedo) = &targets.rows[index];
         let in_units = |kernels: &[Kernel]| scaled(kernels, 1.0 / lights.unit);
         let to = View::of_row(index, rows);
         // What they were, and what becomes of that here.
@@ -189,7 +182,7 @@ fn fit_all(
         row_is_done();
         Ok((scaled(&kernels, lights.unit), *albedo, error))
     };
-    let mut fitted: Vec<Row> = Vec::with_capacity(targets.azimuths * rows);
+    let mut fitted: Vec<Row> = Vec::with_capacity(targets.rows.len());
     for azimuth in 0..targets.azimuths {
         let first = azimuth * rows;
         let column = from_the_middle(rows, &|row, neighbour| {

@@ -10,12 +10,10 @@
 //! | the fit of one row | [`solve`] |
 //! | of all rows | [`generate()`] |
 //! | sets of them, for sub-pixels | [`ThreadSettings::for_picture`](super::ThreadSettings::for_picture) |
-//! | azimuths of the view, for anisotropic BRDFs | [`azimuths`] |
 //! | of an edited BRDF, at once and coarsely | [`draft()`] |
 //! | what a fit leaves, under other lights | [`validation_error`] |
 //! | as stored and looked up, 12 bytes a thread and row | [`FittedTable`] |
 pub mod answers;
-pub mod azimuths;
 pub mod cells;
 mod directions;
 mod draft;
@@ -29,10 +27,9 @@ mod table;
 mod tests;
 mod validate;
 
-pub use azimuths::azimuth_count;
 pub use draft::draft;
 pub use generate::generate;
-pub(super) use sets::{rows_of_subpixels, set_count};
+pub(super) use sets::set_count;
 pub use table::{FittedTable, PackedKernel, UnpackedKernel};
 pub use validate::validation_error;
 

@@ -12,9 +12,3 @@ pub fn set_count(brdf: &Brdf, count: usize, subpixels: u32) -> usize {
     let fewest = if subpixels == 1 || brdf.is_isotropic() { 1 } else { FEWEST_OF_LONG_LOBE };
     (count / fewest).clamp(1, subpixels)
 }
-
-/// How many rows threads of sub-pixels have where those of whole pixels have `rows`: every second, if that is of the same angles. They err by
-/// more than what lies between.
-pub fn rows_of_subpixels(rows: usize) -> usize {
-    if rows.is_multiple_of(2) { rows / 2 } else { rows }
-}

@@ -4,11 +4,11 @@ use std::f64::consts::FRAC_PI_2;
 use glam::{DVec3, Vec2, Vec3};
 use half::f16;
 
-use super::azimuths::fold_azimuth;
 use super::kernel::{Kernel, SHARPEST_LEVEL, WIDEST_LEVEL, all_between, sharp_part};
 use crate::packing::{
     STEREOGRAPHIC_EXTENT, pack_snorm_2x16, stereographic_decode, stereographic_encode, unpack_snorm_2x16,
 };
+use crate::threads::azimuths::Azimuths;
 
 /// A kernel in three words: direction (its place on the stereographic map, 2 x 16 bits), level and red weight, green and blue weight (half floats).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
@@ -77,7 +77,7 @@ impl PackedKernel {
 pub struct FittedTable {
     /// Number of view angles.
     pub rows: usize,
-    /// Number of azimuths of the view, as [`super::azimuth_count`] has it: 1 of an isotropic BRDF.
+    /// Number of azimuths of the view, as [`azimuth_count`](crate::threads::azimuths::azimuth_count) has it: 1 of an isotropic BRDF.
     pub azimuths: usize,
     /// Number of threads.
     pub count: usize,
@@ -124,12 +124,10 @@ impl FittedTable {
         if self.azimuths == 1 {
             return at_azimuth(0);
         }
-        let (at, is_mirrored) = fold_azimuth(phi_o, self.azimuths);
-        let before = (at as usize).min(self.azimuths - 2);
-        let mut kernels = all_between(&at_azimuth(before), &at_azimuth(before + 1), at - before as f64);
-        if is_mirrored {
-            kernels.iter_mut().for_each(|kernel| kernel.direction.y *= -1.0);
-        }
+        let azimuths = Azimuths::around(phi_o, self.azimuths);
+        let [before, next] = [azimuths.before, azimuths.before + 1].map(at_azimuth);
+        let mut kernels = all_between(&before, &next, azimuths.towards_next);
+        kernels.iter_mut().for_each(|kernel| kernel.direction.y *= azimuths.side());
         kernels
     }
 

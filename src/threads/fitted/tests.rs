@@ -3,13 +3,13 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use glam::DVec3;
 
-use super::azimuths::View;
 use super::generate::{MOST_MOVED, carried, most_moved};
 use super::kernel::{Kernel, SHARPEST_LEVEL, WIDEST_LEVEL, kappa_of_level, scale_rad, vmf_peak};
 use super::{FittedTable, MAX_COUNT, PackedKernel, draft, generate, validation_error};
 use crate::brdf::{Brdf, CustomBrdf, SeenBrdf};
 use crate::error::Error;
 use crate::progress::Observer;
+use crate::threads::azimuths::View;
 use crate::threads::slice::{Slice, fibonacci_lattice};
 use crate::threads::{ThreadKind, ThreadSettings, Threads, read, test_materials, theta_o, write};
 
@@ -177,12 +177,12 @@ fn alone(table: &FittedTable, set: usize) -> FittedTable {
 fn each_set_of_threads_does_alone_and_all_do_better() {
     for (name, brdf) in test_materials::all().into_iter().filter(|(name, _)| *name != "lambert") {
         let error = |table: &FittedTable| validation_error(table, &brdf);
-        let table = generate(&brdf, &ThreadSettings { sets: 4, ..small(16, 90) }, &()).unwrap();
-        let [few, free] = [4, 16].map(|count| generate(&brdf, &small(count, 90), &()).unwrap());
+        let table = generate(&brdf, &ThreadSettings { sets: 4, ..small(16, 30) }, &()).unwrap();
+        let [few, free] = [4, 16].map(|count| generate(&brdf, &small(count, 30), &()).unwrap());
         assert!(table.kernels == free.kernels && table.sets == 1, "{name}: whole pixels have free threads");
         let [few, free] = [few, free].map(|table| error(&table));
         let table = table.for_subpixels();
-        assert_eq!((table.sets, table.rows), (4, 45));
+        assert_eq!(table.sets, 4);
         let each: Vec<_> = (0..4).map(|set| error(&alone(table, set))).collect();
         let all = error(table);
         println!("{name}: {few:.4} with 4 threads, {each:.4?} with sets of 4, {all:.4} with all 16, {free:.4} if free");
@@ -350,17 +350,19 @@ fn gold(alpha: f64) -> Brdf {
 
 #[test]
 fn drafts_follow_an_edited_parameter_with_up_to_three_times_the_error() {
-    let settings = small(16, 90);
+    let settings = ThreadSettings { sets: 4, ..small(16, 90) };
     let mut drafted = generate(&gold(0.3), &settings, &()).unwrap();
     let there = (1..=20).map(|step| 0.3 - 0.01 * f64::from(step));
     for alpha in there.clone().chain(there.rev()) {
         drafted = draft(&gold(alpha), &drafted, &()).unwrap();
         check("gold", &drafted);
     }
-    let [found, finished] =
-        [&drafted, &generate(&gold(0.29), &settings, &()).unwrap()].map(|table| validation_error(table, &gold(0.29)));
-    println!("after 40 drafts {found:.5}, finished {finished:.5}");
-    assert!(found < 3.0 * finished, "{found} {finished}");
+    let finished = generate(&gold(0.29), &settings, &()).unwrap();
+    for [drafted, finished] in [[&drafted, &finished], [drafted.for_subpixels(), finished.for_subpixels()]] {
+        let [found, finished] = [drafted, finished].map(|table| validation_error(table, &gold(0.29)));
+        println!("after 40 drafts {found:.5}, finished {finished:.5}");
+        assert!(found < 3.0 * finished, "{found} {finished}");
+    }
     let furnace = |row: usize| glam::Vec3::from(drafted.albedo[row]).as_dvec3();
     for row in [0, 32, 60, 85] {
         let albedo = gold(0.29).albedo(theta_o(row, drafted.rows));

@@ -1,14 +1,16 @@
-//! The azimuths of the view for which an anisotropic BRDF has threads: as few as its symmetry leaves.
+//! The azimuths of the view for which an anisotropic BRDF has rows, of threads or of CDFs: as few as its symmetry leaves.
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-use crate::brdf::{Brdf, Symmetry};
-use crate::threads::theta_o;
+use super::theta_o;
+use glam::{DVec2, DVec3};
 
-/// From one to the next, in radians: 10 degrees. `AZIMUTH_STEP` in glsl/threads/fitted.glsl. Of brushed metals of roughness_alpha 0.05 x 0.3
-/// and 0.2 x 0.5, 16 threads err between azimuths by 1.2 to 1.5 times what they do at them; with steps of 15 degrees by 1.4 to 1.6 times.
+use crate::brdf::{Brdf, Symmetry};
+
+/// From one to the next, in radians: 10 degrees. `AZIMUTH_STEP` in glsl/azimuths.glsl. Of brushed metals of roughness_alpha 0.05 x 0.3
+/// and 0.2 x 0.5, 16 fitted threads err between azimuths by 1.2 to 1.5 times what they do at them; with steps of 15 degrees by 1.4 to 1.6 times.
 pub const STEP_RAD: f64 = PI / 18.0;
 
-/// How many azimuths of the view there are rows of threads for: 1 if it does not matter; else every [`STEP_RAD`] from the tangent on, both
+/// How many azimuths of the view there are rows for: 1 if it does not matter; else every [`STEP_RAD`] from the tangent on, both
 /// ends included, to 90 degrees if the BRDF has mirror planes along and across the tangent, to 180 if half a turn leaves it as it is, to 360.
 pub fn azimuth_count(brdf: &Brdf) -> usize {
     let Symmetry { isotropic, half_turn, mirror_x, mirror_y } = brdf.symmetry();
@@ -36,14 +38,37 @@ impl View {
         Self { theta_o: theta_o(index % rows, rows), phi_o: (index / rows) as f64 * STEP_RAD }
     }
 
+    /// w_o in the surface's own axes, of which x is the tangent and z the normal.
+    pub fn w_o(&self) -> DVec3 {
+        (DVec2::from_angle(self.phi_o) * self.theta_o.sin()).extend(self.theta_o.cos())
+    }
+
+    /// A direction of the surface's own axes, in the frame of the view.
+    pub fn seen(&self, direction: DVec3) -> DVec3 {
+        turned(direction, -self.phi_o)
+    }
+
+    /// The inverse of [`Self::seen`].
+    pub fn in_own_axes(&self, direction: DVec3) -> DVec3 {
+        turned(direction, self.phi_o)
+    }
+
     /// That of an isotropic BRDF.
     pub fn of_angle(theta_o: f64) -> Self {
         Self { theta_o, phi_o: 0.0 }
     }
 }
 
+/// `direction` turned about z; to the last bit the same by no angle.
+fn turned(direction: DVec3, angle: f64) -> DVec3 {
+    match angle {
+        0.0 => direction,
+        angle => DVec2::from_angle(angle).rotate(direction.truncate()).extend(direction.z),
+    }
+}
+
 /// Where the azimuth `phi_o` (radians) of a view is among `count` of them, in steps, and whether what is seen is the mirror image of what is
-/// there. Twin: `fold_azimuth` in glsl/threads/fitted.glsl, in single precision.
+/// there. Twin: `fold_azimuth` in glsl/azimuths.glsl, in single precision.
 pub fn fold_azimuth(phi_o: f64, count: usize) -> (f64, bool) {
     let span = (count - 1) as f64 * STEP_RAD;
     // Half a turn leaves a BRDF with two mirror planes as it is, and so do both of them.
@@ -51,6 +76,36 @@ pub fn fold_azimuth(phi_o: f64, count: usize) -> (f64, bool) {
     let is_mirrored = turns > span;
     let folded = if is_mirrored { PI - turns } else { turns };
     ((folded / STEP_RAD).min((count - 1) as f64), is_mirrored)
+}
+
+/// Between which azimuths a view is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Azimuths {
+    /// The one before; the next is one more.
+    pub before: usize,
+    /// How far the view is from that one to the next, 0 to 1.
+    pub towards_next: f64,
+    /// Whether what is seen is the mirror image of what is there.
+    pub is_mirrored: bool,
+}
+
+impl Azimuths {
+    /// Those around the azimuth `phi_o` (radians) of a view, of `count`, which are at least 2.
+    pub fn around(phi_o: f64, count: usize) -> Self {
+        let (at, is_mirrored) = fold_azimuth(phi_o, count);
+        let before = (at as usize).min(count - 2);
+        Self { before, towards_next: at - before as f64, is_mirrored }
+    }
+
+    /// The azimuth, in radians, of the view or of its mirror image.
+    pub fn folded_rad(&self) -> f64 {
+        (self.before as f64 + self.towards_next) * STEP_RAD
+    }
+
+    /// 1, or -1 where what is seen is the mirror image: what y of a direction in the frame of the view is to be multiplied by.
+    pub fn side(&self) -> f64 {
+        if self.is_mirrored { -1.0 } else { 1.0 }
+    }
 }
 
 #[cfg(test)]
