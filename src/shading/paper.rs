@@ -87,9 +87,8 @@ impl Paper<'_> {
     }
 
     fn thread_at(&self, rows: &Rows, k: usize) -> Vec4 {
-        let between = |first: usize| {
-            self.thread(first + rows.below, k).lerp(self.thread(first + rows.above, k), rows.t)
-        };
+        let between =
+            |first: usize| self.thread(first + rows.below, k).lerp(self.thread(first + rows.above, k), rows.t);
         if rows.next_azimuth == 0 {
             return between(0);
         }
