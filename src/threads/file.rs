@@ -5,7 +5,7 @@
 //! | bytes | content |
 //! |---|---|
 //! | 8 | magic `THREADS\0` |
-//! | 4 | u32 format version, now 14 |
+//! | 4 | u32 format version, now 15 |
 //! | 4 | u32 length H of the header |
 //! | H | header, JSON: `method` ("fitted", "paper" or "gaussian"), `material`, `count`, `rows`, `seed`, and `azimuths` and `sets` if there is more than one |
 //! | ... | the rows, then the threads, see below |
@@ -15,8 +15,8 @@
 //! cos theta_o). Colours are linear Rec. 709. Thread k of row r is the (r count + k)-th. Of an anisotropic BRDF there are as many rows for
 //! each of 10, 19 or 37 azimuths of w_o from the tangent, every 10 degrees; then those of the second azimuth follow those of the first.
 //! Of fitted threads and Gaussians in several sets thread k is of set k % sets: each set does alone, with as many times the weights as there are sets.
-//! With sets but without azimuths these are the threads of sub-pixels. As many rows and threads, of one set, come before them: those of pixels
-//! whose sub-pixels share one sum.
+//! Twice as much content are two such tables: the second is of threads in sets, for sub-pixels, and the first of as many threads that are not, for
+//! pixels whose sub-pixels share one sum.
 //!
 //! | method | a row | a thread |
 //! |---|---|---|
@@ -39,7 +39,7 @@ use crate::file_format;
 use crate::output::write_whole;
 
 /// Version of the file format and of the threads in it: to be raised when either changes, since caches depend on it.
-pub const FORMAT_VERSION: u32 = 14;
+pub const FORMAT_VERSION: u32 = 15;
 
 const MAGIC: &[u8; 8] = b"THREADS\0";
 const DIGEST_BYTES: usize = blake3::OUT_LEN;
@@ -129,17 +129,18 @@ fn decode(bytes: &[u8]) -> Result<Threads, String> {
         ThreadKind::Fitted | ThreadKind::Gaussian => FittedTable::FILE_ROW_WORDS,
         ThreadKind::Paper => ThreadTable::FILE_ROW_WORDS,
     };
-    let tables = FittedTable::table_count(azimuths, sets);
     let per_row = count.checked_mul(3).and_then(|words| words.checked_add(words_a_row));
     let all_rows = rows.checked_mul(azimuths);
-    let expected = per_row.and_then(|words| words.checked_mul(all_rows?)?.checked_mul(4 * tables));
+    let expected = per_row.and_then(|words| words.checked_mul(all_rows?)?.checked_mul(4));
+    let are_two = sets > 1 && expected.is_some_and(|bytes| Some(payload.len()) == bytes.checked_mul(2));
+    let expected = if are_two { Some(payload.len()) } else { expected };
     let most_sets = if kind.are_kernels() { count } else { 1 };
     let is_possible = [1, 10, 19, 37].contains(&azimuths) && (1..=most_sets).contains(&sets);
     if count == 0 || rows == 0 || !is_possible || expected != Some(payload.len()) {
         return Err("has a header that does not fit its content".into());
     }
     let words: Vec<u32> = payload.as_chunks().0.iter().map(|&word| u32::from_le_bytes(word)).collect();
-    let (first, second) = words.split_at(words.len() / tables);
+    let (first, second) = words.split_at(if are_two { words.len() / 2 } else { words.len() });
     Ok(match kind {
         ThreadKind::Fitted | ThreadKind::Gaussian => {
             let table = |words: &[u32], sets| -> Result<_, String> {
@@ -147,8 +148,8 @@ fn decode(bytes: &[u8]) -> Result<Threads, String> {
                 let table = FittedTable::from_file_words(of_rows, of_threads)?;
                 Ok(FittedTable { rows, azimuths, count, sets, ..table })
             };
-            let of_subpixels = (tables == 2).then(|| table(second, sets).map(Box::new)).transpose()?;
-            let table = table(first, if tables == 2 { 1 } else { sets })?;
+            let of_subpixels = are_two.then(|| table(second, sets).map(Box::new)).transpose()?;
+            let table = table(first, if are_two { 1 } else { sets })?;
             let table = FittedTable { material, of_subpixels, ..table };
             if kind == ThreadKind::Fitted { Threads::Fitted(table) } else { Threads::Gaussian(table) }
         }

@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use super::cells::in_sets;
 use super::kernel::{Kernel, all_between, scale_rad};
 use super::lights::{Quadrature, TestLights};
+use super::sets::pixels_have_own;
 use super::solve::{Effort, Fit};
 use super::table::FittedTable;
 use crate::brdf::{Brdf, SeenBrdf, luminance};
@@ -104,7 +105,7 @@ impl Targets {
 }
 
 /// Fits `settings.count` threads to `brdf`, to its answers to lights or, of kind [`ThreadKind::Gaussian`], to f cos itself; the same to the last bit on any number of cores.
-/// If they are to be in sets, there are as many others of one set, but not of an anisotropic BRDF, whose fits take ten times as long.
+/// If they are to be in sets, there may be as many others that are not: [`pixels_have_own`].
 ///
 /// # Errors
 /// No or too many threads, no rows, or cancelled by `observer` (noticed within a step of a row).
@@ -112,10 +113,11 @@ pub fn generate(brdf: &Brdf, settings: &ThreadSettings, observer: &dyn Observer)
     settings.check()?;
     let targets = Targets::new(brdf, settings, observer)?;
     let done = AtomicUsize::new(0);
-    let tables = FittedTable::table_count(targets.azimuths, settings.sets);
-    let row_is_done = || observer.progress(done.fetch_add(1, Ordering::Relaxed) + 1, tables * targets.rows.len());
+    let are_two = settings.sets > 1 && pixels_have_own(brdf);
+    let total = if are_two { 2 * targets.rows.len() } else { targets.rows.len() };
+    let row_is_done = || observer.progress(done.fetch_add(1, Ordering::Relaxed) + 1, total);
     let fit = |sets| fit_all(brdf, &targets, &ThreadSettings { sets, ..*settings }, observer, &row_is_done);
-    if tables == 1 {
+    if !are_two {
         return fit(settings.sets);
     }
     let (of_pixels, of_subpixels) = rayon::join(|| fit(1), || fit(settings.sets));

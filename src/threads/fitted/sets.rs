@@ -1,5 +1,5 @@
 //! How many sets threads are made in, each of which does alone: the partition of the paper's section 4.2.
-use crate::brdf::Brdf;
+use crate::brdf::{Brdf, half_vector_width};
 
 /// Fewest threads of a set of an anisotropic BRDF, if it has as many: fewer leave gaps in a long lobe. Of a metal of roughness_alpha
 /// 0.05 x 0.3, 4 threads err by 0.066 of the radiance, 8 by 0.024, 16 by 0.010.
@@ -11,4 +11,15 @@ pub fn set_count(brdf: &Brdf, count: usize, subpixels: u32) -> usize {
     let subpixels = (subpixels * subpixels) as usize;
     let fewest = if subpixels == 1 || brdf.is_isotropic() { 1 } else { FEWEST_OF_LONG_LOBE };
     (count / fewest).clamp(1, subpixels)
+}
+
+/// Lobes narrower than this in half vectors, in radians, are narrower than normals are apart in the pixels of most meshes, so that these have a
+/// sum for each sub-pixel: the root of `SHARED_VARIANCE` in src/passes/classify.rs.
+const NARROW_RAD: f64 = 0.01;
+
+/// Whether pixels that share one sum have threads of their own, not in sets. Not of a narrow lobe, for which there are few such pixels, and whose
+/// free threads are so sharp that all pixels pay for looking that up: 26 ms become 35 with 16 threads of alumina-oxide on a dragon. Nor of
+/// an anisotropic BRDF, whose fits take ten times as long.
+pub fn pixels_have_own(brdf: &Brdf) -> bool {
+    brdf.is_isotropic() && half_vector_width(brdf) >= NARROW_RAD
 }

@@ -101,11 +101,6 @@ impl FittedTable {
         self.of_subpixels.as_deref().unwrap_or(self)
     }
 
-    /// How many tables there are, of as many threads each: one of isotropic BRDFs for whole pixels, and one in sets.
-    pub(in super::super) fn table_count(azimuths: usize, sets: usize) -> usize {
-        if azimuths == 1 && sets > 1 { 2 } else { 1 }
-    }
-
     /// The kernels of `row`, one per thread; rows of the second azimuth follow those of the first.
     pub fn row(&self, row: usize) -> &[PackedKernel] {
         &self.kernels[row * self.count..][..self.count]

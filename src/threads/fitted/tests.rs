@@ -179,7 +179,9 @@ fn each_set_of_threads_does_alone_and_all_do_better() {
         let error = |table: &FittedTable| validation_error(table, &brdf);
         let table = generate(&brdf, &ThreadSettings { sets: 4, ..small(16, 30) }, &()).unwrap();
         let [few, free] = [4, 16].map(|count| generate(&brdf, &small(count, 30), &()).unwrap());
-        assert!(table.kernels == free.kernels && table.sets == 1, "{name}: whole pixels have free threads");
+        let has_free = table.kernels == free.kernels && table.sets == 1;
+        // Of a lobe of 0.3 degrees pixels have those of their sub-pixels.
+        assert_eq!(has_free, name != "conductor 0.005", "{name}: whole pixels have free threads");
         let [few, free] = [few, free].map(|table| error(&table));
         let table = table.for_subpixels();
         assert_eq!(table.sets, 4);
