@@ -53,94 +53,45 @@ vec3 weighted_mean(WeightedSum sum) {
     return mix(sum.radiance / sum.weight, vec3(0.0), lessThanEqual(sum.weight, vec3(0.0)));
 }
 
-// Where a view lies among the rows, which stand at multiples of 90 degrees / row_count, and where these start. Beyond the last one the view
-// angle is held there.
+// Where a view lies among the rows, which stand at multiples of 90 degrees / row_count. Beyond the last one the view is held there.
 struct Rows {
     uint below;
     uint above;
     float t;
     vec3 w_o; // of the view, in its shading frame
-    // Of an anisotropic BRDF, how far it is from those rows to the ones of the next azimuth, this many elements on; 0 of an isotropic one.
-    uint next_azimuth;
-    float towards_next;
-    float side; // 1, or -1 where the view is the mirror image of one that there are rows for
 };
-
-bool is_anisotropic(Material material) {
-    return HAS_TANGENTS != 0 && material.threads.azimuth_count > 1;
-}
 
 // No sine or cosine where there is another way: devices may err by 5e-4 there, and a narrow lobe tells.
 Rows rows_at(Surface surface, Material material) {
-    uint row_count = material.threads.row_count;
-    float last = float(row_count - 1);
-    float row = surface.theta_o * (float(row_count) / radians(90.0));
+    float last = float(material.threads.row_count - 1);
+    float row = surface.theta_o * (float(material.threads.row_count) / radians(90.0));
     vec3 w_o = view_direction(surface);
     if (row > last) {
-        float theta_o = last * (radians(90.0) / float(row_count));
+        float theta_o = last * (radians(90.0) / float(material.threads.row_count));
         w_o = vec3(sin(theta_o), 0.0, cos(theta_o));
         row = last;
     }
     uint below = uint(row);
-    uint above = min(below + 1, row_count - 1);
-    Rows rows = Rows(row_start(material, below), row_start(material, above), row - float(below), w_o, 0, 0.0, 1.0);
-    if (is_anisotropic(material)) {
-        vec2 folded = fold_azimuth(surface.phi_o, material.threads.azimuth_count);
-        uint before = min(uint(folded.x), material.threads.azimuth_count - 2);
-        rows.next_azimuth = row_start(material, row_count) - row_start(material, 0);
-        rows.below += before * rows.next_azimuth;
-        rows.above += before * rows.next_azimuth;
-        rows.towards_next = folded.x - float(before);
-        rows.side = folded.y;
-    }
-    return rows;
-}
-
-// Thread k at the view, in the shading frame: its direction, not of unit length, and the logarithm of its pdf.
-vec4 thread_at(Rows rows, uint k) {
-    vec4 thread = mix(unpack_thread(rows.below, k), unpack_thread(rows.above, k), rows.t);
-    if (HAS_TANGENTS != 0 && rows.next_azimuth != 0) {
-        uint next = rows.next_azimuth;
-        vec4 of_next = mix(unpack_thread(rows.below + next, k), unpack_thread(rows.above + next, k), rows.t);
-        thread = mix(thread, of_next, rows.towards_next);
-        thread.y *= rows.side;
-    }
-    return thread;
-}
-
-vec3 albedo_at(Rows rows) {
-    vec3 albedo = mix(unpack_albedo(rows.below), unpack_albedo(rows.above), rows.t);
-    if (HAS_TANGENTS != 0 && rows.next_azimuth != 0) {
-        uint next = rows.next_azimuth;
-        vec3 of_next = mix(unpack_albedo(rows.below + next), unpack_albedo(rows.above + next), rows.t);
-        albedo = mix(albedo, of_next, rows.towards_next);
-    }
-    return albedo;
+    return Rows(below, min(below + 1, material.threads.row_count - 1), row - float(below), w_o);
 }
 
 // The threads as published: row and frame follow the view.
 vec3 threads_following_view(Surface surface, Material material, Rows rows, Partition share) {
+    uint below = row_start(material, rows.below);
+    uint above = row_start(material, rows.above);
     WeightedSum sum = WeightedSum(vec3(0.0), vec3(0.0));
     for (uint k = share.first; k < material.threads.count; k += share.stride) {
-        vec4 between = thread_at(rows, k);
+        vec4 between = mix(unpack_thread(below, k), unpack_thread(above, k), rows.t);
         float solid_angle_sr = lookup_solid_angle(surface, material, share, between.w);
         add_term(sum, surface, material, surface.frame, normalize(between.xyz), rows.w_o, between.w, solid_angle_sr);
     }
     return weighted_mean(sum);
 }
 
-// The surface's own axes: the tangent, whose azimuth in the shading frame is -phi_o; across it; the normal.
-mat3 own_axes(Surface surface) {
-    vec3 x = surface.phi_o.x * surface.frame[0] - surface.phi_o.y * surface.frame[1];
-    vec3 y = surface.phi_o.y * surface.frame[0] + surface.phi_o.x * surface.frame[1];
-    return mat3(x, y, surface.frame[2]);
-}
-
 // The threads of the first row, in a frame that does not turn, carried to this view along their half vectors: lobes stay
-// lobes, and p changes by the Jacobian 4 (w_o . h) of the reflection. Those of an anisotropic BRDF are along the surface's own axes.
+// lobes, and p changes by the Jacobian 4 (w_o . h) of the reflection.
 vec3 threads_of_facing_view(Surface surface, Material material, Partition share) {
-    mat3 frame = is_anisotropic(material) ? own_axes(surface)
-                                          : fixed_frame(surface.frame[2], to_environment(push.camera.right.xyz));
+    mat3 frame = fixed_frame(surface.frame[2], to_environment(push.camera.right.xyz));
     vec3 w_o = surface.w_o * frame;
     uint facing = row_start(material, 0);
     WeightedSum sum = WeightedSum(vec3(0.0), vec3(0.0));
@@ -174,7 +125,10 @@ vec3 estimate(Surface surface, Material material, uint first, uint stride) {
     if (following < 1.0) {
         mean += (1.0 - following) * threads_of_facing_view(surface, material, share);
     }
+    vec3 of_below = unpack_albedo(row_start(material, rows.below));
+    vec3 of_above = unpack_albedo(row_start(material, rows.above));
+    vec3 albedo = mix(of_below, of_above, rows.t);
     // The partition's part of all threads.
     float fraction = float((material.threads.count - first + stride - 1) / stride) / float(material.threads.count);
-    return fraction * albedo_at(rows) * mean;
+    return fraction * albedo * mean;
 }

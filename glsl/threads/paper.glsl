@@ -1,8 +1,6 @@
 // The paper's threads as the GPU holds them. Twin of the layout: src/threads/table.rs.
 
-#include "azimuths.glsl"
-
-// Azimuth by azimuth of the view, and row by row of theta_o: the row's albedo, then thread by thread the direction in the shading frame, and the logarithm
+// Row by row of theta_o: the row's albedo, then thread by thread the direction in the shading frame, and the logarithm
 // to base 2 of its pdf in 1/sr. Between rows the logarithm is nearer to the pdf than a linear blend.
 layout(set = 0, binding = 7, std430) readonly buffer Threads {
     vec4 threads[];

@@ -141,8 +141,7 @@ impl ThreadWords {
                 let first = (self.words.len() / ThreadTable::DEVICE_ELEMENT_WORDS) as u32;
                 self.words.extend(table.device_words());
                 let (count, row_count) = (table.count as u32, table.rows as u32);
-                let azimuth_count = table.azimuths as u32;
-                [ThreadTableRecord { first, count, row_count, azimuth_count, ..ThreadTableRecord::NONE }; 2]
+                [ThreadTableRecord { first, count, row_count, ..ThreadTableRecord::NONE }; 2]
             }
         }
     }

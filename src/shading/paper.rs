@@ -5,20 +5,12 @@ use glam::{Mat3, Vec2, Vec3, Vec4};
 
 use super::{Point, Surface, turned};
 use crate::tangent::tangent_along;
-use crate::threads::azimuths::Azimuths;
 use crate::threads::{ThreadTable, Threads};
 
 /// A frame at `n` that does not turn with w_o. Twin of `fixed_frame` in glsl/surface.glsl.
 fn fixed_frame(n: Vec3, axis: Vec3) -> Mat3 {
     let x = tangent_along(axis, n);
     Mat3::from_cols(x, n.cross(x), n)
-}
-
-/// The surface's own axes. Twin of `own_axes`.
-fn own_axes(surface: &Surface) -> Mat3 {
-    let back = Vec2::new(surface.phi_o.x, -surface.phi_o.y);
-    let [x, y] = [Vec3::X, Vec3::Y].map(|axis| surface.frame * turned(axis, back));
-    Mat3::from_cols(x, y, surface.frame.z_axis)
 }
 
 /// View angles between which the threads start to follow the view, as in the shader.
@@ -44,10 +36,6 @@ struct Rows {
     above: usize,
     t: f32,
     w_o: Vec3,
-    /// Rows from one azimuth to the next; 0 of an isotropic BRDF.
-    next_azimuth: usize,
-    towards_next: f32,
-    side: f32,
 }
 
 /// The point with the threads of its material.
@@ -67,7 +55,7 @@ pub(super) fn estimate(point: &Point) -> Vec3 {
 
 impl Paper<'_> {
     fn rows_at(&self, surface: &Surface) -> Rows {
-        let ThreadTable { rows: count, azimuths, .. } = *self.threads;
+        let count = self.threads.rows;
         let last = (count - 1) as f32;
         let mut row = surface.theta_o * (count as f32 / FRAC_PI_2);
         let mut w_o = surface.view_direction();
@@ -76,30 +64,7 @@ impl Paper<'_> {
             (row, w_o) = (last, Vec3::new(sin, 0.0, cos));
         }
         let below = row as usize;
-        let (above, t) = ((below + 1).min(count - 1), row - below as f32);
-        if azimuths == 1 {
-            return Rows { below, above, t, w_o, next_azimuth: 0, towards_next: 0.0, side: 1.0 };
-        }
-        let azimuths = Azimuths::around(surface.phi_o.to_angle().into(), azimuths);
-        let [below, above] = [below, above].map(|row| azimuths.before * count + row);
-        let (towards_next, side) = (azimuths.towards_next as f32, azimuths.side() as f32);
-        Rows { below, above, t, w_o, next_azimuth: count, towards_next, side }
-    }
-
-    fn thread_at(&self, rows: &Rows, k: usize) -> Vec4 {
-        let between =
-            |first: usize| self.thread(first + rows.below, k).lerp(self.thread(first + rows.above, k), rows.t);
-        if rows.next_azimuth == 0 {
-            return between(0);
-        }
-        let thread = between(0).lerp(between(rows.next_azimuth), rows.towards_next);
-        thread.with_y(rows.side * thread.y)
-    }
-
-    fn albedo_at(&self, rows: &Rows) -> Vec3 {
-        let at = |row: usize| Vec3::from(self.threads.albedo[row]);
-        let between = |first: usize| at(first + rows.below).lerp(at(first + rows.above), rows.t);
-        between(0).lerp(between(rows.next_azimuth), rows.towards_next)
+        Rows { below, above: (below + 1).min(count - 1), t: row - below as f32, w_o }
     }
 
     fn thread(&self, row: usize, k: usize) -> Vec4 {
@@ -128,15 +93,14 @@ impl Paper<'_> {
     fn threads_following_view(&self, surface: &Surface, rows: &Rows) -> Vec3 {
         let mut sum = WeightedSum::default();
         for k in self.partition() {
-            let between = self.thread_at(rows, k);
+            let between = self.thread(rows.below, k).lerp(self.thread(rows.above, k), rows.t);
             self.add_term(&mut sum, surface.frame, between.truncate().normalize(), rows.w_o, between.w);
         }
         sum.weighted_mean()
     }
 
     fn threads_of_facing_view(&self, surface: &Surface, axis: Vec3) -> Vec3 {
-        let is_isotropic = self.threads.azimuths == 1;
-        let frame = if is_isotropic { fixed_frame(surface.frame.z_axis, axis) } else { own_axes(surface) };
+        let frame = fixed_frame(surface.frame.z_axis, axis);
         let w_o = frame.transpose() * surface.w_o;
         let mut sum = WeightedSum::default();
         for k in self.partition() {
@@ -163,7 +127,8 @@ impl Paper<'_> {
         if following < 1.0 {
             mean += (1.0 - following) * self.threads_of_facing_view(surface, axis);
         }
+        let [below, above] = [rows.below, rows.above].map(|row| Vec3::from(self.threads.albedo[row]));
         let share = self.partition().count() as f32 / self.threads.count as f32;
-        share * self.albedo_at(&rows) * mean
+        share * below.lerp(above, rows.t) * mean
     }
 }

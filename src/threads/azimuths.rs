@@ -2,8 +2,6 @@
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use super::theta_o;
-use glam::{DVec2, DVec3};
-
 use crate::brdf::{Brdf, Symmetry};
 
 /// From one to the next, in radians: 10 degrees. `AZIMUTH_STEP` in glsl/azimuths.glsl. Of brushed metals of roughness_alpha 0.05 x 0.3
@@ -38,32 +36,9 @@ impl View {
         Self { theta_o: theta_o(index % rows, rows), phi_o: (index / rows) as f64 * STEP_RAD }
     }
 
-    /// w_o in the surface's own axes, of which x is the tangent and z the normal.
-    pub fn w_o(&self) -> DVec3 {
-        (DVec2::from_angle(self.phi_o) * self.theta_o.sin()).extend(self.theta_o.cos())
-    }
-
-    /// A direction of the surface's own axes, in the frame of the view.
-    pub fn seen(&self, direction: DVec3) -> DVec3 {
-        turned(direction, -self.phi_o)
-    }
-
-    /// The inverse of [`Self::seen`].
-    pub fn in_own_axes(&self, direction: DVec3) -> DVec3 {
-        turned(direction, self.phi_o)
-    }
-
     /// That of an isotropic BRDF.
     pub fn of_angle(theta_o: f64) -> Self {
         Self { theta_o, phi_o: 0.0 }
-    }
-}
-
-/// `direction` turned about z; to the last bit the same by no angle.
-fn turned(direction: DVec3, angle: f64) -> DVec3 {
-    match angle {
-        0.0 => direction,
-        angle => DVec2::from_angle(angle).rotate(direction.truncate()).extend(direction.z),
     }
 }
 

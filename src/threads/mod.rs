@@ -21,7 +21,6 @@ use crate::error::{Error, Result};
 use crate::progress::Observer;
 
 pub mod azimuths;
-mod column;
 pub mod cones;
 mod file;
 pub mod fitted;
@@ -139,14 +138,6 @@ impl Threads {
         }
     }
 
-    /// Number of azimuths of the view that there are rows for: 1 of an isotropic BRDF.
-    pub fn azimuths(&self) -> usize {
-        match self {
-            Self::Fitted(table) | Self::Gaussian(table) => table.azimuths,
-            Self::Paper(table) => table.azimuths,
-        }
-    }
-
     /// Where `thread` looks in `row`, unit, in the shading frame.
     pub fn direction(&self, row: usize, thread: usize) -> DVec3 {
         match self {
@@ -168,7 +159,7 @@ impl Threads {
                 kernels.into_iter().map(|(direction, weight)| (direction, share(weight))).collect()
             }
             Self::Paper(table) => {
-                (0..count).map(|thread| (table.interpolate(theta_o, phi_o, thread).0, 1.0 / count as f64)).collect()
+                (0..count).map(|thread| (table.interpolate(theta_o, thread).0, 1.0 / count as f64)).collect()
             }
         }
     }

@@ -56,7 +56,7 @@ struct Cell {
 }
 
 /// The direction that the facet `h` mirrors `w_o` into.
-pub(super) fn reflect(w_o: DVec3, h: DVec3) -> DVec3 {
+fn reflect(w_o: DVec3, h: DVec3) -> DVec3 {
     (2.0 * w_o.dot(h) * h - w_o).normalize()
 }
 
@@ -193,19 +193,9 @@ impl<'a> Slice<'a> {
         }
     }
 
-    /// The same without its CDF, nearly all of its 200 KB: it knows densities, but neither directions nor coordinates.
-    pub(super) fn without_cdf(self) -> Self {
-        Self { ring_cdf: Vec::new(), azimuth_cdf: Vec::new(), ..self }
-    }
-
     /// The integral of f cos per channel: the directional albedo.
     pub fn albedo(&self) -> DVec3 {
         self.albedo
-    }
-
-    /// Where it is seen from.
-    pub fn w_o(&self) -> DVec3 {
-        self.w_o
     }
 
     /// Equation (4): p(w_i) in 1/sr.

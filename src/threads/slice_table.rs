@@ -1,4 +1,5 @@
 //! The CDFs of a BRDF's slices at all view angles: what importance sampling draws directions by (Matusik et al. 2003).
+use glam::dvec3;
 use rayon::prelude::*;
 
 use super::azimuths::{View, azimuth_count};
@@ -44,7 +45,10 @@ impl SliceTable {
         let azimuths = azimuth_count(brdf);
         let rows = if azimuths == 1 { ROWS } else { AZIMUTH_ROWS };
         let seen = SeenBrdf::from_azimuth(brdf, 0.0);
-        let slice = |row: usize| Slice::of_view(&seen, View::of_row(row, rows).w_o());
+        let slice = |row: usize| {
+            let View { theta_o, phi_o } = View::of_row(row, rows);
+            Slice::of_view(&seen, dvec3(theta_o.sin() * phi_o.cos(), theta_o.sin() * phi_o.sin(), theta_o.cos()))
+        };
         Self { azimuths, rows, cdfs: tabulated(azimuths * rows, slice) }
     }
 }

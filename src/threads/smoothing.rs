@@ -1,8 +1,5 @@
-//! Smoothing, section 3.2.2: each thread moves by half its Laplacian vector over theta_o; of an anisotropic BRDF, then over phi_o.
+//! Smoothing, section 3.2.2: each thread moves by half its Laplacian vector over theta_o.
 use glam::DVec3;
-
-use super::MIN_COS;
-use super::slice::reflect;
 
 /// Smooths one thread, given as one unit direction per row. The first and the last stay: they have one neighbour.
 pub fn smooth(thread: &[DVec3]) -> Vec<DVec3> {
@@ -13,15 +10,6 @@ pub fn smooth(thread: &[DVec3]) -> Vec<DVec3> {
         smoothed[row] = (thread[row] + 0.5 * laplacian).normalize();
     }
     smoothed
-}
-
-/// Smooths one thread over the azimuths of one view angle: its directions in the surface's own axes, and w_o of each. What moves is the half
-/// vector, since lobes stay where they are there: the mirrored view goes around, and its Laplacian would draw it inwards. What would be
-/// mirrored below the horizon stays.
-pub fn smooth_over_azimuths(thread: &[DVec3], w_o: &[DVec3]) -> Vec<DVec3> {
-    let half_vectors: Vec<_> = thread.iter().zip(w_o).map(|(s, w_o)| (s + w_o).normalize()).collect();
-    let mirrored = smooth(&half_vectors).into_iter().zip(w_o).map(|(h, w_o)| reflect(*w_o, h));
-    mirrored.zip(thread).map(|(s, before)| if s.z > MIN_COS { s } else { *before }).collect()
 }
 
 #[cfg(test)]
@@ -43,19 +31,6 @@ mod tests {
         let thread: Vec<DVec3> =
             (0..20).map(|row| 0.02 * f64::from(row)).map(|a| DVec3::new(a.sin(), 0.0, a.cos())).collect();
         assert!(smooth(&thread).iter().zip(&thread).all(|(a, b)| a.distance(*b) < 1e-12));
-    }
-
-    #[test]
-    fn a_thread_on_one_facet_stays_as_the_view_goes_around_and_a_kink_is_halved() {
-        let w_o: Vec<_> =
-            (0..10).map(|i| 0.17 * f64::from(i)).map(|a| DVec3::new(0.6 * a.cos(), 0.6 * a.sin(), 0.8)).collect();
-        let facet = |tilt: f64| DVec3::new(tilt.sin(), 0.0, tilt.cos());
-        let mut thread: Vec<_> = w_o.iter().map(|w_o| reflect(*w_o, facet(0.1))).collect();
-        let smoothed = smooth_over_azimuths(&thread, &w_o);
-        assert!(smoothed.iter().zip(&thread).all(|(a, b)| a.distance(*b) < 1e-12));
-        thread[4] = reflect(w_o[4], facet(0.12));
-        let h = (smooth_over_azimuths(&thread, &w_o)[4] + w_o[4]).normalize();
-        assert!(h.distance(facet(0.11)) < 1e-5, "{h}");
     }
 
     #[test]

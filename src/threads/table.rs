@@ -4,7 +4,6 @@ use std::f64::consts::FRAC_PI_2;
 
 use glam::{DVec3, Vec4, dvec3};
 
-use super::azimuths::Azimuths;
 use super::theta_o;
 
 /// One incident sample in the shading frame of its row.
@@ -44,54 +43,42 @@ impl Sample {
     }
 }
 
-/// The threads of one material: `azimuths` x `rows` x `count` samples. Row r of an azimuth is for theta_o = r 90 deg / rows.
+/// The threads of one material: `rows` x `count` samples. Row r is for theta_o = r 90 deg / rows.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ThreadTable {
     /// Number of view angles.
     pub rows: usize,
-    /// Number of azimuths of the view, as [`azimuth_count`](crate::threads::azimuths::azimuth_count) has it: 1 of an isotropic BRDF.
-    pub azimuths: usize,
     /// Number of threads.
     pub count: usize,
     /// The seed it was made with.
     pub seed: u64,
     /// Name of the material, for people.
     pub material: String,
-    /// Directional albedo of each row, azimuth by azimuth, linear Rec. 709: the integral of f cos that equation (4) divides by.
+    /// Directional albedo of each row, linear Rec. 709: the integral of f cos that equation (4) divides by.
     pub albedo: Vec<[f32; 3]>,
-    /// Row by row: thread k of row r of azimuth a is `samples[(a * rows + r) * count + k]`.
+    /// Row by row: thread k of row r is `samples[r * count + k]`.
     pub samples: Vec<Sample>,
 }
 
 impl ThreadTable {
     /// View angle of `row` in radians.
     pub fn theta_o(&self, row: usize) -> f64 {
-        theta_o(row % self.rows, self.rows)
+        theta_o(row, self.rows)
     }
 
-    /// The samples of `row`, one per thread; rows of the second azimuth follow those of the first.
+    /// The samples of `row`, one per thread.
     pub fn row(&self, row: usize) -> &[Sample] {
         &self.samples[row * self.count..][..self.count]
     }
 
-    /// Direction and pdf of `thread` seen from `theta_o` and its azimuth `phi_o` (radians), between rows: directions blend as unit vectors (a blend of
+    /// Direction and pdf of `thread` seen from `theta_o` (radians), between rows: directions blend as unit vectors (a blend of
     /// phi would break where it wraps), pdfs by their logarithm: half-way between rows a white furnace is 2 to 3 times nearer
     /// to the albedo than with a linear blend. Beyond the last row that row holds.
-    pub fn interpolate(&self, theta_o: f64, phi_o: f64, thread: usize) -> (DVec3, f64) {
+    pub fn interpolate(&self, theta_o: f64, thread: usize) -> (DVec3, f64) {
         let position = (theta_o / FRAC_PI_2 * self.rows as f64).clamp(0.0, (self.rows - 1) as f64);
         let (low, t) = (position as usize, position.fract());
         let high = (low + 1).min(self.rows - 1);
-        let at_azimuth = |azimuth: usize| {
-            let [low, high] = [low, high].map(|row| &self.row(azimuth * self.rows + row)[thread]);
-            interpolate(low, high, t)
-        };
-        if self.azimuths == 1 {
-            return at_azimuth(0);
-        }
-        let azimuths = Azimuths::around(phi_o, self.azimuths);
-        let [(before, p), (next, next_p)] = [azimuths.before, azimuths.before + 1].map(at_azimuth);
-        let direction = before.lerp(next, azimuths.towards_next).normalize();
-        (direction.with_y(azimuths.side() * direction.y), p * (next_p / p).powf(azimuths.towards_next))
+        interpolate(&self.row(low)[thread], &self.row(high)[thread], t)
     }
 
     /// Words of an element of the shader's buffer: a vec4.
@@ -129,7 +116,7 @@ impl ThreadTable {
         if !albedo.as_flattened().iter().all(|value| (0.0..=f32::MAX).contains(value)) {
             return Err("holds an albedo that is none".into());
         }
-        Ok(Self { rows: 0, azimuths: 0, count: 0, seed: 0, material: String::new(), albedo, samples })
+        Ok(Self { rows: 0, count: 0, seed: 0, material: String::new(), albedo, samples })
     }
 }
 

@@ -340,7 +340,6 @@ pub fn threads() -> Reader {
             let material = "m".to_owned();
             let paper = ThreadTable {
                 rows: 3,
-                azimuths: 1,
                 count: 2,
                 seed: 9,
                 material: material.clone(),
