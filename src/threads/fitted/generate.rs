@@ -105,7 +105,7 @@ impl Targets {
 }
 
 /// Fits `settings.count` threads to `brdf`, to its answers to lights or, of kind [`ThreadKind::Gaussian`], to f cos itself; the same to the last bit on any number of cores.
-/// If they are to be in sets, there may be as many others that are not: [`pixels_have_own`].
+/// If they are to be in sets, there may be as many others that are not: see sets.rs.
 ///
 /// # Errors
 /// No or too many threads, no rows, or cancelled by `observer` (noticed within a step of a row).
