@@ -5,6 +5,7 @@ use glam::DVec3;
 
 use super::generate::{MOST_MOVED, carried, most_moved};
 use super::kernel::{Kernel, SHARPEST_LEVEL, WIDEST_LEVEL, kappa_of_level, scale_rad, vmf_peak};
+use super::sets::pixels_have_own;
 use super::{FittedTable, MAX_COUNT, PackedKernel, draft, generate, validation_error};
 use crate::brdf::{Brdf, CustomBrdf, SeenBrdf};
 use crate::error::Error;
@@ -180,8 +181,9 @@ fn each_set_of_threads_does_alone_and_all_do_better() {
         let table = generate(&brdf, &ThreadSettings { sets: 4, ..small(16, 30) }, &()).unwrap();
         let [few, free] = [4, 16].map(|count| generate(&brdf, &small(count, 30), &()).unwrap());
         let has_free = table.kernels == free.kernels && table.sets == 1;
-        // Of a lobe of 0.3 degrees pixels have those of their sub-pixels.
-        assert_eq!(has_free, name != "conductor 0.005", "{name}: whole pixels have free threads");
+        assert_eq!(has_free, pixels_have_own(&brdf), "{name}: whole pixels have free threads");
+        // Of a lobe of 0.3 degrees they have those of their sub-pixels; measured alumina-oxide has one as narrow.
+        assert!(name == "alumina-oxide" || has_free == (name != "conductor 0.005"), "{name}");
         let [few, free] = [few, free].map(|table| error(&table));
         let table = table.for_subpixels();
         assert_eq!(table.sets, 4);
