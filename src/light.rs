@@ -4,7 +4,7 @@ use crate::environment::sources::{CLEAR, clearance};
 use crate::environment::{Environment, Pyramid, VmfPyramid};
 use crate::memo::Keyed;
 use crate::threads::fitted::kernel::FINEST_WIDTH_RAD;
-use crate::threads::{Threads, WithThreads};
+use crate::threads::{FittedTable, Threads, WithThreads};
 
 /// What a method looks up of an environment, as far as it has to be filtered.
 #[derive(Clone, Default)]
@@ -65,9 +65,8 @@ impl KernelNeeds {
             sources.iter().any(|source| clearance(0.0, source.width_rad() as f32, lobe_width) < CLEAR[1])
         };
         let is_sharp = |threads: Option<&Threads>| {
-            threads.and_then(Threads::fitted).is_some_and(|table| {
-                [table, table.for_subpixels()].iter().any(|table| table.sharp_count(finest_level) > 0)
-            })
+            let mut tables = threads.and_then(Threads::fitted).into_iter().flat_map(FittedTable::tables);
+            tables.any(|table| table.sharp_count(finest_level) > 0)
         };
         Self {
             map: materials.iter().any(|(_, threads)| is_sharp(*threads)),

@@ -9,7 +9,7 @@ use crate::memo::{Key, Keyed, Memo, Round, Step};
 use crate::method::Method;
 use crate::passes::{BackgroundMap, DeviceLight, DeviceMaterials, DeviceMesh, ShadedMaterial, WayAround};
 use crate::scene::Mesh;
-use crate::threads::Threads;
+use crate::threads::{FittedTable, Threads};
 use crate::vulkan::Device;
 use std::sync::Arc;
 
@@ -69,7 +69,8 @@ impl Step for UploadMaterials<'_> {
             let threads = self.materials.iter().filter_map(|(_, threads)| *threads);
             threads
                 .filter_map(|threads| threads.fitted())
-                .flat_map(|table| [table, table.for_subpixels()].map(|table| table.sharp_count(level) as u64))
+                .flat_map(FittedTable::tables)
+                .map(|table| table.sharp_count(level) as u64)
                 .collect::<Vec<_>>()
         });
         Ok(sharp.into_iter().flatten().fold(key, |key, count| key.number(count)).build())

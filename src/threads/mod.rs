@@ -198,7 +198,7 @@ pub struct ThreadSettings {
     /// Where the first row's points start.
     pub seed: u64,
     /// How many sets the fitted threads or Gaussians of sub-pixels are made in, each of which does alone: thread k is of set k % `sets`.
-    /// Whole pixels have others, except of an anisotropic BRDF. The paper's need no sets.
+    /// Whole pixels may have others, which are not. The paper's need no sets.
     pub sets: usize,
 }
 

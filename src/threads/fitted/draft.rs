@@ -39,7 +39,7 @@ pub fn draft(brdf: &Brdf, before: &FittedTable, observer: &dyn Observer) -> Resu
     let Some(of_subpixels) = &before.of_subpixels else { return continued(brdf, before, observer) };
     let (of_pixels, of_subpixels) =
         rayon::join(|| continued(brdf, before, observer), || continued(brdf, of_subpixels, observer));
-    Ok(FittedTable { of_subpixels: Some(Box::new(of_subpixels?)), ..of_pixels? })
+    Ok(of_pixels?.with_subpixels(of_subpixels?))
 }
 
 /// The threads of `before`, but not those of its sub-pixels.

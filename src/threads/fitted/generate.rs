@@ -121,7 +121,7 @@ pub fn generate(brdf: &Brdf, settings: &ThreadSettings, observer: &dyn Observer)
         return fit(settings.sets);
     }
     let (of_pixels, of_subpixels) = rayon::join(|| fit(1), || fit(settings.sets));
-    Ok(FittedTable { of_subpixels: Some(Box::new(of_subpixels?)), ..of_pixels? })
+    Ok(of_pixels?.with_subpixels(of_subpixels?))
 }
 
 /// The fit of all rows, all threads of which are in `settings.sets`.

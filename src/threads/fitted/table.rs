@@ -101,6 +101,16 @@ impl FittedTable {
         self.of_subpixels.as_deref().unwrap_or(self)
     }
 
+    /// The same, with threads of sub-pixels' own.
+    pub(super) fn with_subpixels(self, of_subpixels: Self) -> Self {
+        Self { of_subpixels: Some(Box::new(of_subpixels)), ..self }
+    }
+
+    /// Itself, and the threads of sub-pixels if they are others.
+    pub fn tables(&self) -> impl Iterator<Item = &Self> {
+        std::iter::once(self).chain(self.of_subpixels.as_deref())
+    }
+
     /// The kernels of `row`, one per thread; rows of the second azimuth follow those of the first.
     pub fn row(&self, row: usize) -> &[PackedKernel] {
         &self.kernels[row * self.count..][..self.count]
