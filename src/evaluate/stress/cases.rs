@@ -133,8 +133,8 @@ fn tables(folder: &Path) -> Vec<Case> {
         Case::table(folder, "table: rows of zeros", |[_, theta_d, _]| if theta_d % 2 == 0 { 0.5 * WHITE } else { 0.0 }),
         Case::table(folder, "table: negative cells", |[h, d, p]| if (h + d + p) % 3 == 0 { -1.0 } else { 0.2 * WHITE }),
         Case::table(folder, "table: one hot cell", |cell| if cell == [10, 20, 90] { 1e7 } else { 0.1 * WHITE }),
-        Case::table(folder, "table: denormal", |_| 1e-310),
-        Case::table(folder, "table: zero", |_| 0.0),
+        // In single precision, that is; files of zeros are refused.
+        Case::table(folder, "table: denormal", |_| 1e-40 * WHITE),
     ]
 }
 
