@@ -62,7 +62,7 @@ impl KernelNeeds {
         let sources = environment.small_sources();
         let mirrors = |brdf: &Brdf| {
             let lobe_width = (MIN_COS_THETA_D * half_vector_width(brdf)) as f32;
-            sources.parts().any(|source| clearance(0.0, source.width_rad() as f32, lobe_width) < CLEAR[1])
+            sources.leaves().any(|source| clearance(0.0, source.width_rad() as f32, lobe_width) < CLEAR[1])
         };
         let is_sharp = |threads: Option<&Threads>| {
             let mut tables = threads.and_then(Threads::fitted).into_iter().flat_map(FittedTable::tables);
@@ -70,7 +70,7 @@ impl KernelNeeds {
         };
         Self {
             map: materials.iter().any(|(_, threads)| is_sharp(*threads)),
-            sources: !sources.lamps.is_empty(),
+            sources: !sources.nodes.is_empty(),
             mirrored_sources: materials.iter().any(|(brdf, _)| mirrors(brdf)),
         }
     }

@@ -4,7 +4,7 @@
 //! in double precision; everything else follows the shader line by line.
 use crate::Result;
 use crate::brdf::{Brdf, MaterialRecord};
-use crate::environment::{Alias, FractionBits, LightMap, SourceRecords};
+use crate::environment::{Alias, FractionBits, LightMap, SourceRecord};
 use crate::geometry_texel::GeometryTexel;
 use crate::light::Light;
 use crate::memo::Round;
@@ -147,7 +147,7 @@ pub struct CpuShader<'a> {
     /// The table of each material that shaders look up in one.
     tables: Vec<Option<Brdf>>,
     /// The small bright sources of the environment.
-    sources: SourceRecords,
+    sources: Vec<SourceRecord>,
     /// Those of lookups in cube maps.
     fractions: FractionBits,
 }
