@@ -1,5 +1,5 @@
 //! What shading looks up of an environment, in memory: its filtered forms, and which of them the kernels of threads need.
-use crate::brdf::{Brdf, MIN_COS_THETA_D, half_vector_width};
+use crate::brdf::{LobeShape, MIN_COS_THETA_D};
 use crate::environment::sources::{CLEAR, clearance};
 use crate::environment::{Environment, Pyramid, VmfPyramid};
 use crate::memo::Keyed;
@@ -60,8 +60,8 @@ impl KernelNeeds {
     pub fn of(environment: &Environment, materials: &[WithThreads], rest: &VmfPyramid) -> Self {
         let finest_level = finest_level(rest);
         let sources = &environment.small_sources().list;
-        let mirrors = |brdf: &Brdf| {
-            let lobe_width = (MIN_COS_THETA_D * half_vector_width(brdf)) as f32;
+        let mirrors = |lobe: &LobeShape| {
+            let lobe_width = (MIN_COS_THETA_D * lobe.width_rad) as f32;
             sources.iter().any(|source| clearance(0.0, source.width_rad() as f32, lobe_width) < CLEAR[1])
         };
         let is_sharp = |threads: Option<&Threads>| {
@@ -71,7 +71,7 @@ impl KernelNeeds {
         Self {
             map: materials.iter().any(|(_, threads)| is_sharp(*threads)),
             sources: !sources.is_empty(),
-            mirrored_sources: materials.iter().any(|(brdf, _)| mirrors(brdf)),
+            mirrored_sources: materials.iter().any(|(lobe, _)| mirrors(lobe)),
         }
     }
 

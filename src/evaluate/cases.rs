@@ -131,8 +131,9 @@ impl Cases {
         }
         self.check_materials(memo)?;
         for (number, (material_name, source)) in self.own_materials() {
-            let brdf = memo.round(observer).ask(&LoadMaterial(source))?;
-            let mut material = vec![PreparedMaterial::new(material_name.clone(), brdf)];
+            let of_material = memo.round(observer);
+            let brdf = of_material.ask(&LoadMaterial(source))?;
+            let mut material = vec![PreparedMaterial::new(material_name.clone(), brdf, &of_material)?];
             let mut tables = Vec::new();
             for (scene, prepared, display) in &mut scenes {
                 // The scene borrows the material and the environment while they are looked at together.
@@ -210,13 +211,8 @@ impl Place<'_> {
     pub fn choose(&mut self, estimator: Estimator) -> Result<()> {
         let Estimator { variant: Variant { method, pattern }, count } = estimator;
         let sampling = Sampling { count, seed: self.cases.seed, pattern };
-        let threads = ask_threads(
-            &self.round(),
-            method,
-            &self.prepared.materials[0].brdf,
-            sampling,
-            self.prepared.view.subpixels,
-        )?;
+        let threads =
+            ask_threads(&self.round(), method, &self.prepared.materials[0], sampling, self.prepared.view.subpixels)?;
         self.tables.extend(threads.clone());
         self.prepared.materials[0].threads = threads;
         self.prepared.method = method;
