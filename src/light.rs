@@ -66,7 +66,7 @@ impl KernelNeeds {
         };
         let is_sharp = |threads: Option<&Threads>| {
             let mut tables = threads.and_then(Threads::fitted).into_iter().flat_map(FittedTable::tables);
-            tables.any(|table| table.sharp_count(finest_level) > 0)
+            tables.any(|table| table.used().sharp_count(finest_level) > 0)
         };
         Self {
             map: materials.iter().any(|(_, threads)| is_sharp(*threads)),

@@ -149,13 +149,14 @@ impl ThreadWords {
     }
 
     fn add_kernels(&mut self, table: &FittedTable) -> ThreadTableRecord {
+        let used = table.used();
         let first = self.words.len() as u32;
-        self.words.extend(table.device_words());
+        self.words.extend(used.device_words());
         ThreadTableRecord {
             first,
-            count: table.used_count() as u32,
+            count: used.count() as u32,
             row_count: table.rows as u32,
-            sharp_count: self.finest_level.map_or(0, |level| table.sharp_count(level) as u32),
+            sharp_count: self.finest_level.map_or(0, |level| used.sharp_count(level) as u32),
             set_count: table.sets as u32,
             azimuth_count: table.azimuths as u32,
         }

@@ -70,7 +70,7 @@ impl Step for UploadMaterials<'_> {
             threads
                 .filter_map(|threads| threads.fitted())
                 .flat_map(FittedTable::tables)
-                .map(|table| table.sharp_count(level) as u64)
+                .map(|table| table.used().sharp_count(level) as u64)
                 .collect::<Vec<_>>()
         });
         Ok(sharp.into_iter().flatten().fold(key, |key, count| key.number(count)).build())
