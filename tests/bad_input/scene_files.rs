@@ -38,6 +38,7 @@ fn hostile_scene_files_are_refused() {
         ("[[material]]\nname = 'm'\nmodel = 'lambert'\n[[object]]\nbuiltin = 'sphere'", "reflectance"),
         ("[[material]]\nname = 'm'\nfile = 'missing.binary'\n[[object]]\nbuiltin = 'sphere'", "missing.binary"),
         ("[[material]]\nname = 'm'\nbuiltin = 'velvet'\n[[object]]\nbuiltin = 'sphere'", "velvet"),
+        ("[[material]]\nname = 'velvet'", "blue-velvet"),
         ("[camera]\neye = [0, 0, 0]", "target"),
         ("[camera]\neye = [0, 0, 4]\nfov_y_deg = 180", "fov_y_deg"),
     ] {
