@@ -98,7 +98,7 @@ fn shaders_are_compiled_for_a_gpu_that_is_not_there_and_spill_nothing() {
     let said = String::from_utf8_lossy(&output.stdout);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     assert!(
-        ["NAVI21", "VGPRs", "shade_fitted"]
+        ["NAVI21", "VGPRs", "geometry_cache_vert", "geometry_cache_frag", "shade_fitted"]
             .iter()
             .all(|text| said.contains(text)),
         "{said}"
