@@ -33,7 +33,7 @@ pub use base::{base_files, base_files_of, change_base_files, resolve_base_files}
 pub use coat::Coat;
 pub use custom::CustomBrdf;
 pub use ggx_lobe::{Tap, ggx_lobe};
-pub use lobe::{LobeAxes, MIN_COS_THETA_D, half_vector_width, lobe_axes, lobe_radius};
+pub use lobe::{LobeShape, MIN_COS_THETA_D, half_vector_width, lobe_radius};
 pub use merl_export::merl_bytes;
 pub use microfacet::{Distribution, fresnel_conductor, fresnel_dielectric};
 pub use parameters::{Domain, Parameter, Parameters, Spacing, as_number, channels, parameter, set_parameter};
@@ -278,8 +278,7 @@ impl Brdf {
         const PHI_STEPS: usize = 384;
         let w_o = (DVec2::from_angle(phi_o) * theta_o.sin()).extend(theta_o.cos());
         // A ring crosses an ellipse within its ratio in radians. GGX then leaves an error of 2 e^(-ratio phi_steps).
-        let LobeAxes { narrow_rad, wide_rad, .. } = lobe_axes(self);
-        let phi_steps = PHI_STEPS.max((8.0 * wide_rad / narrow_rad).ceil() as usize);
+        let phi_steps = PHI_STEPS.max((8.0 / LobeShape::of(self).narrowness).ceil() as usize);
         let mut sum = DVec3::ZERO;
         for i in 0..THETA_STEPS {
             let x = (i as f64 + 0.5) / THETA_STEPS as f64;

@@ -180,7 +180,7 @@ impl<'a> CpuShader<'a> {
             map,
             slices: slices.unwrap_or_default(),
             split_sums: split_sums.unwrap_or_default(),
-            records: materials.iter().map(|material| MaterialRecord::new(&material.brdf)).collect(),
+            records: materials.iter().map(|material| MaterialRecord::new(&material.brdf, &material.lobe)).collect(),
             tables: materials.iter().map(table).collect::<Result<_>>()?,
             sources: environment.small_sources().records(1.0),
             fractions: FractionBits::ALL,
