@@ -302,8 +302,8 @@ impl Prepared {
         bounding_sphere(&self.meshes, &self.objects)
     }
 
-    /// The light as the method shades by it. What it shades by kernels alone has its small sources among all other light: so it is where the
-    /// BRDF of a material, by which it would shade them, is none that shaders can evaluate. A notice says so.
+    /// The light as the method shades by it. What it shades by kernels alone has its small sources among all other light: so it
+    /// is where the BRDF of a material, by which it would shade them, is none that shaders can evaluate. A notice says so.
     ///
     /// # Errors
     /// Cancelled.

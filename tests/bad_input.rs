@@ -267,7 +267,11 @@ fn methods_that_evaluate_the_brdf_in_a_shader_refuse_measured_anisotropy() {
     let folder = workplace();
     let file = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/rgl/half_turn_rgb.bsdf");
     for method in ["importance", "paper"] {
-        refuses(&folder, &render(&format!("--material {file} --method {method}")), &["`rgl`: is anisotropic", "fitted"]);
+        refuses(
+            &folder,
+            &render(&format!("--material {file} --method {method}")),
+            &["`rgl`: is anisotropic", "fitted"],
+        );
     }
 }
 

@@ -1,8 +1,9 @@
 //! A measured BRDF as a table over the angles of light and view to the normal, the azimuth between them, and that of the light.
 //!
-//! What goniometers measure. Between nodes f is linear in each of the four angles; nodes that were not measured have no weight. Beyond the
-//! first and the last angle to the normal it is as there. Since one of the azimuths is that between light and view, what does not change when
-//! the material is turned is exactly so between nodes too, and a highlight keeps its shape from node to node. f is reciprocal only as far as measured.
+//! What goniometers measure. Between nodes f is linear in each of the four angles; nodes that were not measured have no weight. Beyond
+//! the first and the last angle to the normal it is as there. Since one of the azimuths is that between light and view, what does not
+//! change when the material is turned is exactly so between nodes too, and a highlight keeps its shape from node to node. f is reciprocal
+//! only as far as measured.
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
@@ -71,8 +72,8 @@ impl Nodes {
 }
 
 impl Goniometric {
-    /// The table of what was measured at the nodes of theta_i, theta_o, azimuth and turn; what is negative counts as 0. The error is that
-    /// all is black, or nothing was measured.
+    /// The table of what was measured at the nodes of theta_i, theta_o, azimuth and turn; what is negative counts as
+    /// 0. The error is that all is black, or nothing was measured.
     pub(super) fn of(axes: Axes, measured: impl Fn([usize; 4]) -> Option<Vec3>) -> Result<Self, String> {
         let [thetas, azimuths, turns] = [axes.thetas, axes.azimuths, axes.turns].map(|nodes| nodes.count);
         let value = |index: usize| {

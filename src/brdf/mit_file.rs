@@ -7,8 +7,9 @@
 //! wdas/brdf restates it.)
 //!
 //! What the description leaves open: phi_in is taken as the azimuth of the light from the tangent, and phi_diff as that of the view less
-//! that of the light, as in BRDF Explorer (but for half a turn of both). Where phi_diff ends at 180 degrees, light and view change places beyond, as reciprocity has it. Numbers are
-//! taken for f in 1/sr as they are; their scale is not described (BRDF Explorer multiplies them by 10). Reading takes at most twice the memory of the file.
+//! that of the light, as in BRDF Explorer (but for half a turn of both). Where phi_diff ends at 180 degrees, light and view change places
+//! beyond, as reciprocity has it. Numbers are taken for f in 1/sr as they are; their scale is not described (BRDF Explorer multiplies
+//! them by 10). Reading takes at most twice the memory of the file.
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::path::Path;
 

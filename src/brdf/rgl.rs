@@ -1,9 +1,10 @@
 //! RGL: a measured BRDF of EPFL's material database, in the parameterisation that follows the material.
 //!
 //! Dupuy and Jakob, "An Adaptive Parameterization for Efficient Material Acquisition and Rendering" (2018). A direction is a point of the
-//! unit square, u = (sqrt(2 theta / pi), (phi + pi) / (2 pi)), phi of isotropic materials relative to the plane of the measured direction `a`, of others from the tangent. The half vector's
-//! point u_h is warped by the distribution of the normals that are visible from `a`, which spreads the lobe over the whole square; there
-//! the measured values M are looked up. With the distribution of normals D and the projected area sigma of the database's fit,
+//! unit square, u = (sqrt(2 theta / pi), (phi + pi) / (2 pi)), phi of isotropic materials relative to the plane of the measured direction
+//! `a`, of others from the tangent. The half vector's point u_h is warped by the distribution of the normals that are visible from `a`,
+//! which spreads the lobe over the whole square; there the measured values M are looked up. With the distribution of normals D and the
+//! projected area sigma of the database's fit,
 //!
 //! ```text
 //! f cos theta_b = M(warp_a(u_h), phi_a, theta_a) D(u_h) / (4 sigma(u_a))
@@ -229,8 +230,8 @@ impl RglTables {
         self.phi_a.len() <= 2
     }
 
-    /// What takes both directions to where `w_a` was measured: factors of their coordinates. Of an azimuth at the ends of that part, both ends are
-    /// as good; signs of zeros say which, as in Mitsuba 3.
+    /// What takes both directions to where `w_a` was measured: factors of their coordinates. Of an azimuth at the
+    /// ends of that part, both ends are as good; signs of zeros say which, as in Mitsuba 3.
     fn to_measured_part(&self, w_a: DVec3) -> DVec3 {
         let [x, y] = [w_a.x, w_a.y].map(|coordinate| -1f64.copysign(coordinate));
         match self.parts {

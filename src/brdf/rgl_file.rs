@@ -85,7 +85,8 @@ fn grid(file: &TensorFile, name: &str, least: f32) -> Result<Grid<f32>, String> 
     Ok(Grid { size: sides(name, field.shape)?, values: field.all().collect() })
 }
 
-/// Columns and rows of the last two dimensions of the field `name`, if the ones before are the numbers of azimuths and angles, and `between`.
+/// Columns and rows of the last two dimensions of the field `name`, if the ones before are the numbers of azimuths
+/// and angles, and `between`.
 fn square(name: &str, shape: &[usize], angles: [usize; 2], between: &[usize]) -> Result<[usize; 2], String> {
     let (before, last) = shape.split_at(shape.len() - 2);
     if before != [&angles, between].concat() {

@@ -4,10 +4,10 @@
 //! and blue: rows over light, columns over view, each of index phi + 48 theta with phi in steps of 7.5 degrees and theta in steps of 15
 //! degrees, from 0 to 75. (The database's own reader, as jdupuy/dj_brdf and asztr/UTIA-brdf restate it.)
 //!
-//! At nodes f is what the database's reader finds; values below 0 count as 0. Between them that reader is linear in the azimuth of the view
-//! where `goniometric.rs` is linear in the azimuth between light and view, and beyond 75 degrees it goes on in a straight line where f stays as it is at 75
-//! here. Of GGX with alpha 0.1 x 0.4, 0.2 x 0.5 and 0.3, tabulated like that, it errs by 27, 9 and 5.5 % of the light, and this by 24, 8
-//! and 4.5. Reading takes no more memory than the file.
+//! At nodes f is what the database's reader finds; values below 0 count as 0. Between them that reader is linear in the azimuth of the
+//! view where `goniometric.rs` is linear in the azimuth between light and view, and beyond 75 degrees it goes on in a straight line where
+//! f stays as it is at 75 here. Of GGX with alpha 0.1 x 0.4, 0.2 x 0.5 and 0.3, tabulated like that, it errs by 27, 9 and 5.5 % of the
+//! light, and this by 24, 8 and 4.5. Reading takes no more memory than the file.
 use std::path::Path;
 
 use glam::Vec3;
