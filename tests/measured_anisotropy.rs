@@ -190,7 +190,7 @@ fn threads_shade_measured_anisotropy_and_what_needs_the_brdf_in_a_shader_refuses
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("brushed.bsdf");
     std::fs::write(&file, rgl_file(&brushed(), false)).unwrap();
-    let prepared = ready(&scene(&file, "fitted", 4));
+    let prepared = ready(&scene(&file, "fitted", 2));
     assert!(!prepared.environment.small_sources().list.is_empty(), "the sun is one");
     let rendering = gpu.render(&prepared, EVERYTHING);
 
@@ -207,10 +207,10 @@ fn threads_shade_measured_anisotropy_and_what_needs_the_brdf_in_a_shader_refuses
     let display = Display { exposure: 1.0, gamma: 2.2 };
     let comparable = |radiance: &[[f32; 4]]| Comparable::from_radiance(40, 30, radiance, true, display);
     let rms = compare(&comparable(&rendering.radiance), &comparable(&truth.radiance), true).unwrap().rms;
-    println!("4 threads: RMS {rms:.5}");
-    assert!(rms < 0.02, "{rms}");
+    println!("2 threads: RMS {rms:.5}");
+    assert!(rms < 0.03, "{rms}");
 
-    for method in ["paper", "importance", "mis"] {
+    for method in ["importance", "mis"] {
         let prepared = ready(&scene(&file, method, 4));
         let error = DeviceScene::new(&gpu.device, &prepared, &gpu.round()).map(|_| ()).unwrap_err().to_string();
         assert!(error.contains("`rgl`: is anisotropic") && error.contains("--method fitted"), "{method}: {error}");
