@@ -59,10 +59,10 @@ impl KernelNeeds {
     /// What those of `materials` do, where the environment without its small sources is blurred as `rest`.
     pub fn of(environment: &Environment, materials: &[WithThreads], rest: &VmfPyramid) -> Self {
         let finest_level = finest_level(rest);
-        let sources = &environment.small_sources().list;
+        let sources = environment.small_sources();
         let mirrors = |brdf: &Brdf| {
             let lobe_width = (MIN_COS_THETA_D * half_vector_width(brdf)) as f32;
-            sources.iter().any(|source| clearance(0.0, source.width_rad() as f32, lobe_width) < CLEAR[1])
+            sources.parts().any(|source| clearance(0.0, source.width_rad() as f32, lobe_width) < CLEAR[1])
         };
         let is_sharp = |threads: Option<&Threads>| {
             let mut tables = threads.and_then(Threads::fitted).into_iter().flat_map(FittedTable::tables);
@@ -70,7 +70,7 @@ impl KernelNeeds {
         };
         Self {
             map: materials.iter().any(|(_, threads)| is_sharp(*threads)),
-            sources: !sources.is_empty(),
+            sources: !sources.lamps.is_empty(),
             mirrored_sources: materials.iter().any(|(brdf, _)| mirrors(brdf)),
         }
     }

@@ -39,22 +39,41 @@ float away_from(Lobe lobe, Surface surface, Material material, vec3 direction) {
 // How far a source is from where the BRDF cannot be taken at a few points of it, because it is mirrored towards the eye and wider than
 // the lobe; in half standard deviations of the source. Within a half vector of lobe_width f loses a quarter, as a Gaussian does
 // at 0.76 of its width; reflection doubles that. Twin: src/environment/sources.rs, with CLEAR for the bounds of its use below.
-float clearance(Source source, float lobe_width, float away) {
-    return (away + 4.0 * 2.6 * lobe_width) / (2.0 * source.direction.w);
+float clearance(float source_width, float lobe_width, float away) {
+    return (away + 4.0 * 2.6 * lobe_width) / (2.0 * source_width);
 }
 
-// How much of the answer to sources is the BRDF's: the rest is the kernels', which fit best where the mirrored view is. Sources count
-// as no narrower than `least_width`. There is at least one.
-float share_of_brdf(Lobe lobe, Surface surface, Material material, float least_width) {
-    float share = 1.0;
-    uint s = 0;
+// Twin: FAR in src/environment/sources.rs.
+const float FAR = 8.0;
+
+// What to go through of a lamp, from and up to which index: its parts, or all of it as one source where it is so far from the lobe that a
+// few points of it do. Sources count as no narrower than `least_width`.
+uvec2 parts_of(uint lamp, Lobe lobe, Surface surface, Material material, float least_width) {
+    Source whole = sources[lamp];
+    float away = away_from(lobe, surface, material, whole.direction.xyz);
+    bool is_far = clearance(max(whole.direction.w, least_width), lobe.width, away) > FAR;
+    return is_far ? uvec2(lamp, lamp + 1) : uint(whole.axis[0].w) + uvec2(0, whole.axis[1].w);
+}
+
+// How much of the answer to sources is the BRDF's, where the least clearance of one is this: the rest is the kernels', which fit best
+// where the mirrored view is.
+float share_of_brdf(float least_clearance) {
+    return smoothstep(1.25, 2.5, least_clearance);
+}
+
+// The least clearance of all sources, of which there is at least one.
+float least_clearance(Lobe lobe, Surface surface, Material material, float least_width) {
+    float least = FAR;
+    uint lamp = 0;
     do {
-        Source source = sources[s];
-        source.direction.w = max(source.direction.w, least_width);
-        float away = away_from(lobe, surface, material, source.direction.xyz);
-        share = min(share, smoothstep(1.25, 2.5, clearance(source, lobe.width, away)));
-    } while (++s < source_count);
-    return share;
+        uvec2 part = parts_of(lamp, lobe, surface, material, least_width);
+        do {
+            vec4 direction = sources[part.x].direction;
+            float away = away_from(lobe, surface, material, direction.xyz);
+            least = min(least, clearance(max(direction.w, least_width), lobe.width, away));
+        } while (++part.x < part.y);
+    } while (++lamp < lamp_count);
+    return least;
 }
 
 // The lobe of what is seen: across the plane of incidence it is narrower by the cosine. Twin of the bound: MIN_COS_THETA_D in
@@ -71,13 +90,14 @@ bool needs_subpixels(Surface surface, Material material) {
     // Normals mirrored turn twice as far; three standard deviations of that.
     return deviation > material.lobe_width
         || HAS_SOURCES != 0
-        && share_of_brdf(lobe_of(surface, material), surface, material, 3.0 * 2.0 * deviation) < 1.0;
+        && share_of_brdf(least_clearance(lobe_of(surface, material), surface, material, 3.0 * 2.0 * deviation)) < 1.0;
 }
 
-// Powers of all sources times what is to be integrated over them.
+// What all sources are to a surface.
 struct AtSources {
-    vec3 f_cos;
+    vec3 f_cos;  // their powers times what is to be integrated over them
     vec3 cosine;
+    float least_clearance;
 };
 
 // Of a square of light around a direction of this z, whose standard deviation along z is this: what part of it has risen above the
@@ -92,32 +112,45 @@ vec2 risen(float z, float deviation) {
     return vec2(above * above / (4.0 * half_side), 0.5 * above);
 }
 
-AtSources at_sources(Surface surface, Material material, Lobe lobe) {
-    AtSources sum = AtSources(vec3(0.0), vec3(0.0));
-    uint s = 0;
+// Adds a source of this clearance.
+void add_source(inout AtSources sum, Source source, float clear, Surface surface, Material material, vec3 w_o) {
+    vec3 n = surface.frame[2];
+    float deviation = length(vec2(dot(source.axis[0].xyz, n), dot(source.axis[1].xyz, n)));
+    // None of it has risen: the points below are at most sqrt(3.6) deviations away, and light around them reaches sqrt(3) further.
+    if (dot(source.direction.xyz, n) < -4.0 * deviation) {
+        return;
+    }
+    // Gauss and Legendre's points on a square of the source's variance: fewer from afar, where f changes less within it. Tails of
+    // Gaussian lobes go on falling steeply, so only from very far does the middle alone do.
+    int side = clear > 40.0 ? 1 : clear > FAR ? 2 : 3;
+    int i = 0;
     do {
-        Source source = sources[s];
-        // Gauss and Legendre's points on a square of the source's variance: fewer from afar, where f changes less within it. Tails of
-        // Gaussian lobes go on falling steeply, so only from very far does the middle alone do.
-        float away = away_from(lobe, surface, material, source.direction.xyz);
-        float clear = clearance(source, lobe.width, away);
-        int side = clear > 40.0 ? 1 : clear > 8.0 ? 2 : 3;
-        float deviation = length(vec2(dot(source.axis[0].xyz, surface.frame[2]), dot(source.axis[1].xyz, surface.frame[2])));
-        int i = 0;
+        vec2 place = vec2(i % side, i / side) - 0.5 * float(side - 1);
+        vec2 at = (side == 2 ? 2.0 : sqrt(3.0 * 0.6)) * place;
+        vec2 weights = side == 3 ? mix(vec2(4.0 / 9.0), vec2(2.5 / 9.0), notEqual(place, vec2(0.0))) : vec2(1.0 / float(side));
+        vec3 w_i = normalize((source.direction.xyz + at.x * source.axis[0].xyz + at.y * source.axis[1].xyz) * surface.frame);
+        vec2 above = risen(w_i.z, deviation / float(side));
+        if (above.x > 0.0) {
+            vec3 power = weights.x * weights.y * above.x * source.power.rgb;
+            w_i = normalize(vec3(w_i.xy, above.y));
+            sum.f_cos += power * brdf_at(surface, material, w_i, w_o);
+            sum.cosine += power;
+        }
+    } while (++i < side * side);
+}
+
+AtSources at_sources(Surface surface, Material material, Lobe lobe) {
+    AtSources sum = AtSources(vec3(0.0), vec3(0.0), FAR);
+    uint lamp = 0;
+    do {
+        uvec2 part = parts_of(lamp, lobe, surface, material, 0.0);
         do {
-            vec2 place = vec2(i % side, i / side) - 0.5 * float(side - 1);
-            vec2 at = (side == 2 ? 2.0 : sqrt(3.0 * 0.6)) * place;
-            vec2 weights = side == 3 ? mix(vec2(4.0 / 9.0), vec2(2.5 / 9.0), notEqual(place, vec2(0.0))) : vec2(1.0 / float(side));
-            vec3 w_i = normalize((source.direction.xyz + at.x * source.axis[0].xyz + at.y * source.axis[1].xyz) * surface.frame);
-            vec2 above = risen(w_i.z, deviation / float(side));
-            if (above.x > 0.0) {
-                vec3 power = weights.x * weights.y * above.x * source.power.rgb;
-                w_i = normalize(vec3(w_i.xy, above.y));
-                sum.f_cos += power * brdf_at(surface, material, w_i, lobe.w_o);
-                sum.cosine += power;
-            }
-        } while (++i < side * side);
-    } while (++s < source_count);
+            Source source = sources[part.x];
+            float clear = clearance(source.direction.w, lobe.width, away_from(lobe, surface, material, source.direction.xyz));
+            sum.least_clearance = min(sum.least_clearance, clear);
+            add_source(sum, source, clear, surface, material, lobe.w_o);
+        } while (++part.x < part.y);
+    } while (++lamp < lamp_count);
     return sum;
 }
 
@@ -198,13 +231,12 @@ vec3 estimate(Surface surface, Material material, uint first, uint stride) {
             sum += kernel.weight * blurred_radiance(looks_towards(kernel, surface), kernel.level);
         } while ((k += stride) < table.count);
     }
-    AtSources at = AtSources(vec3(0.0), vec3(0.0));
+    AtSources at = AtSources(vec3(0.0), vec3(0.0), FAR);
     float of_kernels = 0.0;
     if (HAS_SOURCES != 0) {
-        Lobe lobe = lobe_of(surface, material);
-        at = at_sources(surface, material, lobe);
+        at = at_sources(surface, material, lobe_of(surface, material));
         if (HAS_MIRRORED_SOURCES != 0) {
-            of_kernels = 1.0 - share_of_brdf(lobe, surface, material, 0.0);
+            of_kernels = 1.0 - share_of_brdf(at.least_clearance);
         }
     }
     k = first;

@@ -176,7 +176,8 @@ mod tests {
             [1.0 + ((x * 7 + y * 3) % 13) as f32, spot, (y / 20) as f32]
         });
         let sources = map.small_sources();
-        assert_eq!(sources.list.len(), 1);
+        let sources: Vec<_> = sources.parts().collect();
+        assert_eq!(sources.len(), 1);
         let irradiance = irradiance_map(&map.part(false), &()).unwrap();
         for i in 0..200 {
             let z: f64 = 1.0 - (f64::from(i) + 0.5) / 100.0;
@@ -190,7 +191,7 @@ mod tests {
                     truth += cos * solid_angle * to_dvec3(&map.texels[row * map.width + column]);
                 }
             }
-            let of_source = sources.list[0].power * n.dot(sources.list[0].direction).max(0.0);
+            let of_source = sources[0].power * n.dot(sources[0].direction).max(0.0);
             let found = irradiance.lookup(n.as_vec3(), 0.0).as_dvec3() * std::f64::consts::PI + of_source;
             // A texel at the edge of the hemisphere is half in it.
             let error = ((found - truth) / truth.max(DVec3::splat(1.0))).abs().max_element();

@@ -22,7 +22,7 @@ pub use irradiance::irradiance_map;
 pub use light_map::{Alias, LightMap};
 pub use procedural::builtin_names;
 pub use pyramid::{FractionBits, Pyramid};
-pub use sources::{LightSource, MAX_SOURCES, SmallSources, SourceRecord};
+pub use sources::{LightSource, MAX_SOURCES, SmallSources, SourceRecord, SourceRecords};
 pub use vmf_pyramid::{BlurKernel, BlurStep, VmfPyramid};
 
 file_formats!(Environment: hdr_file, exr_file);

@@ -94,7 +94,7 @@ impl DeviceLight {
         self.source_pyramid = upload("source pyramid", source_pyramid)?;
         self.irradiance = upload("irradiance map", &blurred.irradiance)?;
         let (sources, storage) = (environment.small_sources(), vk::BufferUsageFlags::STORAGE_BUFFER);
-        let words = sources.device_words(scale);
+        let words = sources.records(scale).device_words();
         self.sources = Some(Buffer::with_contents(device, "light sources", storage, bytemuck::cast_slice(&words))?);
         Ok(())
     }

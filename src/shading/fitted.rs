@@ -5,8 +5,8 @@ use glam::{IVec2, Vec2, Vec3, Vec4};
 
 use super::{CpuShader, Point, Surface, turned};
 use crate::brdf::MIN_COS_THETA_D;
-use crate::environment::sources::{CLEAR, clearance};
-use crate::environment::{LightMap, SourceRecord};
+use crate::environment::sources::{CLEAR, FAR, clearance};
+use crate::environment::{LightMap, SourceRecord, SourceRecords};
 use crate::light::{BlurredLight, finest_level};
 use crate::packing::stereographic_decode;
 use crate::threads::azimuths::Azimuths;
@@ -90,14 +90,31 @@ impl<'a> Lobe<'a> {
         2.0 * (h.dot(axis) * record.narrowness).hypot(h.dot(axis.perp()))
     }
 
-    /// Twin of `share_of_brdf`.
-    fn share_of_brdf(&self, sources: &[SourceRecord], least_width: f32) -> f32 {
-        let share = |source: &SourceRecord| {
-            let away = self.away(source.direction.truncate());
-            smoothstep(CLEAR, clearance(away, source.direction.w.max(least_width), self.width))
-        };
-        sources.iter().map(share).fold(1.0, f32::min)
+    fn clearance(&self, source: &SourceRecord, least_width: f32) -> f32 {
+        let away = self.away(source.direction.truncate());
+        clearance(away, source.direction.w.max(least_width), self.width)
     }
+
+    /// What to go through of each lamp. Twin of `parts_of`.
+    fn sources<'s>(&self, sources: &'s SourceRecords, least_width: f32) -> impl Iterator<Item = &'s SourceRecord> {
+        (0..sources.lamp_count).flat_map(move |lamp| {
+            let whole = &sources.list[lamp];
+            let [first, count] = whole.axes.map(|axis| axis.w as usize);
+            let is_far = self.clearance(whole, least_width) > FAR;
+            &sources.list[if is_far { lamp..lamp + 1 } else { first..first + count }]
+        })
+    }
+
+    /// Twin of `least_clearance`.
+    fn least_clearance(&self, sources: &SourceRecords, least_width: f32) -> f32 {
+        let sources = self.sources(sources, least_width);
+        sources.map(|source| self.clearance(source, least_width)).fold(FAR, f32::min)
+    }
+}
+
+/// Twin of `share_of_brdf`.
+fn share_of_brdf(least_clearance: f32) -> f32 {
+    smoothstep(CLEAR, least_clearance)
 }
 
 /// Twin of `needs_subpixels`.
@@ -107,7 +124,7 @@ pub(super) fn needs_subpixels(point: &Point) -> bool {
     }
     let sources = &point.twin.sources;
     let deviation = point.surface.normal_variance.sqrt();
-    deviation > point.record().lobe_width || Lobe::of(point).share_of_brdf(sources, 3.0 * 2.0 * deviation) < 1.0
+    deviation > point.record().lobe_width || share_of_brdf(Lobe::of(point).least_clearance(sources, 3.0 * 2.0 * deviation)) < 1.0
 }
 
 /// Twin of `risen`.
@@ -120,21 +137,30 @@ fn risen(z: f32, deviation: f32) -> [f32; 2] {
     [above * above / (4.0 * half_side), 0.5 * above]
 }
 
-/// Twin of `at_sources`: powers of all sources times f cos, and times cos.
-fn at_sources(lobe: &Lobe, sources: &[SourceRecord]) -> (Vec3, Vec3) {
-    let point = lobe.point;
-    let (mut f_cos, mut cosine) = (Vec3::ZERO, Vec3::ZERO);
-    for source in sources {
-        let clear = clearance(lobe.away(source.direction.truncate()), source.direction.w, lobe.width);
+/// What all sources are to a surface. Twin of `AtSources`.
+struct AtSources {
+    f_cos: Vec3,
+    cosine: Vec3,
+    least_clearance: f32,
+}
+
+impl AtSources {
+    /// Twin of `add_source`.
+    fn add(&mut self, source: &SourceRecord, clear: f32, lobe: &Lobe) {
+        let point = lobe.point;
+        let n = point.surface.frame.z_axis;
+        let [x, y] = source.axes.map(Vec4::truncate);
+        let deviation = x.dot(n).hypot(y.dot(n));
+        if source.direction.truncate().dot(n) < -4.0 * deviation {
+            return;
+        }
         let side = if clear > 40.0 {
             1
-        } else if clear > 8.0 {
+        } else if clear > FAR {
             2
         } else {
             3
         };
-        let deviation = source.axes.map(|axis| axis.truncate().dot(point.surface.frame.z_axis));
-        let deviation = deviation[0].hypot(deviation[1]);
         for i in 0..side * side {
             let place = IVec2::new(i % side, i / side).as_vec2() - 0.5 * (side - 1) as f32;
             let at = if side == 2 { 2.0 } else { (3.0 * 0.6_f32).sqrt() } * place;
@@ -143,19 +169,28 @@ fn at_sources(lobe: &Lobe, sources: &[SourceRecord]) -> (Vec3, Vec3) {
                 3 => 2.5 / 9.0,
                 _ => 1.0 / side as f32,
             };
-            let [x, y] = source.axes.map(Vec4::truncate);
             let towards = source.direction.truncate() + at.x * x + at.y * y;
             let w_i = (point.surface.frame.transpose() * towards).normalize();
             let [cos, middle] = risen(w_i.z, deviation / side as f32);
             if cos > 0.0 {
                 let power = weight(place.x) * weight(place.y) * cos * source.power.truncate();
                 let w_i = w_i.with_z(middle).normalize();
-                f_cos += power * point.brdf(w_i, lobe.w_o);
-                cosine += power;
+                self.f_cos += power * point.brdf(w_i, lobe.w_o);
+                self.cosine += power;
             }
         }
     }
-    (f_cos, cosine)
+}
+
+/// Twin of `at_sources`.
+fn at_sources(lobe: &Lobe, sources: &SourceRecords) -> AtSources {
+    let mut sum = AtSources { f_cos: Vec3::ZERO, cosine: Vec3::ZERO, least_clearance: FAR };
+    for source in lobe.sources(sources, 0.0) {
+        let clear = lobe.clearance(source, 0.0);
+        sum.least_clearance = sum.least_clearance.min(clear);
+        sum.add(source, clear, lobe);
+    }
+    sum
 }
 
 /// Between which rows a view is. Twin of `Rows`.
@@ -224,12 +259,8 @@ pub(super) fn estimate(point: &Point) -> Vec3 {
     let light = blurred_light(point.twin);
     let sources = &point.twin.sources;
     let rows = Rows::at(surface, threads);
-    let (mut f_cos, mut cosine, mut of_kernels) = (Vec3::ZERO, Vec3::ZERO, 0.0);
-    if !sources.is_empty() {
-        let lobe = Lobe::of(point);
-        of_kernels = 1.0 - lobe.share_of_brdf(sources, 0.0);
-        (f_cos, cosine) = at_sources(&lobe, sources);
-    }
+    let at = at_sources(&Lobe::of(point), sources);
+    let of_kernels = 1.0 - share_of_brdf(at.least_clearance);
     let (mut weights, mut sum) = (Vec3::ZERO, Vec3::ZERO);
     for k in (point.first as usize..threads.count).step_by(point.stride) {
         let kernel = rows.kernel(threads, k);
@@ -241,7 +272,7 @@ pub(super) fn estimate(point: &Point) -> Vec3 {
     let share = point.stride as f32;
     let cosine_part = rows.albedo(threads) - share * weights;
     sum = share * sum + cosine_part * light.irradiance.lookup_by(surface.frame.z_axis, 0.0, point.twin.fractions);
-    sum += f_cos.lerp(cosine * cosine_part / PI, of_kernels);
+    sum += at.f_cos.lerp(at.cosine * cosine_part / PI, of_kernels);
     sum.max(Vec3::ZERO)
 }
 
