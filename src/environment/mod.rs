@@ -92,7 +92,7 @@ impl Environment {
 
     /// The same, but its small sources count as all other light.
     pub fn with_sources_left_in(&self) -> Self {
-        let none = SmallSources { list: Vec::new(), pixels: vec![false; self.texels.len()] };
+        let none = SmallSources { lamps: Vec::new(), pixels: vec![false; self.texels.len()] };
         Self { small_sources: none.into(), ..self.clone() }
     }
 
