@@ -74,7 +74,9 @@ fn parts_of_a_turn(phi_i: &Tensor<1>) -> Result<u32, String> {
     let is_known = [1.0, 2.0, 4.0].contains(&parts);
     if !is_known || first < -PI - SAME_AZIMUTH || last > TAU / parts - PI + SAME_AZIMUTH {
         let [first, last] = [first, last].map(f32::to_degrees);
-        return Err(format!("has azimuths phi_i from {first:.1} to {last:.1} degrees, not -180 to -90, to 0 or to 180"));
+        return Err(format!(
+            "has azimuths phi_i from {first:.1} to {last:.1} degrees, not -180 to -90, to 0 or to 180"
+        ));
     }
     Ok(parts as u32)
 }
