@@ -1,4 +1,4 @@
-//! Reads measured materials from `.dat` files of MIT CSAIL, as far as they are isotropic.
+//! Reads measured materials from `.dat` files of MIT CSAIL.
 //!
 //! Ngan, Durand and Matusik, "Experimental Analysis of BRDF Models" (2005). The file is a header of 16 little-endian i32, then planes of f32
 //! for red, green and blue. Of the header count: 0 to 3, the number of bins over theta_in, theta_out, phi_diff and phi_in, of which the last varies
@@ -6,15 +6,17 @@
 //! number of channels, 3. Angles theta go to 90 degrees, phi_in to 360. Negative bins were not measured. (The description that comes with the data, as
 //! wdas/brdf restates it.)
 //!
-//! The materials are anisotropic. What is read is the mean over phi_in, the azimuth of the material. Numbers are taken for f in 1/sr as they are; their scale
-//! is not described (BRDF Explorer multiplies them by 10). Reading takes at most three times the memory of the file.
+//! What the description leaves open: phi_in is taken as the azimuth of the light from the tangent, and phi_diff as that of the view less
+//! that of the light, as in BRDF Explorer (but for half a turn of both). Where phi_diff ends at 180 degrees, light and view change places
+//! beyond, as reciprocity has it. Numbers are taken for f in 1/sr as they are; their scale is not described (BRDF Explorer multiplies
+//! them by 10). Reading takes at most twice the memory of the file.
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::path::Path;
 
 use glam::Vec3;
 
 use super::Brdf;
-use super::goniometric::{Goniometric, Means, Nodes};
+use super::goniometric::{Axes, Goniometric, Nodes};
 use crate::error::{Error, Result};
 use crate::file_format::FileFormat;
 
@@ -46,7 +48,7 @@ fn table(bytes: &[u8]) -> Result<Goniometric, String> {
     let [thetas, views, azimuths, turns] = [dimensions[0], dimensions[1], dimensions[2], dimensions[3]];
     let cells = dimensions.iter().try_fold(1, |product: usize, &size| product.checked_mul(size));
     let expected = cells.filter(|&cells| cells > 0).and_then(|cells| cells.checked_mul(12));
-    if expected != Some(values.len()) || thetas != views || (is_half == 0 && azimuths % 2 == 1) {
+    if expected != Some(values.len()) || thetas != views {
         return Err(format!(
             "has {} bytes behind its header of {thetas} x {views} x {azimuths} x {turns} bins",
             values.len()
@@ -63,24 +65,17 @@ fn table(bytes: &[u8]) -> Result<Goniometric, String> {
         ));
     }
 
-    // Nodes are the middles of bins; of the whole circle, bins after 180 degrees are those before it in a mirror.
-    let half = if is_half == 1 { azimuths } else { azimuths / 2 };
-    let nodes = |count: usize, range: f64| {
-        let step = range / count as f64;
-        Nodes { count, first: 0.5 * step, step }
+    // Nodes are the middles of bins.
+    let axes = Axes {
+        thetas: Nodes::of_bins(thetas, FRAC_PI_2),
+        azimuths: if is_half == 1 { Nodes::of_bins(azimuths, PI) } else { Nodes::of_bins_around(azimuths) },
+        turns: Nodes::of_bins_around(turns),
     };
-    let mut means = Means::new(nodes(thetas, FRAC_PI_2), nodes(half, PI));
-    for cell in 0..cells {
+    Goniometric::of(axes, |[theta_in, theta_out, azimuth, turn]| {
+        let cell = turn + turns * (azimuth + azimuths * (theta_out + views * theta_in));
         let rgb = Vec3::from([0, 1, 2].map(|plane| f32::from_le_bytes(numbers[cell + cells * plane])));
-        if rgb.min_element() >= 0.0 {
-            let azimuth = cell / turns % azimuths;
-            let node =
-                [cell / turns / azimuths / views, cell / turns / azimuths % views, azimuth.min(2 * half - 1 - azimuth)];
-            // Parts of a mean are small, so that the sum of the greatest is a number.
-            means.add(node, rgb.min(Vec3::splat(1e30)));
-        }
-    }
-    means.finish()
+        (rgb.min_element() >= 0.0).then_some(rgb)
+    })
 }
 
 #[cfg(test)]
@@ -108,28 +103,33 @@ mod tests {
     }
 
     #[test]
-    fn bins_are_where_the_description_has_them_and_the_material_turns() {
+    fn bins_are_where_the_description_has_them() {
         for is_half in [true, false] {
             // What was not measured, one of the two turns in some bins, has no weight.
             let bytes = made(is_half, |plane, [theta_i, theta_o, azimuth, turn]| match plane {
                 0 => theta_i as f32 + if turn == 1 && theta_o == 2 { -100.0 } else { 1.0 },
-                1 => theta_o as f32,
-                _ => {
-                    if is_half {
-                        azimuth as f32
-                    } else {
-                        azimuth.min(7 - azimuth) as f32
-                    }
-                }
+                1 => (theta_o + 10 * turn) as f32,
+                _ => azimuth as f32,
             });
             let brdf = parse(Path::new("x.dat"), &bytes).unwrap();
-            // Bins of 30 and of 45 degrees.
-            for (theta_i, theta_o, azimuth) in [(15.0, 75.0, 22.5), (30.0, 45.0, 90.0), (80.0, 1.0, 170.0)] {
-                let found = brdf.evaluate(direction(theta_i, 200.0), direction(theta_o, 200.0 - azimuth));
-                let bin = |angle: f64, size: f64, last: f64| (angle / size - 0.5).clamp(0.0, last);
-                let expected = dvec3(1.0 + bin(theta_i, 30.0, 2.0), bin(theta_o, 30.0, 2.0), bin(azimuth, 45.0, 3.0));
+            let bin = |angle: f64, size: f64, last: f64| (angle / size - 0.5).clamp(0.0, last);
+            // Bins of 30, of 45 and of 180 degrees.
+            for (theta_i, theta_o, azimuth, phi_i, turn) in [
+                (15.0, 75.0, 22.5, 200.0, 0.0),
+                (30.0, 45.0, 90.0, 90.0, 0.0),
+                (80.0, 1.0, 150.0, 270.0, 1.0),
+                (30.0, 30.0, 100.0, 0.0, 0.5),
+                (45.0, 15.0, 100.0, 225.0, 0.75),
+            ] {
+                let found = brdf.evaluate(direction(theta_i, phi_i), direction(theta_o, phi_i + azimuth));
+                let green = bin(theta_o, 30.0, 2.0) + 10.0 * turn;
+                let expected = dvec3(1.0 + bin(theta_i, 30.0, 2.0), green, bin(azimuth, 45.0, 7.0));
                 assert!((found - expected).abs().max_element() < 1e-4, "{theta_i} {theta_o} {azimuth}: {found}");
             }
+            // Beyond 180 degrees bins go on, or light and view change places.
+            let found = brdf.evaluate(direction(75.0, 270.0), direction(15.0, 270.0 - 112.5));
+            let expected = if is_half { dvec3(1.0, 2.0, 2.0) } else { dvec3(3.0, 10.0, 5.0) };
+            assert!((found - expected).abs().max_element() < 1e-4, "{found}");
         }
     }
 

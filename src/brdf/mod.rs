@@ -247,6 +247,11 @@ impl Brdf {
         TWINS.contains(&self.model()) && !dispatch!(self, model => model.needs_table())
     }
 
+    /// Whether shaders can evaluate it at all, given its lobe: tables that are made hold isotropic BRDFs.
+    pub fn has_shader_form(&self, lobe: &LobeShape) -> bool {
+        self.has_twin() || lobe.is_isotropic
+    }
+
     /// The model's parameters for its GLSL twin, `BrdfParameters { vec4 a, b, c }` in memory order. Shaders have no rotation: see
     /// [`Self::without_rotation`].
     pub fn gpu_parameters(&self) -> [f32; 12] {

@@ -1,13 +1,17 @@
-//! RGL: a measured isotropic BRDF of EPFL's material database, in the parameterisation that follows the material.
+//! RGL: a measured BRDF of EPFL's material database, in the parameterisation that follows the material.
 //!
 //! Dupuy and Jakob, "An Adaptive Parameterization for Efficient Material Acquisition and Rendering" (2018). A direction is a point of the
-//! unit square, u = (sqrt(2 theta / pi), (phi + pi) / (2 pi)), phi relative to the plane of the measured direction `a`. The half vector's
-//! point u_h is warped by the distribution of the normals that are visible from `a`, which spreads the lobe over the whole square; there
-//! the measured values M are looked up. With the distribution of normals D and the projected area sigma of the database's fit,
+//! unit square, u = (sqrt(2 theta / pi), (phi + pi) / (2 pi)), phi of isotropic materials relative to the plane of the measured direction
+//! `a`, of others from the tangent. The half vector's point u_h is warped by the distribution of the normals that are visible from `a`,
+//! which spreads the lobe over the whole square; there the measured values M are looked up. With the distribution of normals D and the
+//! projected area sigma of the database's fit,
 //!
 //! ```text
-//! f cos theta_b = M(warp_a(u_h), theta_a) D(u_h) / (4 sigma(u_a))
+//! f cos theta_b = M(warp_a(u_h), phi_a, theta_a) D(u_h) / (4 sigma(u_a))
 //! ```
+//!
+//! Of anisotropic materials with symmetries only a part of the azimuths phi_a was measured: those from -180 to 0 degrees if half a turn leaves f
+//! as it is, those to -90 if the mirrors x to -x and y to -y do. Both directions are taken there first.
 //!
 //! **Which direction is the light.** Files call `a` omega_i and `b` omega_o, and the lamp was at `a`. But what they hold, and what renderers
 //! evaluate, is f times the cosine of `b`: so `b` is the light in the rendering equation, and `a` the view, the direction that is known when
@@ -18,6 +22,8 @@
 //!
 //! Channels of saturated colours are negative in places, since they are out of Rec. 709's gamut; these count as 0.
 use std::f64::consts::{FRAC_1_PI, FRAC_2_PI};
+use std::iter::Sum;
+use std::ops::Mul;
 use std::sync::Arc;
 
 use glam::{DVec2, DVec3, Vec3, dvec2};
@@ -37,11 +43,15 @@ pub struct Rgl {
 
 /// What a file holds.
 pub(super) struct RglTables {
+    /// The azimuths phi_a that were measured, ascending, in radians; at least one. Of at most two the material is isotropic.
+    pub phi_a: Vec<f64>,
+    /// Whether they are all of them, or those of a half or of a quarter of a turn: 1, 2 or 4.
+    pub parts: u32,
     /// The angles theta_a that were measured, ascending, in radians; at least one.
     pub theta_a: Vec<f64>,
-    /// The distribution of normals that are visible from each theta_a.
+    /// The distribution of normals that are visible from each theta_a of each phi_a.
     pub visible_normals: Warp,
-    /// M for each theta_a, linear Rec. 709.
+    /// M for each theta_a of each phi_a, linear Rec. 709.
     pub values: Grid<Vec3>,
     /// D over u_h.
     pub normals: Grid<f32>,
@@ -66,11 +76,10 @@ struct Cell {
     inside: DVec2,
 }
 
-/// Two neighbours among squares, and the weight of the second.
-#[derive(Clone, Copy)]
-struct Between {
-    squares: [usize; 2],
-    weight: f64,
+/// Neighbours among squares, and the weight of each.
+struct Blend {
+    squares: [(usize, f64); 4],
+    count: usize,
 }
 
 /// Densities over the unit square, bilinear between nodes, with their integrals.
@@ -81,6 +90,13 @@ pub(super) struct Warp {
     along_rows: Vec<f64>,
     /// The integral over the square from its first row to each.
     across_rows: Vec<f64>,
+}
+
+impl Blend {
+    /// The mean of what is `at` each square.
+    fn mean<T: Mul<f64, Output = T> + Sum>(&self, at: impl Fn(usize) -> T) -> T {
+        self.squares[..self.count].iter().map(|&(square, weight)| at(square) * weight).sum()
+    }
 }
 
 impl<T> Grid<T> {
@@ -116,13 +132,12 @@ impl Grid<f32> {
 
 impl Grid<Vec3> {
     /// Bilinear between nodes, linear between squares.
-    fn at(&self, between: Between, u: DVec2) -> DVec3 {
+    fn at(&self, blend: &Blend, u: DVec2) -> DVec3 {
         let cell = self.cell(u);
-        let [first, second] = between.squares.map(|square| {
+        blend.mean(|square| {
             let [a, b, c, d] = self.corners(square, &cell).map(Vec3::as_dvec3);
             a.lerp(b, cell.inside.x).lerp(c.lerp(d, cell.inside.x), cell.inside.y)
-        });
-        first.lerp(second, between.weight)
+        })
     }
 }
 
@@ -151,21 +166,20 @@ impl Warp {
     }
 
     /// The point with as much of the density before it, along rows and across, as there is area of the square before the result.
-    fn invert(&self, between: Between, u: DVec2) -> DVec2 {
+    fn invert(&self, blend: &Blend, u: DVec2) -> DVec2 {
         let [columns, rows] = self.density.size;
         let cell = self.density.cell(u);
-        let blend = |at: &dyn Fn(usize) -> f64| lerp(at(between.squares[0]), at(between.squares[1]), between.weight);
-        let corner = |corner: usize| blend(&|square| f64::from(self.density.corners(square, &cell)[corner]));
+        let corner = |corner: usize| blend.mean(|square| f64::from(self.density.corners(square, &cell)[corner]));
         let [low, high] = along_cell([corner(0), corner(1), corner(2), corner(3)], cell.inside.y);
 
-        let in_row = |node: usize| blend(&|square| self.along_rows[square * columns * rows + node]);
+        let in_row = |node: usize| blend.mean(|square| self.along_rows[square * columns * rows + node]);
         let before = lerp(in_row(cell.first), in_row(cell.first + columns), cell.inside.y);
         let last = columns * (cell.row + 1) - 1;
         let totals = [in_row(last), in_row(last + columns)];
         let total = lerp(totals[0], totals[1], cell.inside.y);
         // No normal is visible in a row without density, so any place in it is as good.
         let x = if total > 0.0 { (before + integral_in_cell(low, high, cell.inside.x)) / total } else { u.x };
-        let y = blend(&|square| self.across_rows[square * rows + cell.row])
+        let y = blend.mean(|square| self.across_rows[square * rows + cell.row])
             + integral_in_cell(totals[0], totals[1], cell.inside.y);
         dvec2(x, y)
     }
@@ -197,7 +211,10 @@ fn lerp(a: f64, b: f64, t: f64) -> f64 {
 impl Rgl {
     pub(super) fn of(tables: RglTables) -> Self {
         let mut hasher = blake3::Hasher::new();
-        super::hash_numbers(&mut hasher, tables.theta_a.iter().copied());
+        for angles in [&tables.phi_a, &tables.theta_a] {
+            super::hash_numbers(&mut hasher, [angles.len() as f64]);
+            super::hash_numbers(&mut hasher, angles.iter().copied());
+        }
         super::hash_numbers(&mut hasher, [f64::from(u8::from(tables.has_jacobian))]);
         hasher.update(bytemuck::cast_slice(&tables.values.values));
         for grid in [&tables.visible_normals.density, &tables.normals, &tables.projected_area] {
@@ -209,16 +226,45 @@ impl Rgl {
 }
 
 impl RglTables {
-    /// The angles that were measured next to `theta_a`; beyond the first and the last it is as there.
-    fn between(&self, theta_a: f64) -> Between {
-        let last = self.theta_a.len() - 1;
-        let after = self.theta_a.partition_point(|&known| known <= theta_a);
-        if after == 0 || after > last {
-            return Between { squares: [after.min(last); 2], weight: 0.0 };
-        }
-        let (low, high) = (self.theta_a[after - 1], self.theta_a[after]);
-        Between { squares: [after - 1, after], weight: (theta_a - low) / (high - low) }
+    fn is_isotropic(&self) -> bool {
+        self.phi_a.len() <= 2
     }
+
+    /// What takes both directions to where `w_a` was measured: factors of their coordinates. Of an azimuth at the
+    /// ends of that part, both ends are as good; signs of zeros say which, as in Mitsuba 3.
+    fn to_measured_part(&self, w_a: DVec3) -> DVec3 {
+        let [x, y] = [w_a.x, w_a.y].map(|coordinate| -1f64.copysign(coordinate));
+        match self.parts {
+            1 => DVec3::ONE,
+            2 => DVec3::new(y, y, 1.0),
+            _ => DVec3::new(x, y, 1.0),
+        }
+    }
+
+    /// The squares that were measured around an azimuth and an angle.
+    fn around(&self, phi_a: f64, theta_a: f64) -> Blend {
+        let mut blend = Blend { squares: [(0, 0.0); 4], count: 0 };
+        for (phi, weight_phi) in neighbours(&self.phi_a, phi_a) {
+            for (theta, weight_theta) in neighbours(&self.theta_a, theta_a) {
+                if weight_phi * weight_theta > 0.0 {
+                    blend.squares[blend.count] = (theta + self.theta_a.len() * phi, weight_phi * weight_theta);
+                    blend.count += 1;
+                }
+            }
+        }
+        blend
+    }
+}
+
+/// Those of `known` numbers, which ascend, that are next to `at`, and the weight of each; beyond the first and the last it is as there.
+fn neighbours(known: &[f64], at: f64) -> [(usize, f64); 2] {
+    let last = known.len() - 1;
+    let after = known.partition_point(|&known| known <= at);
+    if after == 0 || after > last {
+        return [(after.min(last), 1.0), (last, 0.0)];
+    }
+    let weight = (at - known[after - 1]) / (known[after] - known[after - 1]);
+    [(after - 1, 1.0 - weight), (after, weight)]
 }
 
 /// The angle between `w` and the normal, in radians, to the last digits near the normal too.
@@ -238,19 +284,26 @@ impl Model for Rgl {
 
     fn evaluate(&self, w_i: DVec3, w_o: DVec3) -> DVec3 {
         let tables = &*self.tables;
+        let part = tables.to_measured_part(w_o);
+        let (w_i, w_o) = (w_i * part, w_o * part);
         let h = (w_i + w_o).normalize();
-        // Seen along the normal there is no plane of view, but values depend on its azimuth all the same, by what the measurement erred.
-        // It is the plane of x, where views have theirs that tables and threads are made for: so these go on evenly to the normal.
-        let plane = if w_o.truncate() == DVec2::ZERO { DVec2::X } else { w_o.truncate() };
-        let phi_h = plane.perp_dot(h.truncate()).atan2(plane.dot(h.truncate()));
+        let (theta_o, phi_o) = (theta(w_o), w_o.y.atan2(w_o.x));
+        let (phi_a, phi_h) = match tables.is_isotropic() {
+            true => {
+                // Seen along the normal there is no plane of view, but values depend on its azimuth all the same, by what the measurement erred.
+                // It is the plane of x, where views have theirs that tables and threads are made for: so these go on evenly to the normal.
+                let plane = if w_o.truncate() == DVec2::ZERO { DVec2::X } else { w_o.truncate() };
+                (0.0, plane.perp_dot(h.truncate()).atan2(plane.dot(h.truncate())))
+            }
+            false => (phi_o, h.y.atan2(h.x)),
+        };
         let u = |theta: f64, phi: f64| dvec2((theta * FRAC_2_PI).sqrt(), 0.5 + 0.5 * FRAC_1_PI * phi);
-        let theta_o = theta(w_o);
         let u_h = u(theta(h), phi_h);
 
-        let between = tables.between(theta_o);
-        let mut value = tables.values.at(between, tables.visible_normals.invert(between, u_h)).max(DVec3::ZERO);
+        let blend = tables.around(phi_o, theta_o);
+        let mut value = tables.values.at(&blend, tables.visible_normals.invert(&blend, u_h)).max(DVec3::ZERO);
         if tables.has_jacobian {
-            value *= tables.normals.at(u_h) / (4.0 * tables.projected_area.at(u(theta_o, 0.0)));
+            value *= tables.normals.at(u_h) / (4.0 * tables.projected_area.at(u(theta_o, phi_a)));
         }
         value / w_i.z.max(MIN_COS_THETA_I)
     }

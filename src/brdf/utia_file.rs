@@ -1,17 +1,19 @@
-//! Reads measured materials from `.bin` files of the UTIA BRDF database, as far as they are isotropic.
+//! Reads measured materials from `.bin` files of the UTIA BRDF database.
 //!
 //! Filip and Vávra, "Template-Based Sampling of Anisotropic BRDFs" (2014). The file is 3 planes of 288 x 288 f64, little-endian, for red, green
 //! and blue: rows over light, columns over view, each of index phi + 48 theta with phi in steps of 7.5 degrees and theta in steps of 15
 //! degrees, from 0 to 75. (The database's own reader, as jdupuy/dj_brdf and asztr/UTIA-brdf restate it.)
 //!
-//! The materials are anisotropic. What is read is the mean over the material's azimuth: light and view turn together. Values below 0 count as 0.
-//! What is read takes no more memory than the file.
+//! At nodes f is what the database's reader finds; values below 0 count as 0. Between them that reader is linear in the azimuth of the
+//! view where `goniometric.rs` is linear in the azimuth between light and view, and beyond 75 degrees it goes on in a straight line where
+//! f stays as it is at 75 here. Of GGX with alpha 0.1 x 0.4, 0.2 x 0.5 and 0.3, tabulated like that, it errs by 27, 9 and 5.5 % of the
+//! light, and this by 24, 8 and 4.5. Reading takes no more memory than the file.
 use std::path::Path;
 
 use glam::Vec3;
 
 use super::Brdf;
-use super::goniometric::{Goniometric, Means, Nodes};
+use super::goniometric::{Axes, Goniometric, Nodes};
 use crate::error::{Error, Result};
 use crate::file_format::FileFormat;
 
@@ -41,19 +43,13 @@ fn table(bytes: &[u8]) -> Result<Goniometric, String> {
         let value = f64::from_le_bytes(values[place]);
         return Err(format!("holds {value:e} in plane {plane}, row {row}, column {column}"));
     }
-    let thetas = Nodes { count: THETAS, first: 0.0, step: 15f64.to_radians() };
-    let azimuths = Nodes { count: PHIS / 2 + 1, first: 0.0, step: 7.5f64.to_radians() };
-    let mut means = Means::new(thetas, azimuths);
-    for row in 0..SIDE {
-        for column in 0..SIDE {
-            let value = |plane: usize| f64::from_le_bytes(values[column + SIDE * (row + SIDE * plane)]).max(0.0) as f32;
-            let turned = (column % PHIS + PHIS - row % PHIS) % PHIS;
-            let node = [row / PHIS, column / PHIS, turned.min(PHIS - turned)];
-            // Parts of a mean are small, so that the sum of the greatest is a number.
-            means.add(node, Vec3::new(value(0), value(1), value(2)).min(Vec3::splat(1e30)));
-        }
-    }
-    means.finish()
+    let phis = Nodes { count: PHIS, first: 0.0, step: 7.5f64.to_radians(), is_circle: true };
+    let thetas = Nodes { count: THETAS, first: 0.0, step: 15f64.to_radians(), is_circle: false };
+    Goniometric::of(Axes { thetas, azimuths: phis, turns: phis }, |[theta_i, theta_o, azimuth, phi_i]| {
+        let (row, column) = (phi_i + PHIS * theta_i, (phi_i + azimuth) % PHIS + PHIS * theta_o);
+        let value = |plane: usize| f64::from_le_bytes(values[column + SIDE * (row + SIDE * plane)]) as f32;
+        Some(Vec3::new(value(0), value(1), value(2)))
+    })
 }
 
 #[cfg(test)]
@@ -77,24 +73,24 @@ mod tests {
     }
 
     #[test]
-    fn nodes_are_where_the_database_has_them_and_the_material_turns() {
-        // Of light, of view, of the azimuth between them, and of the material: the last is averaged away.
+    fn nodes_are_where_the_database_has_them() {
         let bytes = made(|plane, theta_i, phi_i, theta_v, phi_v| match plane {
-            0 => (1 + theta_i) as f64,
-            1 => theta_v as f64 + (phi_i % 2) as f64,
-            _ => (phi_v + PHIS - phi_i) as f64 % PHIS as f64,
+            0 => (10 * theta_i + theta_v) as f64,
+            1 => phi_i as f64,
+            _ => phi_v as f64,
         });
         let brdf = parse(Path::new("x.bin"), &bytes).unwrap();
-        for (theta_i, theta_o, azimuth) in
-            [(0.0, 0.0, 0.0), (15.0, 60.0, 90.0), (22.5, 75.0, 180.0), (80.0, 7.5, 33.75)]
+        for (theta_i, phi_i, theta_o, phi_o) in
+            [(0.0, 0.0, 0.0, 0.0), (15.0, 7.5, 60.0, 352.5), (22.5, 180.0, 75.0, 90.0), (80.0, 240.0, 7.5, 150.0)]
         {
-            let found = brdf.evaluate(direction(theta_i, 20.0), direction(theta_o, 20.0 + azimuth));
+            let found = brdf.evaluate(direction(theta_i, phi_i), direction(theta_o, phi_o));
             let steps = |theta: f64| theta.min(75.0) / 15.0;
-            // Blue is the mean of an azimuth and the one in a mirror, but at 0, where both are the same.
-            let blue = if azimuth == 0.0 { 0.0 } else { 24.0 };
-            let expected = dvec3(1.0 + steps(theta_i), 0.5 + steps(theta_o), blue);
-            assert!((found - expected).abs().max_element() < 1e-4, "{theta_i} {theta_o} {azimuth}: {found}");
+            let expected = dvec3(10.0 * steps(theta_i) + steps(theta_o), phi_i / 7.5, phi_o / 7.5);
+            assert!((found - expected).abs().max_element() < 1e-4, "{theta_i} {phi_i} {theta_o} {phi_o}: {found}");
         }
+        // From the last azimuth to the first, which is the next, both turning together.
+        let found = brdf.evaluate(direction(30.0, 356.25), direction(30.0, 356.25 - 90.0));
+        assert!((found - dvec3(22.0, 23.5, 35.5)).abs().max_element() < 1e-4, "{found}");
     }
 
     #[test]

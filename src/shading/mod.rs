@@ -158,7 +158,9 @@ impl<'a> CpuShader<'a> {
     /// # Errors
     /// A shader that cannot be read.
     pub fn new(prepared: &'a Prepared, round: &Round) -> Result<Self> {
-        let Prepared { method, environment, materials, .. } = prepared;
+        let Prepared { method, materials, .. } = prepared;
+        let environment = &prepared.shading_light(round)?;
+        let evaluates_brdf = method.evaluates_brdf(environment);
         let lookups = method.lookups();
         let light = light(round, None, *method, environment, &prepared.shaded())?;
         let map = match lookups {
@@ -167,9 +169,9 @@ impl<'a> CpuShader<'a> {
             _ => None,
         };
         let slices = lookups.slices.then(|| materials.iter().map(|material| SliceTable::new(&material.brdf)).collect());
-        let table = |material: &PreparedMaterial| match material.brdf.has_twin() {
-            true => Ok(None),
-            false => Ok(Some(Brdf::Tabulated((*round.ask(&Tabulate(&material.brdf))?).clone()))),
+        let table = |material: &PreparedMaterial| match evaluates_brdf && !material.brdf.has_twin() {
+            false => Ok(None),
+            true => Ok(Some(Brdf::Tabulated((*round.ask(&Tabulate(&material.brdf))?).clone()))),
         };
         let split_sums =
             lookups.split_sum.then(|| materials.iter().map(|material| SplitSum::new(&material.brdf)).collect());

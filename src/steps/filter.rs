@@ -101,6 +101,22 @@ impl Step for Part<'_> {
     }
 }
 
+/// An environment whose small sources are left to kernels.
+pub struct LeaveSources<'a>(pub &'a Keyed<Environment>);
+
+impl Step for LeaveSources<'_> {
+    type Output = Environment;
+    const NAME: &'static str = "sources";
+
+    fn key(&self, _: &Memo) -> Result<Key> {
+        Ok(Key::builder("sources left in").key(self.0.key).build())
+    }
+
+    fn make(&self, _: &Round) -> Result<Environment> {
+        Ok(self.0.with_sources_left_in())
+    }
+}
+
 /// An environment blurred by the kernels of fitted threads.
 pub struct Blur<'a> {
     /// Of what.

@@ -166,9 +166,9 @@ impl Step for Tabulate<'_> {
     }
 
     fn make(&self, round: &Round) -> Result<Tabulated> {
-        if !round.ask(&FindLobe(self.0))?.is_isotropic {
-            let problem = "is anisotropic with these parameters, for which shaders have no form of it";
-            let remedy = "use --method reference, or fitted under light without small lamps";
+        if !self.0.has_shader_form(&*round.ask(&FindLobe(self.0))?) {
+            let problem = "is anisotropic, and shaders that evaluate BRDFs have no form of it";
+            let remedy = "use --method fitted or reference";
             return Err(Error::input(format!("model `{}`", self.0.model()), problem, remedy));
         }
         Ok(tabulate(self.0).0)

@@ -57,7 +57,7 @@ fn hostile_rgl_files_are_refused() {
         ("huge", Some(&huge), "ends before its field phi_i"),
         ("zero", Some(&with(&[0.0; 12])), "nothing but zeros"),
         ("nan", Some(&with(&[f32::NAN; 12])), "NaN"),
-        ("anisotropic", Some(&common::rgl_file(&[("phi_i", &[2], &[0.0; 2])])), "is anisotropic: not supported yet"),
+        ("azimuths", Some(&common::rgl_file(&[("phi_i", &[2], &[0.0; 2])])), "phi_i that does not ascend"),
         ("noise", Some(&noise(4096)), "no tensor file"),
     ] {
         let name = format!("{name}.bsdf");
@@ -65,6 +65,16 @@ fn hostile_rgl_files_are_refused() {
             fs::write(folder.path().join(&name), bytes).unwrap();
         }
         refuses(&folder, &render(&format!("--material {name}")), &[&name, reason]);
+    }
+}
+
+#[test]
+fn methods_that_evaluate_the_brdf_in_a_shader_refuse_measured_anisotropy() {
+    let folder = workplace();
+    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/rgl/half_turn_rgb.bsdf");
+    for method in ["importance", "paper"] {
+        let arguments = render(&format!("--material {file} --method {method}"));
+        refuses(&folder, &arguments, &["`rgl`: is anisotropic", "fitted"]);
     }
 }
 

@@ -133,6 +133,19 @@ fn an_anisotropic_material_is_evaluated_from_any_azimuth_and_plotted_but_not_exp
 }
 
 #[test]
+fn a_measured_anisotropic_file_is_evaluated_from_any_azimuth_and_plotted() {
+    let folder = workplace();
+    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/rgl/half_turn_rgb.bsdf");
+    let (code, values, _) = evaluated(&folder, file, "30 60 180 0\n30 60 180 90\n30 60 180 270\n");
+    assert_eq!(code, Some(0));
+    // Half a turn leaves it as it is.
+    let ratio = |other: usize| values[other] / values[3];
+    assert!((ratio(0) - 1.0).abs() > 0.01 && (ratio(6) - 1.0).abs() < 1e-9, "{values:?}");
+    threadlight(&folder, &format!("materials plot {file} -o file.svg")).assert().success();
+    assert!(String::from_utf8(bytes(&folder, "file.svg")).unwrap().contains("azimuth 90"));
+}
+
+#[test]
 fn a_material_is_exported_and_plotted() {
     let folder = workplace();
     threadlight(&folder, "materials export clay -o clay.binary").assert().success();

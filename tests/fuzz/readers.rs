@@ -83,9 +83,12 @@ pub fn rgl_file() -> Reader {
             ("spectra", &[1, 2, 4, 2, 2], &spectra),
         ])
     }
+    fn anisotropic() -> Vec<u8> {
+        include_bytes!("../rgl/half_turn_rgb.bsdf").to_vec()
+    }
     Reader {
         file_name: "x.bsdf",
-        seeds: || vec![common::rgl_like_file(), spectral()],
+        seeds: || vec![common::rgl_like_file(), spectral(), anisotropic()],
         words: &["tensor_file\0", "theta_i", "vndf", "rgb", "spectra", "wavelengths", "\x01\0\0\0\0\0\0\0", "\0\0\0\0"],
         seal: None,
         bytes_per_byte: 16,
@@ -99,7 +102,7 @@ pub fn mit_file() -> Reader {
         seeds: || vec![common::mit_like_file()],
         words: &["\0\0\0\0", "\x01\0\0\0", "\x03\0\0\0"],
         seal: None,
-        bytes_per_byte: 3,
+        bytes_per_byte: 2,
         read: read_material,
     }
 }
@@ -113,7 +116,7 @@ pub fn utia_file() -> Reader {
         },
         words: &["\0\0\0\0\0\0\0\0"],
         seal: None,
-        bytes_per_byte: 3,
+        bytes_per_byte: 2,
         read: read_material,
     }
 }
