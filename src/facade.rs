@@ -7,7 +7,7 @@ use crate::pipeline::{DeviceScene, Rendering, Wanted};
 use crate::prepare::{in_own_axes, prepare};
 use crate::progress::Observer;
 use crate::scene::{Background, ImageSettings, MaterialSource, Scene, Source, mesh};
-use crate::steps::{FitThreads, LoadMaterial};
+use crate::steps::{FindLobe, FitThreads, LoadMaterial};
 use crate::threads::{ThreadSettings, Threads};
 use crate::vulkan::{Device, Instance};
 use crate::{Result, environment};
@@ -122,7 +122,7 @@ impl Renderer {
         let round = self.memo.round(&());
         let (brdf, _) = in_own_axes(&round.ask(&LoadMaterial(&material.into()))?);
         let settings = ThreadSettings { count, ..Default::default() };
-        let settings = settings.for_picture(&brdf, ImageSettings::default().subpixels);
+        let settings = settings.for_picture(&*round.ask(&FindLobe(&brdf))?, ImageSettings::default().subpixels);
         Ok((*round.ask(&FitThreads { brdf: &brdf, settings })?).clone())
     }
 }

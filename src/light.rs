@@ -1,5 +1,5 @@
 //! What shading looks up of an environment, in memory: its filtered forms, and which of them the kernels of threads need.
-use crate::brdf::{Brdf, MIN_COS_THETA_D, half_vector_width};
+use crate::brdf::{LobeShape, MIN_COS_THETA_D};
 use crate::environment::sources::{CLEAR, clearance};
 use crate::environment::{Environment, Pyramid, VmfPyramid};
 use crate::memo::Keyed;
@@ -60,18 +60,18 @@ impl KernelNeeds {
     pub fn of(environment: &Environment, materials: &[WithThreads], rest: &VmfPyramid) -> Self {
         let finest_level = finest_level(rest);
         let sources = environment.small_sources();
-        let mirrors = |brdf: &Brdf| {
-            let lobe_width = (MIN_COS_THETA_D * half_vector_width(brdf)) as f32;
-            sources.parts().any(|source| clearance(0.0, source.width_rad() as f32, lobe_width) < CLEAR[1])
+        let mirrors = |lobe: &LobeShape| {
+            let lobe_width = (MIN_COS_THETA_D * lobe.width_rad) as f32;
+            sources.leaves().any(|source| clearance(0.0, source.width_rad() as f32, lobe_width) < CLEAR[1])
         };
         let is_sharp = |threads: Option<&Threads>| {
             let mut tables = threads.and_then(Threads::fitted).into_iter().flat_map(FittedTable::tables);
-            tables.any(|table| table.sharp_count(finest_level) > 0)
+            tables.any(|table| table.used().sharp_count(finest_level) > 0)
         };
         Self {
             map: materials.iter().any(|(_, threads)| is_sharp(*threads)),
-            sources: !sources.lamps.is_empty(),
-            mirrored_sources: materials.iter().any(|(brdf, _)| mirrors(brdf)),
+            sources: !sources.nodes.is_empty(),
+            mirrored_sources: materials.iter().any(|(lobe, _)| mirrors(lobe)),
         }
     }
 

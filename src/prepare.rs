@@ -1,12 +1,14 @@
 //! Loads everything that a scene names, and makes the threads of its materials: all that the GPU will need.
-use crate::brdf::Brdf;
+use crate::brdf::{Brdf, LobeShape};
 use crate::environment::Environment;
 use crate::geometry_texel::MAX_MATERIALS;
 use crate::memo::{Key, Keyed, Memo, Round, Step};
 use crate::method::{Method, Variant};
 use crate::passes::{PlacedMesh, PlacedTangent, Sampling, View};
 use crate::scene::{Camera, MaterialSource, Mesh, Scene, Source, TangentRule};
-use crate::steps::{DraftThreads, FitThreads, LeaveSources, LoadBrushedMesh, LoadEnvironment, LoadMaterial, LoadMesh};
+use crate::steps::{
+    DraftThreads, FindLobe, FitThreads, LeaveSources, LoadBrushedMesh, LoadEnvironment, LoadMaterial, LoadMesh,
+};
 use crate::threads::{ThreadKind, ThreadSettings, Threads, WithThreads};
 use crate::{Error, Result};
 use glam::{DAffine3, DVec3};
@@ -49,6 +51,8 @@ pub struct PreparedMaterial {
     pub brdf: Keyed<Brdf>,
     /// By how many degrees these are turned: see [`PlacedTangent::turn_deg`].
     pub rotation_deg: f64,
+    /// The lobe of [`Self::brdf`].
+    pub lobe: Keyed<LobeShape>,
     /// Its threads, for methods that use them.
     pub threads: Option<Keyed<Threads>>,
 }
@@ -64,18 +68,22 @@ pub fn in_own_axes(brdf: &Keyed<Brdf>) -> (Keyed<Brdf>, f64) {
 
 impl PreparedMaterial {
     /// A material of this name and BRDF, as the scene has it; threads are yet to come.
-    pub fn new(name: String, turned_brdf: Keyed<Brdf>) -> Self {
+    ///
+    /// # Errors
+    /// Cancelled.
+    pub fn new(name: String, turned_brdf: Keyed<Brdf>, round: &Round) -> Result<Self> {
         let (brdf, rotation_deg) = in_own_axes(&turned_brdf);
-        Self { name, turned_brdf, brdf, rotation_deg, threads: None }
+        let lobe = round.ask(&FindLobe(&brdf))?;
+        Ok(Self { name, turned_brdf, brdf, rotation_deg, lobe, threads: None })
     }
 
-    /// Its BRDF and threads.
+    /// Its lobe and threads.
     pub fn shaded(&self) -> WithThreads<'_> {
-        (&self.brdf, self.threads.as_deref())
+        (&self.lobe, self.threads.as_deref())
     }
 }
 
-/// The threads that `method` shades `brdf` by in a picture of `subpixels` x `subpixels` to the pixel; none for a method that draws
+/// The threads that `method` shades `material` by in a picture of `subpixels` x `subpixels` to the pixel; none for a method that draws
 /// samples instead.
 ///
 /// # Errors
@@ -83,19 +91,19 @@ impl PreparedMaterial {
 pub fn ask_threads(
     round: &Round,
     method: Method,
-    brdf: &Keyed<Brdf>,
+    material: &PreparedMaterial,
     sampling: Sampling,
     subpixels: u32,
 ) -> Result<Option<Keyed<Threads>>> {
-    let Some(settings) = thread_settings(method, brdf, sampling, subpixels) else { return Ok(None) };
-    round.ask(&FitThreads { brdf, settings }).map(Some)
+    let Some(settings) = thread_settings(method, &material.lobe, sampling, subpixels) else { return Ok(None) };
+    round.ask(&FitThreads { brdf: &material.brdf, settings }).map(Some)
 }
 
-/// Which threads `method` shades `brdf` by, if it does.
-fn thread_settings(method: Method, brdf: &Brdf, sampling: Sampling, subpixels: u32) -> Option<ThreadSettings> {
+/// Which threads `method` shades a BRDF of this lobe by, if it does.
+fn thread_settings(method: Method, lobe: &LobeShape, sampling: Sampling, subpixels: u32) -> Option<ThreadSettings> {
     let Sampling { count, seed, .. } = sampling;
     let settings = ThreadSettings { kind: method.threads()?, count: count as usize, seed, ..ThreadSettings::default() };
-    Some(settings.for_picture(brdf, subpixels))
+    Some(settings.for_picture(lobe, subpixels))
 }
 
 /// Asks `round` for all that `scene` names, and for the threads of its materials.
@@ -104,7 +112,7 @@ fn thread_settings(method: Method, brdf: &Brdf, sampling: Sampling, subpixels: u
 /// The first file or setting that cannot be used; cancelled.
 pub fn prepare(scene: &Scene, round: &Round) -> Result<Prepared> {
     let subpixels = scene.image.subpixels;
-    let ask = |method, _: &str, brdf: &Keyed<Brdf>, sampling| ask_threads(round, method, brdf, sampling, subpixels);
+    let ask = |method, material: &PreparedMaterial, sampling| ask_threads(round, method, material, sampling, subpixels);
     prepare_by(scene, round, &ask)
 }
 
@@ -136,18 +144,20 @@ pub fn prepare_draft(scene: &Scene, before: &Prepared, round: &Round) -> Result<
     }
     let is_draft = Cell::new(false);
     let subpixels = scene.image.subpixels;
-    let ask = |method, name: &str, brdf: &Keyed<Brdf>, sampling| {
-        let Some(settings) = thread_settings(method, brdf, sampling, subpixels) else { return Ok(None) };
+    let ask = |method, material: &PreparedMaterial, sampling| {
+        let PreparedMaterial { name, brdf, lobe, .. } = material;
+        let Some(settings) = thread_settings(method, lobe, sampling, subpixels) else { return Ok(None) };
         if let Some(finished) = round.known(&FitThreads { brdf, settings })? {
             return Ok(Some(finished));
         }
         // Drafts are made for view angles only.
         let is_drafted = |shown: &&PreparedMaterial| {
-            shown.name == name && shown.brdf.model() == brdf.model() && shown.brdf.is_isotropic() && brdf.is_isotropic()
+            let are_isotropic = shown.lobe.is_isotropic && lobe.is_isotropic;
+            shown.name == *name && shown.brdf.model() == brdf.model() && are_isotropic
         };
         let mut shown = before.materials.iter().filter(is_drafted);
         let Some((shown, threads)) = shown.find_map(|shown| Some((shown, shown.threads.as_ref()?))) else {
-            return ask_threads(round, method, brdf, sampling, subpixels);
+            return ask_threads(round, method, material, sampling, subpixels);
         };
         is_draft.set(true);
         // While another material is edited, this one's draft serves on.
@@ -161,8 +171,8 @@ pub fn prepare_draft(scene: &Scene, before: &Prepared, round: &Round) -> Result<
     Ok(is_draft.get().then_some(prepared))
 }
 
-/// Gives the threads of a material by its name in the scene and its BRDF.
-type AskThreads<'a> = dyn Fn(Method, &str, &Keyed<Brdf>, Sampling) -> Result<Option<Keyed<Threads>>> + 'a;
+/// Gives the threads of a material that has none yet.
+type AskThreads<'a> = dyn Fn(Method, &PreparedMaterial, Sampling) -> Result<Option<Keyed<Threads>>> + 'a;
 
 fn prepare_by(scene: &Scene, round: &Round, ask_threads: &AskThreads) -> Result<Prepared> {
     let method = Method::from_name(&scene.shading.method)?;
@@ -185,8 +195,8 @@ fn prepare_by(scene: &Scene, round: &Round, ask_threads: &AskThreads) -> Result<
             MaterialSource::Model { .. } => error.within(format!("material \"{name}\"")),
             _ => error,
         })?;
-        let material = PreparedMaterial::new(name.to_owned(), brdf);
-        let threads = ask_threads(method, name, &material.brdf, sampling)?;
+        let material = PreparedMaterial::new(name.to_owned(), brdf, round)?;
+        let threads = ask_threads(method, &material, sampling)?;
         materials.push(PreparedMaterial { threads, ..material });
     }
     let mut prepared = Prepared {
@@ -310,7 +320,7 @@ impl Prepared {
     pub fn shading_light(&self, round: &Round) -> Result<Keyed<Environment>> {
         let Self { method, environment, materials, .. } = self;
         let are_kernels = method.threads().is_some_and(ThreadKind::are_kernels);
-        let mut unknown = materials.iter().filter(|material| !material.brdf.has_shader_form());
+        let mut unknown = materials.iter().filter(|material| !material.brdf.has_shader_form(&material.lobe));
         match unknown.next().filter(|_| are_kernels && method.evaluates_brdf(environment)) {
             Some(PreparedMaterial { name, .. }) => {
                 tracing::warn!(
@@ -327,11 +337,9 @@ impl Prepared {
     /// # Errors
     /// A mesh that cannot be read again with its texture coordinates; cancelled.
     pub fn place_tangents(&mut self, round: &Round) -> Result<()> {
-        // Found once a material: there may be thousands of objects.
-        let are_isotropic: Vec<_> = self.materials.iter().map(|material| material.brdf.is_isotropic()).collect();
         for (object, settings) in self.objects.iter_mut().zip(&self.scene.objects) {
             let material = object.material as usize;
-            let needs_tangent = !are_isotropic[material];
+            let needs_tangent = !self.materials[material].lobe.is_isotropic;
             if settings.tangent == Some(TangentRule::Uv) {
                 let brushed = needs_tangent.then(|| round.ask(&LoadBrushedMesh(&settings.mesh))).transpose()?;
                 let mesh = match brushed.filter(|mesh| !mesh.tangents.is_empty()) {
@@ -387,7 +395,7 @@ impl Prepared {
         self.objects.iter().any(|object| object.tangent.is_some())
     }
 
-    /// BRDF and threads of each material.
+    /// Lobe and threads of each material.
     pub fn shaded(&self) -> Vec<WithThreads<'_>> {
         self.materials.iter().map(PreparedMaterial::shaded).collect()
     }

@@ -97,7 +97,12 @@ fn shaders_are_compiled_for_a_gpu_that_is_not_there_and_spill_nothing() {
     let output = command.args(arguments.split(' ')).output().unwrap();
     let said = String::from_utf8_lossy(&output.stdout);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    assert!(["NAVI21", "VGPRs", "shade_fitted"].iter().all(|text| said.contains(text)), "{said}");
+    assert!(
+        ["NAVI21", "VGPRs", "geometry_cache_vert", "geometry_cache_frag", "shade_fitted"]
+            .iter()
+            .all(|text| said.contains(text)),
+        "{said}"
+    );
     let costs = json(&folder, "shaders.json");
     let costs = costs.as_array().unwrap();
     assert_eq!(keys(&costs[0]).len(), 5);
@@ -189,6 +194,11 @@ fn the_parts_of_a_sweep_together_are_the_whole() {
     assert_eq!(rows("merged.json"), rows("whole.json"));
     assert_eq!(rows("1.json").as_array().unwrap().len() + 12, rows("whole.json").as_array().unwrap().len());
     assert_eq!(files(&folder, "merged"), files(&folder, "whole"));
+    let mut without_one = Command::new(env!("CARGO_BIN_EXE_threadlight"));
+    without_one.current_dir(&folder).args("bench report --from 1.json 3.json".split(' '));
+    let output = without_one.output().unwrap();
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.code() == Some(2) && said.contains("lack 2/3 of"), "{said}");
 }
 
 #[test]

@@ -191,7 +191,7 @@ fn threads_shade_measured_anisotropy_and_what_needs_the_brdf_in_a_shader_refuses
     let file = folder.path().join("brushed.bsdf");
     std::fs::write(&file, rgl_file(&brushed(), false)).unwrap();
     let prepared = ready(&scene(&file, "fitted", 2));
-    assert!(!prepared.environment.small_sources().lamps.is_empty(), "the sun is one");
+    assert!(!prepared.environment.small_sources().nodes.is_empty(), "the sun is one");
     let rendering = gpu.render(&prepared, EVERYTHING);
 
     // The twin leaves the sun to threads as well.

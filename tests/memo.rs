@@ -2,8 +2,9 @@
 mod common;
 use common::{Validated, sphere};
 use std::path::Path;
-use std::sync::Mutex;
-use threadlight::low_level::brdf::Brdf;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex};
+use threadlight::low_level::brdf::{Brdf, Custom, CustomBrdf};
 use threadlight::low_level::memo::Memo;
 use threadlight::low_level::pipeline::{DeviceScene, Wanted};
 use threadlight::low_level::prepare::{key_of, prepare};
@@ -72,7 +73,7 @@ fn each_change_makes_what_it_needs_and_nothing_else() {
         (
             "material",
             |scene| scene.materials[0].source = MaterialSource::Builtin("gold".into()),
-            &["material", "threads", "upload of materials"],
+            &["material", "lobe", "threads", "upload of materials"],
         ),
     ];
     for (name, change, expected) in changes {
@@ -115,6 +116,49 @@ fn a_rotation_of_the_material_fits_nothing() {
     gpu.finish();
 }
 
+/// Diffuse, and counts how often it is evaluated.
+struct Counted(Arc<AtomicUsize>);
+
+impl CustomBrdf for Counted {
+    fn name(&self) -> &str {
+        "counted"
+    }
+
+    fn key(&self) -> Vec<u8> {
+        Vec::new()
+    }
+
+    fn evaluate(&self, _: glam::DVec3, _: glam::DVec3) -> glam::DVec3 {
+        self.0.fetch_add(1, Ordering::Relaxed);
+        glam::DVec3::splat(0.2)
+    }
+}
+
+#[test]
+fn a_brdf_that_stays_is_not_evaluated_again() {
+    let gpu = Validated::new();
+    let count = Arc::new(AtomicUsize::new(0));
+    let mut scene = small();
+    scene.materials[0].source = MaterialSource::Custom(Custom::new(Counted(count.clone())));
+    scene.materials.push(MaterialSettings { name: "other".into(), source: MaterialSource::Builtin("clay".into()) });
+    scene.objects.push(ObjectSettings::new(Source::Builtin("sphere".into()), "other"));
+    let (mut renderer, _) = ask(&gpu, &scene);
+    let evaluations = count.load(Ordering::Relaxed);
+    assert!(evaluations > 0);
+    let changes: [fn(&mut Scene); 3] = [
+        |scene| scene.materials[1].source = MaterialSource::Builtin("gold".into()),
+        |scene| scene.image.exposure = 2.0,
+        |scene| scene.environment.source = Source::Builtin("sky".into()),
+    ];
+    for change in changes {
+        change(&mut scene);
+        (renderer, _) = ask(&gpu, &scene);
+    }
+    assert_eq!(count.load(Ordering::Relaxed), evaluations);
+    drop(renderer);
+    gpu.finish();
+}
+
 #[test]
 fn files_count_by_content() {
     let gpu = Validated::new();
@@ -144,7 +188,7 @@ fn files_count_by_content() {
     assert_eq!(ask(&gpu, &scene).1, Vec::<&str>::new(), "what nobody has named again is as it was");
     gpu.memo.look_again(&path);
     let (edited, made) = ask(&gpu, &scene);
-    assert_eq!(made, ["material", "threads", "upload of materials"]);
+    assert_eq!(made, ["material", "lobe", "threads", "upload of materials"]);
     assert_ne!(picture(&edited), first);
     drop((renderer, edited));
     gpu.finish();

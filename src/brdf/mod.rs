@@ -33,7 +33,7 @@ pub use base::{base_files, base_files_of, change_base_files, resolve_base_files}
 pub use coat::Coat;
 pub use custom::CustomBrdf;
 pub use ggx_lobe::{Tap, ggx_lobe};
-pub use lobe::{LobeAxes, MIN_COS_THETA_D, half_vector_width, lobe_axes, lobe_radius};
+pub use lobe::{LobeShape, MIN_COS_THETA_D, half_vector_width, lobe_radius};
 pub use merl_export::merl_bytes;
 pub use microfacet::{Distribution, fresnel_conductor, fresnel_dielectric};
 pub use parameters::{Domain, Parameter, Parameters, Spacing, as_number, channels, parameter, set_parameter};
@@ -247,9 +247,9 @@ impl Brdf {
         TWINS.contains(&self.model()) && !dispatch!(self, model => model.needs_table())
     }
 
-    /// Whether shaders can evaluate it at all: tables that are made hold isotropic BRDFs.
-    pub fn has_shader_form(&self) -> bool {
-        self.has_twin() || self.is_isotropic()
+    /// Whether shaders can evaluate it at all, given its lobe: tables that are made hold isotropic BRDFs.
+    pub fn has_shader_form(&self, lobe: &LobeShape) -> bool {
+        self.has_twin() || lobe.is_isotropic
     }
 
     /// The model's parameters for its GLSL twin, `BrdfParameters { vec4 a, b, c }` in memory order. Shaders have no rotation: see
@@ -283,8 +283,7 @@ impl Brdf {
         const PHI_STEPS: usize = 384;
         let w_o = (DVec2::from_angle(phi_o) * theta_o.sin()).extend(theta_o.cos());
         // A ring crosses an ellipse within its ratio in radians. GGX then leaves an error of 2 e^(-ratio phi_steps).
-        let LobeAxes { narrow_rad, wide_rad, .. } = lobe_axes(self);
-        let phi_steps = PHI_STEPS.max((8.0 * wide_rad / narrow_rad).ceil() as usize);
+        let phi_steps = PHI_STEPS.max((8.0 / LobeShape::of(self).narrowness).ceil() as usize);
         let mut sum = DVec3::ZERO;
         for i in 0..THETA_STEPS {
             let x = (i as f64 + 0.5) / THETA_STEPS as f64;

@@ -1,5 +1,5 @@
 //! A material as shaders have it. Twin of the layout: glsl/material.glsl.
-use super::{Brdf, LobeAxes, Tabulated, half_vector_width, lobe_axes};
+use super::{Brdf, LobeShape, Tabulated};
 
 /// `ThreadTable` in glsl/material.glsl.
 #[repr(C)]
@@ -34,11 +34,11 @@ pub struct MaterialRecord {
     pub model: u32,
     /// Where its CDFs or its split sum start in the buffer of these.
     pub first_slice: u32,
-    /// [`half_vector_width`].
+    /// [`LobeShape::width_rad`].
     pub lobe_width: f32,
-    /// The lobe's width across its long axis over the one along it: 1 of an isotropic BRDF.
+    /// [`LobeShape::narrowness`].
     pub narrowness: f32,
-    /// The direction of the lobe's long axis in the tangent plane: [`LobeAxes::wide_azimuth`](super::LobeAxes).
+    /// [`LobeShape::long_axis`].
     pub long_axis: [f32; 2],
     /// Its threads.
     pub threads: ThreadTableRecord,
@@ -49,16 +49,15 @@ pub struct MaterialRecord {
 }
 
 impl MaterialRecord {
-    /// Of `brdf`, without threads and CDFs.
-    pub fn new(brdf: &Brdf) -> Self {
-        let LobeAxes { narrow_rad, wide_rad, wide_azimuth } = lobe_axes(brdf);
+    /// Of `brdf`, whose lobe this is, without threads and CDFs.
+    pub fn new(brdf: &Brdf, lobe: &LobeShape) -> Self {
         Self {
             parameters: brdf.gpu_parameters(),
             model: brdf.model_index(),
             first_slice: 0,
-            lobe_width: half_vector_width(brdf) as f32,
-            narrowness: (narrow_rad / wide_rad) as f32,
-            long_axis: wide_azimuth.as_vec2().to_array(),
+            lobe_width: lobe.width_rad as f32,
+            narrowness: lobe.narrowness as f32,
+            long_axis: lobe.long_axis.as_vec2().to_array(),
             threads: ThreadTableRecord::NONE,
             subpixel_threads: ThreadTableRecord::NONE,
             padding: [0; 2],

@@ -8,7 +8,7 @@ use threadlight::low_level::method::Method;
 use threadlight::low_level::output;
 use threadlight::low_level::prepare::in_own_axes;
 use threadlight::low_level::scene::{ImageSettings, MaterialSource};
-use threadlight::low_level::steps::{FitThreads, LoadMaterial};
+use threadlight::low_level::steps::{FindLobe, FitThreads, LoadMaterial};
 use threadlight::low_level::threads::{self, ThreadKind, ThreadSettings};
 
 const EXAMPLES: &str = "\
@@ -69,7 +69,7 @@ impl Threads {
         let round = memo.round(&progress);
         let (brdf, _) = in_own_axes(&round.ask(&LoadMaterial(&source))?);
         let settings = ThreadSettings { kind, count, seed: self.seed, ..Default::default() };
-        let settings = settings.for_picture(&brdf, ImageSettings::default().subpixels);
+        let settings = settings.for_picture(&*round.ask(&FindLobe(&brdf))?, ImageSettings::default().subpixels);
         let threads = round.ask(&FitThreads { brdf: &brdf, settings })?;
         progress.finish();
         let Asked { origin, time, .. } = round.asked(FitThreads::NAME)[0];

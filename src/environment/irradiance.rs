@@ -176,7 +176,7 @@ mod tests {
             [1.0 + ((x * 7 + y * 3) % 13) as f32, spot, (y / 20) as f32]
         });
         let sources = map.small_sources();
-        let sources: Vec<_> = sources.parts().collect();
+        let sources: Vec<_> = sources.leaves().collect();
         assert_eq!(sources.len(), 1);
         let irradiance = irradiance_map(&map.part(false), &()).unwrap();
         for i in 0..200 {

@@ -22,7 +22,7 @@ pub use irradiance::irradiance_map;
 pub use light_map::{Alias, LightMap};
 pub use procedural::builtin_names;
 pub use pyramid::{FractionBits, Pyramid};
-pub use sources::{LightSource, MAX_SOURCES, SmallSources, SourceRecord, SourceRecords};
+pub use sources::{LightSource, MAX_SOURCES, SmallSources, SourceRecord};
 pub use vmf_pyramid::{BlurKernel, BlurStep, VmfPyramid};
 
 file_formats!(Environment: hdr_file, exr_file);
@@ -92,7 +92,7 @@ impl Environment {
 
     /// The same, but its small sources count as all other light.
     pub fn with_sources_left_in(&self) -> Self {
-        let none = SmallSources { lamps: Vec::new(), pixels: vec![false; self.texels.len()] };
+        let none = SmallSources { nodes: Vec::new(), pixels: vec![false; self.texels.len()] };
         Self { small_sources: none.into(), ..self.clone() }
     }
 

@@ -2,6 +2,8 @@
 //!
 //! The tails of a lobe matter most under these, and tails are what few kernels fit worst. So they are cut out of what kernels look up,
 //! and shaded by the BRDF itself.
+use std::ops::Range;
+
 use glam::{DMat2, DVec2, DVec3, Vec4, dvec2};
 
 use super::Environment;
@@ -26,9 +28,6 @@ const WIDEST_RAD: f64 = 0.006;
 /// Measured: earlier, rims of mirrored lamps are off in mirrors; later, in glossy plastics, of which kernels know less.
 pub const CLEAR: [f32; 2] = [1.25, 2.5];
 
-/// From this [`clearance`] on, a few points of a source do: 2 x 2, and of a lamp as a whole instead of its parts.
-pub const FAR: f32 = 8.0;
-
 /// How far a source `away` from the mirrored view is from where the BRDF cannot be taken at a few points of it, because it is mirrored
 /// towards the eye and wider than the lobe; in half standard deviations, `width`, of the source. All in radians.
 /// Twin of `clearance` in glsl/methods/fitted.glsl.
@@ -47,48 +46,28 @@ pub struct LightSource {
     pub power: DVec3,
 }
 
-/// A connected bright region, and the sources that it is divided into: from afar it is one.
-#[derive(Clone, Debug)]
-pub struct Lamp {
-    /// All of it as one source.
-    pub whole: LightSource,
-    /// At least one, together all of it.
-    pub parts: Vec<LightSource>,
-}
-
-/// The sources of an environment.
+/// The sources of an environment: each a tree, of halves of halves.
 #[derive(Clone, Debug)]
 pub struct SmallSources {
-    /// The most powerful first, with at most [`MAX_SOURCES`] parts together.
-    pub lamps: Vec<Lamp>,
+    /// Depth first: each lamp before its halves. A leaf ends at the next one.
+    pub nodes: Vec<SourceNode>,
     /// Whether each pixel is of one of them.
     pub pixels: Vec<bool>,
 }
 
-/// Sources as shaders and their twins have them.
-#[derive(Clone, Debug, Default)]
-pub struct SourceRecords {
-    /// How many lamps there are.
-    pub lamp_count: usize,
-    /// The lamps as wholes, then the parts of the first, of the second, ...
-    pub list: Vec<SourceRecord>,
+/// A lamp, or a part of one.
+#[derive(Clone, Copy, Debug)]
+pub struct SourceNode {
+    /// All of it as one source.
+    pub source: LightSource,
+    /// How many nodes it and all its parts are.
+    pub size: usize,
 }
 
 impl LightSource {
     /// Standard deviation of its light along its longer axis, in radians.
     pub fn width_rad(&self) -> f64 {
         self.axes[0].length()
-    }
-
-    /// The source as shaders have it, its power over `scale`, with its `parts`: where they start, and their number.
-    fn record(&self, scale: f32, parts: [usize; 2]) -> SourceRecord {
-        let Self { direction, axes: [longer, shorter], power } = *self;
-        let [first, count] = parts.map(|index| index as f64);
-        SourceRecord {
-            direction: direction.extend(self.width_rad()).as_vec4(),
-            axes: [longer.extend(first).as_vec4(), shorter.extend(count).as_vec4()],
-            power: (power / f64::from(scale)).extend(0.0).as_vec4(),
-        }
     }
 }
 
@@ -98,7 +77,7 @@ impl LightSource {
 pub struct SourceRecord {
     /// Of its centroid; w: standard deviation along its longer axis, in radians.
     pub direction: Vec4,
-    /// Across that, as long as its standard deviation along each; w: of a lamp, the index of its first part, and their number.
+    /// Across that, as long as its standard deviation along each; w of the first: how many nodes it and all its parts are.
     pub axes: [Vec4; 2],
     /// Radiance integrated over its solid angle, over a scale.
     pub power: Vec4,
@@ -114,53 +93,62 @@ impl SmallSources {
         found.retain(|part| luminance(part.source.power) >= LEAST_SHARE * total);
         found.sort_by(by_power);
         found.truncate(MAX_REGIONS);
-        let mut lamps: Vec<_> = found.into_iter().map(|part| (part.source, vec![part])).collect();
         // The one whose extent matters most goes first.
         let extent = |part: &Part| luminance(part.source.power) * part.source.width_rad().powi(2);
         let is_wide = |part: &Part| part.source.width_rad() > WIDEST_RAD && part.pixels.len() > 1;
-        while lamps.iter().map(|(_, parts)| parts.len()).sum::<usize>() < MAX_SOURCES {
-            let places = lamps.iter().enumerate().flat_map(|(l, (_, parts))| (0..parts.len()).map(move |p| (l, p)));
-            let wide = places.filter(|&(l, p)| is_wide(&lamps[l].1[p]));
-            let widest = wide.max_by(|&(l, p), &(m, q)| extent(&lamps[l].1[p]).total_cmp(&extent(&lamps[m].1[q])));
-            let Some((lamp, part)) = widest else { break };
-            let halves = lamps[lamp].1[part].halves(environment);
-            lamps[lamp].1.splice(part..=part, halves);
+        let lamp_count = found.len();
+        let mut halves: Vec<Range<usize>> = vec![0..0; lamp_count];
+        let mut leaf_count = lamp_count;
+        while leaf_count < MAX_SOURCES {
+            let wide = (0..found.len()).filter(|&i| halves[i].is_empty() && is_wide(&found[i]));
+            let Some(widest) = wide.max_by(|&a, &b| extent(&found[a]).total_cmp(&extent(&found[b]))) else { break };
+            let first = found.len();
+            found.extend(found[widest].halves(environment));
+            halves[widest] = first..found.len();
+            halves.resize(found.len(), 0..0);
+            leaf_count += halves[widest].len() - 1;
         }
         let mut pixels = vec![false; environment.texels.len()];
-        lamps.iter().flat_map(|(_, parts)| parts).flat_map(|part| &part.pixels).for_each(|&pixel| pixels[pixel] = true);
-        let sources = |parts: Vec<Part>| parts.into_iter().map(|part| part.source).collect();
-        let lamps = lamps.into_iter().map(|(whole, parts)| Lamp { whole, parts: sources(parts) }).collect();
-        Self { lamps, pixels }
+        found[..lamp_count].iter().flat_map(|lamp| &lamp.pixels).for_each(|&pixel| pixels[pixel] = true);
+        let mut nodes = Vec::new();
+        (0..lamp_count).for_each(|lamp| add_tree(lamp, &found, &halves, &mut nodes));
+        Self { nodes, pixels }
     }
 
-    /// The parts of all lamps.
-    pub fn parts(&self) -> impl Iterator<Item = &LightSource> {
-        self.lamps.iter().flat_map(|lamp| &lamp.parts)
+    /// The sources that are not divided.
+    pub fn leaves(&self) -> impl Iterator<Item = &LightSource> {
+        self.nodes.iter().filter(|node| node.size == 1).map(|node| &node.source)
     }
 
-    /// Lamps and their parts, with power over `scale`.
-    pub fn records(&self, scale: f32) -> SourceRecords {
-        let mut first = self.lamps.len();
-        let mut list = Vec::new();
-        for Lamp { whole, parts } in &self.lamps {
-            list.push(whole.record(scale, [first, parts.len()]));
-            first += parts.len();
-        }
-        list.extend(self.parts().map(|part| part.record(scale, [0; 2])));
-        SourceRecords { lamp_count: self.lamps.len(), list }
+    /// The nodes as shaders have them, their power over `scale`.
+    pub fn records(&self, scale: f32) -> Vec<SourceRecord> {
+        let record = |&SourceNode { source: LightSource { direction, axes: [longer, shorter], power }, size }: &_| {
+            SourceRecord {
+                direction: direction.extend(longer.length()).as_vec4(),
+                axes: [longer.extend(size as f64).as_vec4(), shorter.extend(0.0).as_vec4()],
+                power: (power / f64::from(scale)).extend(0.0).as_vec4(),
+            }
+        };
+        self.nodes.iter().map(record).collect()
+    }
+
+    /// The words of `Sources` in glsl/light_source.glsl: the number of nodes, and their records.
+    pub fn device_words(&self, scale: f32) -> Vec<u32> {
+        // Structures are aligned to 16 bytes.
+        let mut words = vec![self.nodes.len() as u32, 0, 0, 0];
+        words.extend(self.records(scale).into_iter().flat_map(bytemuck::cast::<_, [u32; 16]>));
+        // A uniform buffer has the size that the shader says: of trees of halves, all nodes are less than twice the leaves.
+        words.resize(4 + 16 * 2 * MAX_SOURCES, 0);
+        words
     }
 }
 
-impl SourceRecords {
-    /// The words of `Sources` in glsl/light_source.glsl.
-    pub fn device_words(&self) -> Vec<u32> {
-        // Structures are aligned to 16 bytes.
-        let mut words = vec![self.lamp_count as u32, 0, 0, 0];
-        words.extend_from_slice(bytemuck::cast_slice(&self.list));
-        // A buffer cannot be empty, nor its array.
-        words.resize(words.len().max(4 + 16), 0);
-        words
-    }
+/// Adds node `index` and all its parts, which `halves` has for each of `found`.
+fn add_tree(index: usize, found: &[Part], halves: &[Range<usize>], nodes: &mut Vec<SourceNode>) {
+    let place = nodes.len();
+    nodes.push(SourceNode { source: found[index].source, size: 1 });
+    halves[index].clone().for_each(|half| add_tree(half, found, halves, nodes));
+    nodes[place].size = nodes.len() - place;
 }
 
 /// [`BRIGHTNESS`] times the mean radiance of what is below it: one lamp that outshines all others does not hide them.
@@ -270,7 +258,7 @@ mod tests {
         for (column, row) in [(0, 20), (127, 33), (64, 0), (30, 63)] {
             let map = environment(128, 64, |x, y| [if (x, y) == (column, row) { 1e6 } else { 1.0 }; 3]);
             let found = SmallSources::of(&map);
-            let found: Vec<_> = found.parts().collect();
+            let found: Vec<_> = found.leaves().collect();
             assert_eq!(found.len(), 1, "{column} {row}");
             assert!(found[0].direction.dot(map.direction(column as f64, row as f64)) > 1.0 - 1e-9);
             let power = 1e6 * map.weight_solid_angle(row);
@@ -281,17 +269,18 @@ mod tests {
 
     #[test]
     fn soft_light_has_no_sources_and_a_bright_strip_has_several() {
-        assert!(SmallSources::of(&environment(64, 32, |x, y| [(x % 5 + y % 7) as f32; 3])).lamps.is_empty());
-        assert!(SmallSources::of(&environment(8, 4, |_, _| [0.0; 3])).lamps.is_empty());
+        assert!(SmallSources::of(&environment(64, 32, |x, y| [(x % 5 + y % 7) as f32; 3])).nodes.is_empty());
+        assert!(SmallSources::of(&environment(8, 4, |_, _| [0.0; 3])).nodes.is_empty());
         // More pixels than there may be sources: some are of two, side by side along the horizon.
         let strip = environment(256, 128, |x, y| [if y == 64 && (100..140).contains(&x) { 5e3 } else { 0.1 }; 3]);
         let sources = SmallSources::of(&strip);
-        let found: Vec<_> = sources.parts().collect();
-        assert_eq!((sources.lamps.len(), found.len()), (1, MAX_SOURCES));
-        let records = sources.records(2.0);
-        let [first, count] = records.list[0].axes.map(|axis| axis.w as usize);
-        let halved: Vec4 = records.list[first..first + count].iter().map(|part| part.power).sum();
-        assert!((halved.x / records.list[0].power.x - 1.0).abs() < 1e-6);
+        let found: Vec<_> = sources.leaves().collect();
+        assert_eq!((sources.nodes.len(), found.len()), (2 * MAX_SOURCES - 1, MAX_SOURCES));
+        for (i, node) in sources.nodes.iter().enumerate().filter(|(_, node)| node.size > 1) {
+            let [one, other] = [i + 1, i + 1 + sources.nodes[i + 1].size].map(|half| sources.nodes[half]);
+            assert_eq!(node.size, 1 + one.size + other.size);
+            assert!((one.source.power + other.source.power).distance(node.source.power) < 1e-9);
+        }
         // A pixel's side is 2 pi / 256; the standard deviation of its tent, sqrt(1/6) of that.
         let pixel = std::f64::consts::TAU / 256.0 / 6f64.sqrt();
         for source in &found {

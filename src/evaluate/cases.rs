@@ -1,9 +1,13 @@
 //! What evaluations go through: every material in every environment in every scene, by every method at every count.
+use std::fmt;
 use std::ops::Range;
+use std::str::FromStr;
 use std::sync::Arc;
 
+use serde::{Deserialize, Serialize};
+
 use super::metrics::Display;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::memo::{Keyed, Memo, Round};
 use crate::method::{Method, Variant};
 use crate::passes::Sampling;
@@ -24,26 +28,50 @@ pub struct Estimator {
     pub count: u32,
 }
 
-/// A part of the combinations of materials and environments, for jobs that share a sweep: part `index`, from 0, of `count`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// A part of the combinations of materials and environments, for jobs that share a sweep: as text `2/8`, the second of eight.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Shard {
-    index: usize,
-    count: usize,
+    /// Which part this is, from 1.
+    number: usize,
+    /// How many parts there are.
+    pub count: usize,
 }
 
 impl Shard {
     /// All of them.
-    pub const WHOLE: Self = Self { index: 0, count: 1 };
+    pub const WHOLE: Self = Self { number: 1, count: 1 };
 
     /// The part of that `number`, from 1, of `count`; none if there is none of that number.
     pub fn new(number: usize, count: usize) -> Option<Self> {
-        (1..=count).contains(&number).then(|| Self { index: number - 1, count })
+        (1..=count).contains(&number).then_some(Self { number, count })
+    }
+
+    /// All of so many parts.
+    pub fn all(count: usize) -> impl Iterator<Item = Self> + Clone {
+        (1..=count).map(move |number| Self { number, count })
     }
 
     /// Which of `length` things are in this part. Neighbours stay together, as the threads of a material are made once for all environments.
     fn of(self, length: usize) -> Range<usize> {
-        let start = |index: usize| index * length / self.count;
-        start(self.index)..start(self.index + 1)
+        let end = |number: usize| number * length / self.count;
+        end(self.number - 1)..end(self.number)
+    }
+}
+
+impl fmt::Display for Shard {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        write!(f, "{}/{}", self.number, self.count)
+    }
+}
+
+impl FromStr for Shard {
+    type Err = &'static str;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let numbers =
+            text.split_once('/').and_then(|(number, count)| Some((number.parse().ok()?, count.parse().ok()?)));
+        let shard = numbers.and_then(|(number, count)| Self::new(number, count));
+        shard.ok_or("use part/parts, such as 2/8 for the second of eight")
     }
 }
 
@@ -106,6 +134,19 @@ impl Cases {
         self.own_materials().try_for_each(|(_, (_, source))| memo.round(&()).ask(&LoadMaterial(source)).map(drop))
     }
 
+    /// Whether each part of the sweep has some combination: otherwise nobody could tell a part that is empty from one that was lost.
+    ///
+    /// # Errors
+    /// More parts than combinations.
+    pub fn check_shard(&self) -> Result<()> {
+        let most = self.materials.len() * self.environments.len();
+        if self.shard.count <= most {
+            return Ok(());
+        }
+        let problem = format!("has more parts than there are combinations of materials and environments, {most}");
+        Err(Error::input("--shard", problem, format!("use at most {most} parts")))
+    }
+
     /// Calls `visit` for each combination of material, scene and environment, the last one changing fastest.
     ///
     /// # Errors
@@ -131,8 +172,9 @@ impl Cases {
         }
         self.check_materials(memo)?;
         for (number, (material_name, source)) in self.own_materials() {
-            let brdf = memo.round(observer).ask(&LoadMaterial(source))?;
-            let mut material = vec![PreparedMaterial::new(material_name.clone(), brdf)];
+            let of_material = memo.round(observer);
+            let brdf = of_material.ask(&LoadMaterial(source))?;
+            let mut material = vec![PreparedMaterial::new(material_name.clone(), brdf, &of_material)?];
             let mut tables = Vec::new();
             for (scene, prepared, display) in &mut scenes {
                 // The scene borrows the material and the environment while they are looked at together.
@@ -210,13 +252,8 @@ impl Place<'_> {
     pub fn choose(&mut self, estimator: Estimator) -> Result<()> {
         let Estimator { variant: Variant { method, pattern }, count } = estimator;
         let sampling = Sampling { count, seed: self.cases.seed, pattern };
-        let threads = ask_threads(
-            &self.round(),
-            method,
-            &self.prepared.materials[0].brdf,
-            sampling,
-            self.prepared.view.subpixels,
-        )?;
+        let threads =
+            ask_threads(&self.round(), method, &self.prepared.materials[0], sampling, self.prepared.view.subpixels)?;
         self.tables.extend(threads.clone());
         self.prepared.materials[0].threads = threads;
         self.prepared.method = method;
@@ -247,7 +284,7 @@ mod tests {
     #[test]
     fn shards_have_each_combination_once() {
         for (count, length) in [(1, 4), (2, 4), (3, 7), (7, 3), (5, 0), (100, 2000)] {
-            let parts = (1..=count).map(|number| Shard::new(number, count).unwrap().of(length));
+            let parts = Shard::all(count).map(|shard| shard.of(length));
             assert!(parts.clone().flatten().eq(0..length), "{count} of {length}");
             let sizes: Vec<_> = parts.map(|part| part.len()).collect();
             assert!(sizes.iter().max().unwrap() - sizes.iter().min().unwrap() <= 1, "{sizes:?}");

@@ -8,7 +8,7 @@ use crate::pipeline::median;
 use crate::prepare::in_own_axes;
 use crate::progress::{Observer, OnlyCancels};
 use crate::scene::{ImageSettings, MaterialSource};
-use crate::steps::LoadMaterial;
+use crate::steps::{FindLobe, LoadMaterial};
 use crate::threads::fitted::{generate, validation_error};
 use crate::threads::{ThreadKind, ThreadSettings};
 
@@ -47,11 +47,13 @@ pub fn run(fits: &Fits, memo: &Memo, observer: &dyn Observer, found: &mut Vec<Ti
     let mut done = 0;
     observer.progress(done, total);
     for (material, source) in &fits.materials {
-        let (brdf, _) = in_own_axes(&memo.round(observer).ask(&LoadMaterial(source))?);
+        let round = memo.round(observer);
+        let (brdf, _) = in_own_axes(&round.ask(&LoadMaterial(source))?);
+        let lobe = round.ask(&FindLobe(&brdf))?;
         for &threads in &fits.counts {
             let count = threads as usize;
             let settings = ThreadSettings { kind: ThreadKind::Fitted, count, ..ThreadSettings::default() };
-            let settings = settings.for_picture(&brdf, ImageSettings::default().subpixels);
+            let settings = settings.for_picture(&lobe, ImageSettings::default().subpixels);
             let mut times_ms = Vec::new();
             let table = loop {
                 let start = Instant::now();

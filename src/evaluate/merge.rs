@@ -1,19 +1,22 @@
 //! Measurements of several files as those of one run.
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
 
 use super::Row;
+use super::cases::Shard;
 use super::sweep::Settings;
 use crate::error::{Error, Result};
 
-/// All rows of `files`, in their order.
+/// All rows of `files`, in their order, as those of a whole sweep.
 ///
 /// # Errors
-/// A file that was measured with other settings than one before it, or that has a row of one before it.
+/// A file that was measured with other settings than one before it, or that has a row of one before it; a part of a sweep that is missing.
 pub fn merged<'a>(files: impl IntoIterator<Item = (&'a Path, Vec<Row>)>) -> Result<Vec<Row>> {
     // The first file of each scene with its settings, and the file of each row.
     let mut scenes: HashMap<String, (&Path, Option<Settings>)> = HashMap::new();
     let mut known: HashMap<([String; 4], u32), &Path> = HashMap::new();
+    // Which parts there are of each method and count on each scene, and of how many.
+    let mut parts: BTreeMap<(String, u32, String, usize), Vec<Shard>> = BTreeMap::new();
     let mut all = Vec::new();
     for (path, rows) in files {
         for row in rows {
@@ -32,7 +35,17 @@ pub fn merged<'a>(files: impl IntoIterator<Item = (&'a Path, Vec<Row>)>) -> Resu
                 let problem = format!("has {what}, as {} has", other.display());
                 return Err(Error::in_file(path, problem, "give each part of a sweep once"));
             }
-            all.push(row);
+            if let Some(shard) = row.shard {
+                parts.entry((method.clone(), *threads, scene.clone(), shard.count)).or_default().push(shard);
+            }
+            all.push(Row { shard: None, ..row });
+        }
+    }
+    for ((method, threads, scene, count), there) in parts {
+        if let Some(missing) = Shard::all(count).find(|shard| !there.contains(shard)) {
+            let problem = format!("lack {missing} of {method} with {threads} on {scene}");
+            let remedy = format!("measure it with --shard {missing}, and give all parts");
+            return Err(Error::input("the parts of a sweep", problem, remedy));
         }
     }
     Ok(all)
@@ -49,6 +62,27 @@ mod tests {
             "settings": {{"width": {width}, "height": 60, "subpixels": 2, "seed": 0, "repeat": 3, "whole_picture": false}}}}"#
         );
         serde_json::from_str(&text).unwrap()
+    }
+
+    #[test]
+    fn a_part_that_is_missing_is_named() {
+        let part = |material: &str, shard: &str| Row { shard: Some(shard.parse().unwrap()), ..row(material, 80) };
+        let merge = |rows: Vec<Row>| merged([(Path::new("a.json"), rows)]);
+        let all = [part("gold", "1/3"), part("clay", "2/3"), part("satin", "3/3")];
+        assert!(merge(all.to_vec()).unwrap().iter().all(|row| row.shard.is_none()));
+        for (missing, name) in ["1/3", "2/3", "3/3"].iter().enumerate() {
+            let mut rows = all.to_vec();
+            rows.remove(missing);
+            // What was not shared has no parts.
+            rows.push(row("chalk", 80));
+            let error = merge(rows).unwrap_err().to_string();
+            assert!(error.contains(&format!("lack {name} of paper with 4 on s")), "{error}");
+        }
+        // Another method may have been shared by others.
+        let of_two = |shard: &str| Row { method: "fitted".into(), ..part("gold", shard) };
+        assert!(merge([&all[..], &[of_two("1/2")]].concat()).is_err());
+        let other = Row { material: "clay".into(), ..of_two("2/2") };
+        assert!(merge([&all[..], &[of_two("1/2"), other]].concat()).is_ok());
     }
 
     #[test]

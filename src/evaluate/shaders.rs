@@ -4,17 +4,17 @@
 //! it is measured: the driver needs no GPU, and nothing runs.
 use serde::Serialize;
 
-use super::tables::{Section, Table};
+use super::tables::{Section, Table, in_order};
 use crate::error::Result;
 use crate::memo::{Memo, Round};
 use crate::method::Method;
-use crate::passes::models_used;
+use crate::passes::{GEOMETRY_STATE, models_used};
 use crate::pipeline::{classify_constants, shade_constants};
 use crate::prepare::{Prepared, prepare};
 use crate::progress::Observer;
 use crate::scene::{Background, Scene};
 use crate::steps::blurred_light;
-use crate::vulkan::{CompilingDevice, Shader, compiled};
+use crate::vulkan::{CompiledShader, CompilingDevice, Shader, compiled};
 
 /// A shader as a driver compiles it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -32,15 +32,14 @@ pub struct ShaderCost {
 }
 
 impl ShaderCost {
-    fn of(
-        device: &CompilingDevice,
+    fn new(
         shader: &'static Shader,
         compiled_for: &'static str,
         constants: Vec<(&'static str, u32)>,
-    ) -> Result<Self> {
-        let made = device.compile(shader, &constants)?;
+        made: CompiledShader,
+    ) -> Self {
         let (wave, statistics) = (made.subgroup_size, made.statistics);
-        Ok(Self { shader: shader.name(), compiled_for, constants, wave, statistics })
+        Self { shader: shader.name(), compiled_for, constants, wave, statistics }
     }
 
     /// The driver's figure of that name, if there is one.
@@ -61,8 +60,13 @@ pub fn run(
     observer: &dyn Observer,
     costs: &mut Vec<ShaderCost>,
 ) -> Result<()> {
-    let mut add = |shader, compiled_for, constants| {
-        costs.push(ShaderCost::of(device, shader, compiled_for, constants)?);
+    let (vertex, fragment) = (&compiled::GEOMETRY_CACHE_VERT, &compiled::GEOMETRY_CACHE_FRAG);
+    let made = device.compile_graphics(vertex, fragment, &GEOMETRY_STATE)?;
+    let of_cache = [vertex, fragment].into_iter().zip(made);
+    costs.extend(of_cache.map(|(shader, made)| ShaderCost::new(shader, "any", Vec::new(), made)));
+    let mut add = |shader, compiled_for, constants: Vec<_>| {
+        let made = device.compile(shader, &constants)?;
+        costs.push(ShaderCost::new(shader, compiled_for, constants, made));
         observer.check()
     };
     add(&compiled::BARE_LOOKUPS, "any", Vec::new())?;
@@ -123,8 +127,8 @@ pub fn table(device: &str, costs: &[ShaderCost]) -> Section {
         let owned = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect();
         COLUMNS.iter().map(|(head, names)| ((*head).to_owned(), owned(names))).collect()
     } else {
-        let names = costs.first().into_iter().flat_map(|cost| &cost.statistics);
-        names.map(|(name, _)| (name.clone(), vec![name.clone()])).collect()
+        let names = in_order(costs.iter().flat_map(|cost| &cost.statistics).map(|(name, _)| name));
+        names.into_iter().map(|name| (name.clone(), vec![name.clone()])).collect()
     };
     let bare = costs.iter().find(|cost| cost.shader == compiled::BARE_LOOKUPS.name());
     let a_thread = |cost: &ShaderCost| Some(cost.statistic("Inverse Throughput")? / f64::from(cost.wave.max(1)));

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use image::RgbImage;
 use serde::{Deserialize, Serialize};
 
-use super::cases::{Cases, Place};
+use super::cases::{Cases, Place, Shard};
 use super::expected::TrueSample;
 use super::metrics::{Comparable, Metrics, compare};
 use super::reference_picture::ReferencePicture;
@@ -74,6 +74,9 @@ pub struct Row {
     /// How it was measured; none in measurements that were written before this was kept.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub settings: Option<Settings>,
+    /// Which part of a sweep it is of; none of a whole one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shard: Option<Shard>,
     /// What `rms` was expected to be, where that was asked for: see [`TrueSample::expected_rms`].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub expected_rms: Option<f64>,
@@ -165,7 +168,8 @@ pub fn run(
                 .map_err(|error| error.within(format!("{} on {}", place.material, place.scene)))?;
             let expected_rms = sample.as_ref().map(|sample| sample.expected_rms(&rendering.radiance));
             let settings = Some(sweep.settings(place.prepared));
-            measured.rows.push(Row { settings, expected_rms, ..row(place, &metrics, &rendering) });
+            let shard = Some(sweep.cases.shard).filter(|shard| *shard != Shard::WHOLE);
+            measured.rows.push(Row { settings, shard, expected_rms, ..row(place, &metrics, &rendering) });
             if sweep.keep_pictures {
                 measured.pictures.push(over_grey(&rendering.radiance, width, height, display));
             }
@@ -207,6 +211,7 @@ fn row(place: &Place, metrics: &Metrics, rendering: &Rendering) -> Row {
         lookups: rendering.lookups,
         covered_pixels: rendering.counters.covered_pixels(),
         settings: None,
+        shard: None,
         expected_rms: None,
     }
 }

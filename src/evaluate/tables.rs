@@ -294,6 +294,7 @@ pub(super) mod tests {
                             lookups: u64::from(threads) * 1000,
                             covered_pixels: 800,
                             settings: None,
+                            shard: None,
                             expected_rms: None,
                         });
                     }

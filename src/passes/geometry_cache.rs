@@ -107,18 +107,20 @@ struct Push {
     material: u32,
 }
 
+/// What its pipeline is besides shaders.
+pub(crate) const GEOMETRY_STATE: GraphicsState = GraphicsState {
+    attributes: &[(vk::Format::R32G32B32_SFLOAT, VERTEX_STRIDE); 3],
+    colors: &[GEOMETRY_FORMAT],
+    depth: DEPTH_FORMAT,
+};
+
 /// Compiles the shaders of the pass.
 ///
 /// # Errors
 /// A driver that cannot compile them.
 pub fn geometry_pipeline(device: &Arc<Device>, cache: &PipelineCache) -> Result<GraphicsPipeline> {
-    let state = GraphicsState {
-        attributes: &[(vk::Format::R32G32B32_SFLOAT, VERTEX_STRIDE); 3],
-        colors: &[GEOMETRY_FORMAT],
-        depth: DEPTH_FORMAT,
-    };
     let (vertex, fragment) = (&compiled::GEOMETRY_CACHE_VERT, &compiled::GEOMETRY_CACHE_FRAG);
-    Ok(GraphicsPipeline::new(device, cache, vertex, fragment, &state)?)
+    Ok(GraphicsPipeline::new(device, cache, vertex, fragment, &GEOMETRY_STATE)?)
 }
 
 impl GeometryCache {

@@ -93,9 +93,8 @@ impl DeviceLight {
         self.pyramid = upload("environment pyramid", pyramid)?;
         self.source_pyramid = upload("source pyramid", source_pyramid)?;
         self.irradiance = upload("irradiance map", &blurred.irradiance)?;
-        let (sources, storage) = (environment.small_sources(), vk::BufferUsageFlags::STORAGE_BUFFER);
-        let words = sources.records(scale).device_words();
-        self.sources = Some(Buffer::with_contents(device, "light sources", storage, bytemuck::cast_slice(&words))?);
+        let (words, uniform) = (environment.small_sources().device_words(scale), vk::BufferUsageFlags::UNIFORM_BUFFER);
+        self.sources = Some(Buffer::with_contents(device, "light sources", uniform, bytemuck::cast_slice(&words))?);
         Ok(())
     }
 

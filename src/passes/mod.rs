@@ -25,6 +25,7 @@ pub use bare_lookups::{BareLookups, bare_lookups};
 pub use classify::{Classify, Counters, SMOOTH_DEG, Tiles, classify, smooth_variance};
 pub use cube_borders::WayAround;
 pub use device_check::{Answers, Questions, Volume, ask};
+pub(crate) use geometry_cache::GEOMETRY_STATE;
 pub use geometry_cache::{DeviceMesh, GeometryCache, PlacedMesh, PlacedTangent, geometry_cache, geometry_pipeline};
 pub use light::DeviceLight;
 #[cfg(feature = "viewer")]

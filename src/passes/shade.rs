@@ -2,7 +2,7 @@
 use super::brdf_atlas::BrdfAtlas;
 use super::{CameraRays, Counters, DeviceLight, Tiles, View};
 use crate::Result;
-use crate::brdf::{Brdf, MaterialRecord, Tabulated, ThreadTableRecord, merl};
+use crate::brdf::{Brdf, LobeShape, MaterialRecord, Tabulated, ThreadTableRecord, merl};
 use crate::graph::{BufferDesc, BufferHandle, FrameGraph, ImageDesc, ImageHandle};
 use crate::memo::Keyed;
 use crate::method::Method;
@@ -38,6 +38,8 @@ pub fn models_used<'a>(brdfs: impl IntoIterator<Item = &'a Brdf>, evaluates_brdf
 pub struct ShadedMaterial<'a> {
     /// What it is.
     pub brdf: &'a Brdf,
+    /// Its lobe.
+    pub lobe: &'a LobeShape,
     /// Its threads, for methods that have any.
     pub threads: Option<&'a Threads>,
     /// What shaders look up of a BRDF without a twin, where they evaluate it.
@@ -68,8 +70,8 @@ impl DeviceMaterials {
         let mut made = BrdfAtlas::new(Tabulated::NODES);
         let materials: Vec<_> = materials.into_iter().collect();
         let models_used = models_used(materials.iter().map(|material| material.brdf), evaluates_brdf);
-        for ShadedMaterial { brdf, threads: own_threads, table } in materials {
-            let mut record = MaterialRecord::new(brdf);
+        for ShadedMaterial { brdf, lobe, threads: own_threads, table } in materials {
+            let mut record = MaterialRecord::new(brdf, lobe);
             if evaluates_brdf {
                 if let Brdf::MerlTable(table) = brdf {
                     record = record.with_measured_table_at(measured.add(device, table.texels())?);
@@ -147,13 +149,14 @@ impl ThreadWords {
     }
 
     fn add_kernels(&mut self, table: &FittedTable) -> ThreadTableRecord {
+        let used = table.used();
         let first = self.words.len() as u32;
-        self.words.extend(table.device_words());
+        self.words.extend(used.device_words());
         ThreadTableRecord {
             first,
-            count: table.used_count() as u32,
+            count: used.count() as u32,
             row_count: table.rows as u32,
-            sharp_count: self.finest_level.map_or(0, |level| table.sharp_count(level) as u32),
+            sharp_count: self.finest_level.map_or(0, |level| used.sharp_count(level) as u32),
             set_count: table.sets as u32,
             azimuth_count: table.azimuths as u32,
         }

@@ -10,7 +10,7 @@ use super::{
     Camera, DEFAULT_MATERIAL, EXPOSURE, EnvironmentSettings, GAMMA, INTENSITY, ImageSettings, MAX_SAMPLES, MAX_SIZE_PX,
     MAX_SUBPIXELS, MaterialSettings, MaterialSource, ObjectSettings, Scene, ShadingSettings, Source, TangentRule,
 };
-use crate::brdf::{change_base_files, resolve_base_files};
+use crate::brdf::{Brdf, change_base_files, resolve_base_files};
 use crate::error::{Error, Result};
 use crate::file_format::{self, FileFormat, FileKind, text};
 use crate::output::write_whole;
@@ -203,7 +203,8 @@ fn quote_line(text: &str, position: usize) -> String {
     format!("line {number} (`{line}`)")
 }
 
-/// A `[[material]]`: its name, and one of `file`, `builtin` and `model`; with `model` come parameters.
+/// A `[[material]]`: its name, and one of `file`, `builtin` and `model`, of which `builtin` may be the name itself; with `model` come
+/// parameters.
 fn material(mut table: toml::Table) -> Result<MaterialSettings, String> {
     let mut take = |key: &str| match table.remove(key) {
         None => Ok(None),
@@ -216,7 +217,14 @@ fn material(mut table: toml::Table) -> Result<MaterialSettings, String> {
         (Some(file), None, None) => MaterialSource::File(file.into()),
         (None, Some(builtin), None) => MaterialSource::Builtin(builtin),
         (None, None, Some(model)) => MaterialSource::Model { model, parameters: std::mem::take(&mut table) },
-        _ => return Err(format!("material \"{name}\" needs exactly one of `file`, `builtin` and `model`")),
+        (None, None, None) if Brdf::builtin_names().any(|known| known == name) => MaterialSource::Builtin(name.clone()),
+        (None, None, None) => {
+            let known = Brdf::builtin_names().collect::<Vec<_>>().join(", ");
+            return Err(format!(
+                "material \"{name}\" needs a `file`, `builtin` or `model`, or as its name one of {known}"
+            ));
+        }
+        _ => return Err(format!("material \"{name}\" needs no more than one of `file`, `builtin` and `model`")),
     };
     match table.keys().next() {
         Some(key) => Err(format!("unknown field `{key}` in material \"{name}\", only a `model` has parameters")),

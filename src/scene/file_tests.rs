@@ -56,6 +56,14 @@ fn error(text: &str) -> String {
 }
 
 #[test]
+fn a_name_alone_is_that_of_a_builtin_material() {
+    let parse = |text: &str| Scene::parse(text, Path::new("")).unwrap();
+    assert_eq!(parse("[[material]]\nname = 'silver'"), parse("[[material]]\nname = 'silver'\nbuiltin = 'silver'"));
+    let path = "[[material]]\nname = 'silver'\nfile = 'x.binary'";
+    assert!(matches!(parse(path).materials[0].source, MaterialSource::File(_)), "what is given goes first");
+}
+
+#[test]
 fn every_key_is_read_and_paths_start_at_the_file() {
     let scene = Scene::parse(FULL, Path::new("/base")).unwrap();
     let expected = ImageSettings {
@@ -204,6 +212,8 @@ fn bad_values_are_errors_that_name_the_key_and_its_line() {
         ("[shading]\nthreads = 10001", "threads", "line 2"),
         ("[shading]\nseed = -1", "seed", "line 2"),
         ("[[material]]\nname = 'm'", "model", "line 1"),
+        ("[[material]]\nname = 'm'", "one of gold, ", "line 1"),
+        ("[[material]]\nname = 'gold'\nalpha = 0.3", "alpha", "line 1"),
         ("[[material]]\nname = 'm'\nfile = 'x'\nmodel = 'y'", "model", "line 1"),
         ("[[material]]\nfile = 'x'", "name", "line 1"),
         ("[[material]]\nname = 3\nfile = 'x'", "name", "line 1"),

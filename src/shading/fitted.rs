@@ -5,8 +5,8 @@ use glam::{IVec2, Vec2, Vec3, Vec4};
 
 use super::{CpuShader, Point, Surface, turned};
 use crate::brdf::MIN_COS_THETA_D;
-use crate::environment::sources::{CLEAR, FAR, clearance};
-use crate::environment::{LightMap, SourceRecord, SourceRecords};
+use crate::environment::sources::{CLEAR, clearance};
+use crate::environment::{LightMap, SourceRecord};
 use crate::light::{BlurredLight, finest_level};
 use crate::packing::stereographic_decode;
 use crate::threads::azimuths::Azimuths;
@@ -56,6 +56,9 @@ fn blurred_radiance(twin: &CpuShader, direction: Vec3, level: f32, sources: f32)
     radiance
 }
 
+/// Twin of `FAR`.
+const FAR: f32 = 4.0;
+
 fn smoothstep([from, to]: [f32; 2], x: f32) -> f32 {
     let x = ((x - from) / (to - from)).clamp(0.0, 1.0);
     x * x * (3.0 - 2.0 * x)
@@ -90,23 +93,37 @@ impl<'a> Lobe<'a> {
         2.0 * (h.dot(axis) * record.narrowness).hypot(h.dot(axis.perp()))
     }
 
+    /// Twin of `clearance_of`.
     fn clearance(&self, source: &SourceRecord, least_width: f32) -> f32 {
         let away = self.away(source.direction.truncate());
         clearance(away, source.direction.w.max(least_width), self.width)
     }
 
-    /// What to go through of each lamp. Twin of `parts_of`.
-    fn sources<'s>(&self, sources: &'s SourceRecords, least_width: f32) -> impl Iterator<Item = &'s SourceRecord> {
-        (0..sources.lamp_count).flat_map(move |lamp| {
-            let whole = &sources.list[lamp];
-            let [first, count] = whole.axes.map(|axis| axis.w as usize);
-            let is_far = self.clearance(whole, least_width) > FAR;
-            &sources.list[if is_far { lamp..lamp + 1 } else { first..first + count }]
+    /// Twin of `opens`.
+    fn opens(&self, source: &SourceRecord, least_width: f32) -> bool {
+        let width = source.direction.w;
+        let away = self.away(source.direction.truncate());
+        away + 4.2 * self.width < 12.0 * width.max(least_width) || width > 0.1
+    }
+
+    /// Twin of `descend`.
+    fn descend(&self, s: usize, sources: &[SourceRecord], least_width: f32) -> usize {
+        let is_divided = |source: &&SourceRecord| source.axes[0].w > 1.0 && self.opens(source, least_width);
+        s + sources[s..].iter().take_while(is_divided).count()
+    }
+
+    /// Those sources that are not taken part by part, in turn.
+    fn sources<'s>(&self, sources: &'s [SourceRecord], least_width: f32) -> impl Iterator<Item = &'s SourceRecord> {
+        let mut next = 0;
+        std::iter::from_fn(move || {
+            let s = (next < sources.len()).then(|| self.descend(next, sources, least_width))?;
+            next = s + sources[s].axes[0].w as usize;
+            Some(&sources[s])
         })
     }
 
     /// Twin of `least_clearance`.
-    fn least_clearance(&self, sources: &SourceRecords, least_width: f32) -> f32 {
+    fn least_clearance(&self, sources: &[SourceRecord], least_width: f32) -> f32 {
         let sources = self.sources(sources, least_width);
         sources.map(|source| self.clearance(source, least_width)).fold(FAR, f32::min)
     }
@@ -124,7 +141,8 @@ pub(super) fn needs_subpixels(point: &Point) -> bool {
     }
     let sources = &point.twin.sources;
     let deviation = point.surface.normal_variance.sqrt();
-    deviation > point.record().lobe_width || share_of_brdf(Lobe::of(point).least_clearance(sources, 3.0 * 2.0 * deviation)) < 1.0
+    deviation > point.record().lobe_width
+        || share_of_brdf(Lobe::of(point).least_clearance(sources, 3.0 * 2.0 * deviation)) < 1.0
 }
 
 /// Twin of `risen`.
@@ -183,7 +201,7 @@ impl AtSources {
 }
 
 /// Twin of `at_sources`.
-fn at_sources(lobe: &Lobe, sources: &SourceRecords) -> AtSources {
+fn at_sources(lobe: &Lobe, sources: &[SourceRecord]) -> AtSources {
     let mut sum = AtSources { f_cos: Vec3::ZERO, cosine: Vec3::ZERO, least_clearance: FAR };
     for source in lobe.sources(sources, 0.0) {
         let clear = lobe.clearance(source, 0.0);

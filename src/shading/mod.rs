@@ -4,7 +4,7 @@
 //! in double precision; everything else follows the shader line by line.
 use crate::Result;
 use crate::brdf::{Brdf, MaterialRecord};
-use crate::environment::{Alias, FractionBits, LightMap, SourceRecords};
+use crate::environment::{Alias, FractionBits, LightMap, SourceRecord};
 use crate::geometry_texel::GeometryTexel;
 use crate::light::Light;
 use crate::memo::Round;
@@ -147,7 +147,7 @@ pub struct CpuShader<'a> {
     /// The table of each material that shaders look up in one.
     tables: Vec<Option<Brdf>>,
     /// The small bright sources of the environment.
-    sources: SourceRecords,
+    sources: Vec<SourceRecord>,
     /// Those of lookups in cube maps.
     fractions: FractionBits,
 }
@@ -182,7 +182,7 @@ impl<'a> CpuShader<'a> {
             map,
             slices: slices.unwrap_or_default(),
             split_sums: split_sums.unwrap_or_default(),
-            records: materials.iter().map(|material| MaterialRecord::new(&material.brdf)).collect(),
+            records: materials.iter().map(|material| MaterialRecord::new(&material.brdf, &material.lobe)).collect(),
             tables: materials.iter().map(table).collect::<Result<_>>()?,
             sources: environment.small_sources().records(1.0),
             fractions: FractionBits::ALL,

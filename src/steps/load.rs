@@ -1,6 +1,6 @@
 //! Loads what scenes name: meshes, environments and BRDFs, with their tables. A file is its contents, so an edited one is another.
 use crate::Result;
-use crate::brdf::{Brdf, Tabulated, base_files, base_files_of, tabulate};
+use crate::brdf::{Brdf, LobeShape, Tabulated, base_files, base_files_of, tabulate};
 use crate::environment::Environment;
 use crate::error::Error;
 use crate::file_format::FileKind;
@@ -138,6 +138,22 @@ fn load(memo: &Memo, source: &MaterialSource) -> Result<Brdf> {
     }
 }
 
+/// Finds what shading goes by of a BRDF's lobe.
+pub struct FindLobe<'a>(pub &'a Keyed<Brdf>);
+
+impl Step for FindLobe<'_> {
+    type Output = LobeShape;
+    const NAME: &'static str = "lobe";
+
+    fn key(&self, _: &Memo) -> Result<Key> {
+        Ok(self.0.key)
+    }
+
+    fn make(&self, _: &Round) -> Result<LobeShape> {
+        Ok(LobeShape::of(self.0))
+    }
+}
+
 /// Makes the table by which shaders know a BRDF that they do not evaluate. Its error is logged. An anisotropic BRDF has none.
 pub struct Tabulate<'a>(pub &'a Keyed<Brdf>);
 
@@ -149,8 +165,8 @@ impl Step for Tabulate<'_> {
         Ok(self.0.key)
     }
 
-    fn make(&self, _: &Round) -> Result<Tabulated> {
-        if !self.0.has_shader_form() {
+    fn make(&self, round: &Round) -> Result<Tabulated> {
+        if !self.0.has_shader_form(&*round.ask(&FindLobe(self.0))?) {
             let problem = "is anisotropic, and shaders that evaluate BRDFs have no form of it";
             let remedy = "use --method fitted or reference";
             return Err(Error::input(format!("model `{}`", self.0.model()), problem, remedy));

@@ -10,5 +10,5 @@ pub use check::CheckDevice;
 pub use compile::{CompileCompute, CompileGeometryCache, pipelines};
 pub use filter::{Blur, BoxFilter, LeaveSources, blurred_light, light};
 pub use fit::{DraftThreads, FitThreads};
-pub use load::{LoadBrushedMesh, LoadEnvironment, LoadMaterial, LoadMesh, Tabulate};
+pub use load::{FindLobe, LoadBrushedMesh, LoadEnvironment, LoadMaterial, LoadMesh, Tabulate};
 pub use upload::{UploadBackground, UploadLight, UploadMaterials, UploadMesh};

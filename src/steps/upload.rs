@@ -1,6 +1,6 @@
 //! Uploads to the device what passes read.
 use super::compile::on;
-use super::load::Tabulate;
+use super::load::{FindLobe, Tabulate};
 use crate::Result;
 use crate::brdf::Brdf;
 use crate::environment::Environment;
@@ -70,7 +70,7 @@ impl Step for UploadMaterials<'_> {
             threads
                 .filter_map(|threads| threads.fitted())
                 .flat_map(FittedTable::tables)
-                .map(|table| table.sharp_count(level) as u64)
+                .map(|table| table.used().sharp_count(level) as u64)
                 .collect::<Vec<_>>()
         });
         Ok(sharp.into_iter().flatten().fold(key, |key, count| key.number(count)).build())
@@ -81,8 +81,11 @@ impl Step for UploadMaterials<'_> {
         let tables =
             self.materials.iter().map(|(brdf, _)| has_table(brdf).then(|| round.ask(&Tabulate(brdf))).transpose());
         let tables = tables.collect::<Result<Vec<_>>>()?;
-        let materials = self.materials.iter().zip(&tables).map(|((brdf, threads), table)| ShadedMaterial {
+        let lobes = self.materials.iter().map(|(brdf, _)| round.ask(&FindLobe(brdf))).collect::<Result<Vec<_>>>()?;
+        let found = lobes.iter().zip(&tables);
+        let materials = self.materials.iter().zip(found).map(|((brdf, threads), (lobe, table))| ShadedMaterial {
             brdf,
+            lobe,
             threads: threads.map(|threads| &**threads),
             table: table.as_deref(),
         });

@@ -16,7 +16,7 @@ use std::f64::consts::FRAC_PI_2;
 
 use glam::DVec3;
 
-use crate::brdf::{Brdf, luminance};
+use crate::brdf::{Brdf, LobeShape, luminance};
 use crate::error::{Error, Result};
 use crate::progress::Observer;
 
@@ -44,8 +44,8 @@ pub use slice_table::SliceTable;
 pub use split_sum::SplitSum;
 pub use table::{Sample, ThreadTable};
 
-/// A BRDF, and the threads by which it is shaded, for methods that have any.
-pub type WithThreads<'a> = (&'a Brdf, Option<&'a Threads>);
+/// The lobe of a BRDF, and the threads by which it is shaded, for methods that have any.
+pub type WithThreads<'a> = (&'a LobeShape, Option<&'a Threads>);
 
 /// Lowest n . s of a sample: 0.006 degrees above the horizon, a thousand times what rounding theta to single precision moves
 /// it by, and far below what any view angle of a table needs.
@@ -209,9 +209,9 @@ impl Default for ThreadSettings {
 }
 
 impl ThreadSettings {
-    /// The same, in the sets that a picture of `brdf` with `subpixels` x `subpixels` to the pixel has them in.
-    pub fn for_picture(self, brdf: &Brdf, subpixels: u32) -> Self {
-        let sets = if self.kind.are_kernels() { fitted::set_count(brdf, self.count, subpixels) } else { 1 };
+    /// The same, in the sets that a picture of a BRDF of this lobe with `subpixels` x `subpixels` to the pixel has them in.
+    pub fn for_picture(self, lobe: &LobeShape, subpixels: u32) -> Self {
+        let sets = if self.kind.are_kernels() { fitted::set_count(lobe, self.count, subpixels) } else { 1 };
         Self { sets, ..self }
     }
 

@@ -59,18 +59,19 @@ mod tests {
         Device::new(&instance, std::env::var("THREADLIGHT_TEST_DEVICE").ok().as_deref())
     }
 
+    const STATE: GraphicsState = GraphicsState {
+        attributes: &[(ash::vk::Format::R32G32B32_SFLOAT, 12)],
+        colors: &[ash::vk::Format::R16G16B16A16_SFLOAT],
+        depth: ash::vk::Format::D32_SFLOAT,
+    };
+    const PAIR: [&Shader; 2] = [&compiled::CUBE_BORDERS_VERT, &compiled::CUBE_BORDERS_FRAG];
+
     /// Makes one of each kind of object, and records and submits.
     fn use_everything(messages: &mut Messages) -> Result<(), VulkanError> {
         let device = open(messages)?;
         let cache = PipelineCache::new(&device, None)?;
         let compute = ComputePipeline::new(&device, &cache, &compiled::TONE_MAP, &[])?;
-        let state = GraphicsState {
-            attributes: &[(ash::vk::Format::R32G32B32_SFLOAT, 12)],
-            colors: &[ash::vk::Format::R16G16B16A16_SFLOAT],
-            depth: ash::vk::Format::D32_SFLOAT,
-        };
-        let (vertex, fragment) = (&compiled::CUBE_BORDERS_VERT, &compiled::CUBE_BORDERS_FRAG);
-        let graphics = GraphicsPipeline::new(&device, &cache, vertex, fragment, &state)?;
+        let graphics = GraphicsPipeline::new(&device, &cache, PAIR[0], PAIR[1], &STATE)?;
         let shape = ImageShape::plane(ash::vk::Format::R8G8B8A8_UNORM, 2, 2);
         let image = Image::with_texels(&device, "image", shape, &[vec![1; 16]])?;
         let sampler = Sampler::new(&device, "sampler", SamplerKind::Trilinear)?;
@@ -82,24 +83,73 @@ mod tests {
         Ok(())
     }
 
-    #[test]
-    fn whichever_call_fails_it_is_named_and_nothing_is_left() {
+    /// The same of a device that only compiles.
+    fn compile_everything(messages: &mut Messages) -> Result<(), VulkanError> {
+        let instance = Instance::new(true)?;
+        *messages = instance.messages();
+        let device = CompilingDevice::new(&instance, None)?;
+        device.compile(&compiled::TONE_MAP, &[])?;
+        device.compile_graphics(PAIR[0], PAIR[1], &STATE).map(drop)
+    }
+
+    /// Lets each call of `act` fail in turn; among them are those `expected`.
+    fn fail_each_call(act: impl Fn(&mut Messages) -> Result<(), VulkanError>, expected: &[&str]) {
         let mut messages = Messages::default();
-        let (result, calls) = with_fault(None, || use_everything(&mut messages));
+        let (result, calls) = with_fault(None, || act(&mut messages));
         result.expect("no call fails");
-        for name in ["vkCreateInstance", "vkCreateDevice", "vkCreateSemaphore", "vkAllocateMemory", "vkQueueSubmit2"] {
-            assert!(calls.contains(&name), "{name} is not among {calls:?}");
+        for name in expected {
+            assert!(calls.contains(name), "{name} is not among {calls:?}");
         }
         for (failing, name) in calls.iter().enumerate() {
             let mut messages = Messages::default();
             let result = ash::vk::Result::ERROR_OUT_OF_DEVICE_MEMORY;
             let fault = Fault { of: None, after: None, index: failing, result, lasts: false };
-            let (result, _) = with_fault(Some(fault), || use_everything(&mut messages));
+            let (result, _) = with_fault(Some(fault), || act(&mut messages));
             let error = result.expect_err("a call fails").to_string();
             assert!(error.contains(name), "{failing}, {name}: {error}");
             assert_eq!(messages.all(), Vec::<String>::new(), "call {failing}, {name}");
         }
         println!("{} calls: {calls:?}", calls.len());
+    }
+
+    #[test]
+    fn whichever_call_fails_it_is_named_and_nothing_is_left() {
+        let expected =
+            ["vkCreateInstance", "vkCreateDevice", "vkCreateSemaphore", "vkAllocateMemory", "vkQueueSubmit2"];
+        fail_each_call(use_everything, &expected);
+    }
+
+    #[test]
+    fn nor_is_anything_left_of_a_device_that_only_compiles() {
+        // The driver that tells of shaders without a GPU, by the names of Debian's and of newer Mesa.
+        let drivers =
+            ["radeon_icd.x86_64.json", "radeon_icd.json"].map(|name| format!("/usr/share/vulkan/icd.d/{name}"));
+        let Some(driver) = drivers.into_iter().find(|driver| std::path::Path::new(driver).is_file()) else {
+            return eprintln!("not tested: there is no such driver here");
+        };
+        let module = module_path!().split_once("::").expect("a crate and a module").1;
+        // In a process of its own: the loader reads these once.
+        let test = std::process::Command::new(std::env::current_exe().expect("a name"))
+            .args([
+                "--exact",
+                &format!("{module}::whichever_call_of_the_null_device_fails"),
+                "--ignored",
+                "--nocapture",
+            ])
+            .env("RADV_FORCE_FAMILY", "navi21")
+            .envs([("VK_DRIVER_FILES", &driver), ("VK_ICD_FILENAMES", &driver)])
+            .output()
+            .expect("a process");
+        let said = [test.stdout, test.stderr].map(|said| String::from_utf8_lossy(&said).into_owned()).concat();
+        assert!(test.status.success() && said.contains("1 passed"), "{said}");
+    }
+
+    #[test]
+    #[ignore = "the test above runs it with the driver that it is about"]
+    fn whichever_call_of_the_null_device_fails() {
+        let expected =
+            ["vkCreateDevice", "vkCreateShaderModule", "vkCreateComputePipelines", "vkCreateGraphicsPipelines"];
+        fail_each_call(compile_everything, &expected);
     }
 
     #[test]

@@ -25,20 +25,7 @@ pub(super) struct Pipeline {
 impl Pipeline {
     /// Makes the layouts that `shaders` declare together; the pipeline itself is still missing.
     fn new(device: &Arc<Device>, name: &'static str, shaders: &[(&Shader, &Interface)]) -> Result<Self> {
-        let mut bindings = BTreeMap::new();
-        let mut stages = vk::ShaderStageFlags::empty();
-        let mut push_constant_bytes = 0;
-        for (shader, interface) in shaders {
-            stages |= shader.stage.flags();
-            push_constant_bytes = push_constant_bytes.max(interface.push_constant_bytes);
-            for (binding_name, binding) in &interface.bindings {
-                let known = bindings.insert(binding_name.clone(), *binding);
-                if known.is_some_and(|known| known != *binding) {
-                    return Err(shader.refuse(format!("{binding_name} is declared differently by another stage")));
-                }
-            }
-            shader.check_bindings(&bindings)?;
-        }
+        let Declared { bindings, stages, push_constant_bytes } = Declared::by(shaders)?;
         let set_layout = set_layout(&device.raw, name, &bindings, stages)?;
         let (raw, layout, identity) = (vk::Pipeline::null(), vk::PipelineLayout::null(), Identity::new());
         let owner = device.clone();
@@ -52,6 +39,33 @@ impl Pipeline {
     /// An error for what does not fit its shaders.
     pub fn refuse(&self, problem: impl ToString) -> VulkanError {
         VulkanError::Shader { shader: self.name.to_owned(), problem: problem.to_string() }
+    }
+}
+
+/// What the shaders of a pipeline declare together.
+#[derive(Default)]
+pub(super) struct Declared {
+    pub bindings: BTreeMap<String, Binding>,
+    pub stages: vk::ShaderStageFlags,
+    pub push_constant_bytes: u32,
+}
+
+impl Declared {
+    /// An error for a name that two of them declare differently.
+    pub fn by(shaders: &[(&Shader, &Interface)]) -> Result<Self> {
+        let mut all = Self::default();
+        for (shader, interface) in shaders {
+            all.stages |= shader.stage.flags();
+            all.push_constant_bytes = all.push_constant_bytes.max(interface.push_constant_bytes);
+            for (name, binding) in &interface.bindings {
+                let known = all.bindings.insert(name.clone(), *binding);
+                if known.is_some_and(|known| known != *binding) {
+                    return Err(shader.refuse(format!("{name} is declared differently by another stage")));
+                }
+            }
+            shader.check_bindings(&all.bindings)?;
+        }
+        Ok(all)
     }
 }
 
@@ -112,10 +126,6 @@ impl Module {
         device.set_name(raw, shader.name);
         Ok(Self { raw, device: device.clone() })
     }
-
-    fn stage(&self, shader: &Shader) -> vk::PipelineShaderStageCreateInfo<'_> {
-        vk::PipelineShaderStageCreateInfo::default().stage(shader.stage.flags()).module(self.raw).name(c"main")
-    }
 }
 
 impl Drop for Module {
@@ -156,13 +166,9 @@ impl Constants {
     }
 }
 
-/// The stage of a compute pipeline.
-pub(super) fn compute_stage<'a>(
-    module: vk::ShaderModule,
-    constants: &'a vk::SpecializationInfo<'a>,
-) -> vk::PipelineShaderStageCreateInfo<'a> {
-    let stage = vk::PipelineShaderStageCreateInfo::default().stage(vk::ShaderStageFlags::COMPUTE).module(module);
-    stage.name(c"main").specialization_info(constants)
+/// The stage of a pipeline that is `shader`, of which `module` was made.
+pub(super) fn stage<'a>(module: vk::ShaderModule, shader: &Shader) -> vk::PipelineShaderStageCreateInfo<'a> {
+    vk::PipelineShaderStageCreateInfo::default().stage(shader.stage.flags()).module(module).name(c"main")
 }
 
 /// A compute shader, ready to dispatch.
@@ -186,7 +192,7 @@ impl ComputePipeline {
         let module = Module::new(device, shader)?;
         let constants = Constants::new(shader, &interface, constants)?;
         let specialization = constants.info();
-        let stage = compute_stage(module.raw, &specialization);
+        let stage = stage(module.raw, shader).specialization_info(&specialization);
         let info = [vk::ComputePipelineCreateInfo::default().stage(stage).layout(pipeline.layout)];
         // SAFETY: `info` and all it points to outlive the call.
         pipeline.raw = call("vkCreateComputePipelines", shader.name, || unsafe {
@@ -260,8 +266,9 @@ impl GraphicsPipeline {
         let mut layouts =
             Pipeline::new(device, fragment.name, &[(vertex, &interfaces[0]), (fragment, &interfaces[1])])?;
         let modules = [Module::new(device, vertex)?, Module::new(device, fragment)?];
-        let stages = [modules[0].stage(vertex), modules[1].stage(fragment)];
-        layouts.raw = make_graphics(device, cache, &layouts, &stages, state)?;
+        let stages = [stage(modules[0].raw, vertex), stage(modules[1].raw, fragment)];
+        let info = vk::GraphicsPipelineCreateInfo::default().stages(&stages).layout(layouts.layout);
+        layouts.raw = make_graphics(&device.raw, cache.raw, fragment.name, info, state)?;
         device.set_name(layouts.raw, fragment.name);
         let strides = state.attributes.iter().map(|(_, stride)| *stride).collect();
         Ok(Self { layouts, strides, colors: state.colors.to_vec(), depth: state.depth })
@@ -273,11 +280,12 @@ impl GraphicsPipeline {
     }
 }
 
-fn make_graphics(
-    device: &Device,
-    cache: &PipelineCache,
-    layouts: &Pipeline,
-    stages: &[vk::PipelineShaderStageCreateInfo],
+/// The pipeline of `info`, which has stages and layout, and of `state`.
+pub(super) fn make_graphics(
+    device: &ash::Device,
+    cache: vk::PipelineCache,
+    name: &str,
+    info: vk::GraphicsPipelineCreateInfo,
     state: &GraphicsState,
 ) -> Result<vk::Pipeline> {
     let buffer = |(binding, (_, stride)): (u32, &(vk::Format, u32))| {
@@ -309,8 +317,7 @@ fn make_graphics(
     let mut rendering = vk::PipelineRenderingCreateInfo::default()
         .color_attachment_formats(state.colors)
         .depth_attachment_format(state.depth);
-    let info = [vk::GraphicsPipelineCreateInfo::default()
-        .stages(stages)
+    let info = [info
         .vertex_input_state(&vertex_input)
         .input_assembly_state(&assembly)
         .viewport_state(&viewport)
@@ -319,11 +326,10 @@ fn make_graphics(
         .depth_stencil_state(&depth)
         .color_blend_state(&blend)
         .dynamic_state(&dynamic)
-        .layout(layouts.layout)
         .push_next(&mut rendering)];
     // SAFETY: `info` and all it points to outlive the call.
-    let made = call("vkCreateGraphicsPipelines", layouts.name, || unsafe {
-        device.raw.create_graphics_pipelines(cache.raw, &info, None).map_err(|(_, result)| result)
+    let made = call("vkCreateGraphicsPipelines", name, || unsafe {
+        device.create_graphics_pipelines(cache, &info, None).map_err(|(_, result)| result)
     })?;
     Ok(made[0])
 }

@@ -1,11 +1,12 @@
-//! What a driver's compiler says of compute shaders: registers, spills, cycles. Nothing runs, so drivers without their GPU do.
+//! What a driver's compiler says of shaders: registers, spills, cycles. Nothing runs, so drivers without their GPU do.
 use super::device::choose;
 use super::error::{Result, VulkanError, call};
 use super::instance::Instance;
 use super::physical_device::{DeviceDescription, candidates, has_extension};
-use super::pipeline::{Constants, check_stage, compute_stage, layout_of, set_layout};
-use super::shader::{Shader, ShaderStage};
+use super::pipeline::{Constants, Declared, GraphicsState, check_stage, layout_of, make_graphics, set_layout, stage};
+use super::shader::{Interface, Shader, ShaderStage};
 use ash::{khr, vk};
+use std::ffi::CStr;
 use std::sync::Arc;
 
 /// A device that only compiles. It needs neither memory nor semaphores, which Mesa's RADV does not have without a GPU.
@@ -41,13 +42,16 @@ impl CompilingDevice {
         let queues = [vk::DeviceQueueCreateInfo::default()
             .queue_family_index(chosen.queue_family)
             .queue_priorities(&priorities)];
-        let extensions = [khr::pipeline_executable_properties::NAME.as_ptr()];
+        let extensions = [khr::pipeline_executable_properties::NAME, khr::dynamic_rendering::NAME].map(CStr::as_ptr);
         let mut tells =
             vk::PhysicalDevicePipelineExecutablePropertiesFeaturesKHR::default().pipeline_executable_info(true);
+        // Graphics pipelines of the renderer have no render pass.
+        let mut dynamic_rendering = vk::PhysicalDeviceDynamicRenderingFeatures::default().dynamic_rendering(true);
         let info = vk::DeviceCreateInfo::default()
             .queue_create_infos(&queues)
             .enabled_extension_names(&extensions)
-            .push_next(&mut tells);
+            .push_next(&mut tells)
+            .push_next(&mut dynamic_rendering);
         // SAFETY: the physical device is this instance's; `info` and all it points to outlive the call.
         let raw =
             call("vkCreateDevice", &name, || unsafe { instance.raw.create_device(chosen.physical, &info, None) })?;
@@ -69,19 +73,11 @@ impl CompilingDevice {
         check_stage(shader, ShaderStage::Compute)?;
         let interface = shader.reflect()?;
         let constants = Constants::new(shader, &interface, constants)?;
-        let mut made = Made::nothing(&self.raw);
-        let stages = vk::ShaderStageFlags::COMPUTE;
-        made.set_layout = set_layout(&self.raw, shader.name, &interface.bindings, stages)?;
-        made.layout = layout_of(&self.raw, shader.name, made.set_layout, interface.push_constant_bytes, stages)?;
-        let words = shader.words();
-        let info = vk::ShaderModuleCreateInfo::default().code(&words);
-        // SAFETY: the words come from the GLSL compiler, as those of every shader.
-        made.module =
-            call("vkCreateShaderModule", shader.name, || unsafe { self.raw.create_shader_module(&info, None) })?;
+        let mut made = Made::but_the_pipeline(&self.raw, &[(shader, &interface)])?;
         let specialization = constants.info();
         let info = [vk::ComputePipelineCreateInfo::default()
             .flags(vk::PipelineCreateFlags::CAPTURE_STATISTICS_KHR)
-            .stage(compute_stage(made.module, &specialization))
+            .stage(stage(made.modules[0], shader).specialization_info(&specialization))
             .layout(made.layout)];
         // SAFETY: `info` and all it points to outlive the call.
         made.pipeline = call("vkCreateComputePipelines", shader.name, || unsafe {
@@ -91,15 +87,40 @@ impl CompilingDevice {
         self.ask(shader, made.pipeline)
     }
 
+    /// Compiles the pair as [`GraphicsPipeline`](super::GraphicsPipeline) does, and asks what each became.
+    ///
+    /// # Errors
+    /// Stages that declare one name differently, a driver that cannot compile them or makes one of both.
+    pub(crate) fn compile_graphics(
+        &self,
+        vertex: &Shader,
+        fragment: &Shader,
+        state: &GraphicsState,
+    ) -> Result<[CompiledShader; 2]> {
+        check_stage(vertex, ShaderStage::Vertex)?;
+        check_stage(fragment, ShaderStage::Fragment)?;
+        let interfaces = [vertex.reflect()?, fragment.reflect()?];
+        let mut made = Made::but_the_pipeline(&self.raw, &[(vertex, &interfaces[0]), (fragment, &interfaces[1])])?;
+        let stages = [stage(made.modules[0], vertex), stage(made.modules[1], fragment)];
+        let info = vk::GraphicsPipelineCreateInfo::default()
+            .flags(vk::PipelineCreateFlags::CAPTURE_STATISTICS_KHR)
+            .stages(&stages)
+            .layout(made.layout);
+        made.pipeline = make_graphics(&self.raw, vk::PipelineCache::null(), fragment.name, info, state)?;
+        Ok([self.ask(vertex, made.pipeline)?, self.ask(fragment, made.pipeline)?])
+    }
+
+    /// What became of `shader`, which is of `pipeline`.
     fn ask(&self, shader: &Shader, pipeline: vk::Pipeline) -> Result<CompiledShader> {
         let info = vk::PipelineInfoKHR::default().pipeline(pipeline);
         // SAFETY: the pipeline is alive and this device's, which was made with the extension and its feature.
         let executables = call("vkGetPipelineExecutablePropertiesKHR", shader.name, || unsafe {
             self.executables.get_pipeline_executable_properties(&info)
         })?;
-        // A compute pipeline is one executable.
-        let executable = executables.first().ok_or_else(|| shader.refuse("the driver made nothing of it"))?;
-        let info = vk::PipelineExecutableInfoKHR::default().pipeline(pipeline).executable_index(0);
+        let is_made_of_it = |made: &vk::PipelineExecutablePropertiesKHR| made.stages.contains(shader.stage.flags());
+        let index = executables.iter().position(is_made_of_it);
+        let index = index.ok_or_else(|| shader.refuse("the driver made nothing of it"))?;
+        let info = vk::PipelineExecutableInfoKHR::default().pipeline(pipeline).executable_index(index as u32);
         // SAFETY: as above, and the pipeline was made to have statistics captured.
         let statistics = call("vkGetPipelineExecutableStatisticsKHR", shader.name, || unsafe {
             self.executables.get_pipeline_executable_statistics(&info)
@@ -109,7 +130,7 @@ impl CompilingDevice {
             (name.unwrap_or_default(), value_of(statistic))
         };
         Ok(CompiledShader {
-            subgroup_size: executable.subgroup_size,
+            subgroup_size: executables[index].subgroup_size,
             statistics: statistics.iter().map(statistic).collect(),
         })
     }
@@ -140,20 +161,34 @@ fn value_of(statistic: &vk::PipelineExecutableStatisticKHR) -> f64 {
 struct Made<'a> {
     set_layout: vk::DescriptorSetLayout,
     layout: vk::PipelineLayout,
-    module: vk::ShaderModule,
+    modules: Vec<vk::ShaderModule>,
     pipeline: vk::Pipeline,
     device: &'a ash::Device,
 }
 
 impl<'a> Made<'a> {
-    fn nothing(device: &'a ash::Device) -> Self {
-        Self {
-            set_layout: vk::DescriptorSetLayout::null(),
+    /// The layouts that `shaders` declare together, and the module of each.
+    fn but_the_pipeline(device: &'a ash::Device, shaders: &[(&Shader, &Interface)]) -> Result<Self> {
+        let name = shaders.last().map_or("", |(shader, _)| shader.name);
+        let Declared { bindings, stages, push_constant_bytes } = Declared::by(shaders)?;
+        // Destroyed with this from here on, whatever fails.
+        let mut made = Self {
+            set_layout: set_layout(device, name, &bindings, stages)?,
             layout: vk::PipelineLayout::null(),
-            module: vk::ShaderModule::null(),
+            modules: Vec::new(),
             pipeline: vk::Pipeline::null(),
             device,
+        };
+        made.layout = layout_of(device, name, made.set_layout, push_constant_bytes, stages)?;
+        for (shader, _) in shaders {
+            let words = shader.words();
+            let info = vk::ShaderModuleCreateInfo::default().code(&words);
+            // SAFETY: the words come from the GLSL compiler, as those of every shader.
+            let module =
+                call("vkCreateShaderModule", shader.name, || unsafe { device.create_shader_module(&info, None) })?;
+            made.modules.push(module);
         }
+        Ok(made)
     }
 }
 
@@ -162,7 +197,7 @@ impl Drop for Made<'_> {
         // SAFETY: all of it was made by this device and never submitted; what was not made is null, which is allowed.
         unsafe {
             self.device.destroy_pipeline(self.pipeline, None);
-            self.device.destroy_shader_module(self.module, None);
+            self.modules.iter().for_each(|module| self.device.destroy_shader_module(*module, None));
             self.device.destroy_pipeline_layout(self.layout, None);
             self.device.destroy_descriptor_set_layout(self.set_layout, None);
         }

@@ -30,6 +30,7 @@ The JSON is a list of rows with these fields, in this order:
   frame_ms                                          from recording until the picture is read back
   lookups, covered_pixels                           lookups in the environment, and pixels that see a surface
   settings                                          width, height, subpixels, seed, repeat and whole_picture of the run
+  shard                                             only with --shard: which part it is of
   expected_rms                                      only with --expected: what rms was expected to be
 
 The plots are SVG, log-log, a line a method: rms_over_threads.svg (the paper's figure 12) and rms_over_gpu_ms.svg, and
@@ -43,7 +44,7 @@ pub struct BenchError {
     #[command(flatten)]
     cases: CasesArguments,
     /// Measure only part I, from 1, of N of the combinations of materials and environments; `bench report --from` puts parts together.
-    #[arg(long, value_name = "I/N", value_parser = parse_shard)]
+    #[arg(long, value_name = "I/N")]
     shard: Option<Shard>,
     #[command(flatten)]
     truth: TruthArguments,
@@ -71,11 +72,7 @@ impl BenchError {
             size: None,
         })?;
         cases.shard = self.shard.unwrap_or(Shard::WHOLE);
-        if cases.place_count() == 0 {
-            let most = cases.materials.len() * cases.environments.len();
-            let problem = format!("leaves this part without any of {most} combinations of materials and environments");
-            return Err(Error::input("--shard", problem, format!("use at most {most} parts")).into());
-        }
+        cases.check_shard()?;
         let sweep = Sweep {
             cases,
             repeat: self.repeat,
@@ -115,11 +112,4 @@ pub(super) fn write_files(rows: &[Row], output: &OutputArguments) -> anyhow::Res
         plots::write(&plots::error_charts(rows).into_iter().chain(expectations).collect::<Vec<_>>(), folder)?;
     }
     Ok(())
-}
-
-/// `2/8`.
-fn parse_shard(text: &str) -> Result<Shard, String> {
-    let numbers = text.split_once('/').and_then(|(number, count)| Some((number.parse().ok()?, count.parse().ok()?)));
-    let shard = numbers.and_then(|(number, count)| Shard::new(number, count));
-    shard.ok_or_else(|| "use part/parts, such as 2/8 for the second of eight".to_owned())
 }

@@ -13,7 +13,7 @@ use threadlight::low_level::output;
 use threadlight::low_level::vulkan::{CompilingDevice, Instance};
 
 const EXAMPLES: &str = "\
-Without --method, shaders of all methods are compiled; and always those of the other passes that compute, and bare lookups.
+Without --method, shaders of all methods are compiled; and always those of the other passes, and bare lookups.
 
 Examples:
   threadlight bench shaders

@@ -162,6 +162,10 @@ fn lights() -> Vec<Case> {
         Case::lit("1e6 in a corner of the cube", map, spot(24, 9)),
         Case::lit("1e6 in all corners of the cube", map, corners),
         Case::lit("a thousand lamps", [128, 64], |x, y| if (x * 37 + y * 101) % 8 == 0 { 300.0 } else { 0.1 }),
+        Case::lit("a wide lamp and a long one", [128, 64], |x, y| match (x, y) {
+            (20..34, 12..22) | (60..100, 40..42) => 2e3,
+            _ => 0.5,
+        }),
         Case::lit("map of 1 x 1", [1, 1], constant(1.0)),
         Case::lit("map of 3 x 2", [3, 2], |x, y| (x + 3 * y) as f32),
         Case::lit("map of 8192 x 4096", [8192, 4096], |x, y| ((x * 7 + y * 13) % 17) as f32),

@@ -30,7 +30,7 @@ mod validate;
 pub use draft::draft;
 pub use generate::generate;
 pub(super) use sets::set_count;
-pub use table::{FittedTable, PackedKernel, UnpackedKernel};
+pub use table::{FittedTable, PackedKernel, UnpackedKernel, UsedThreads};
 pub use validate::validation_error;
 
 /// Most fitted threads that a table can have.

@@ -1,15 +1,15 @@
 //! How many sets threads are made in, each of which does alone: the partition of the paper's section 4.2.
-use crate::brdf::{Brdf, half_vector_width};
+use crate::brdf::{Brdf, LobeShape};
 
 /// Fewest threads of a set of an anisotropic BRDF, if it has as many: fewer leave gaps in a long lobe. Of a metal of roughness_alpha
 /// 0.05 x 0.3, 4 threads err by 0.066 of the radiance, 8 by 0.024, 16 by 0.010.
 const FEWEST_OF_LONG_LOBE: usize = 8;
 
-/// In how many sets `count` threads of `brdf` are made for a picture of `subpixels` x `subpixels` to the pixel: a set for each sub-pixel as
+/// In how many sets `count` threads of a BRDF of this lobe are made for a picture of `subpixels` x `subpixels` to the pixel: a set for each sub-pixel as
 /// far as there are threads, so that they are `count` lookups of the pixel.
-pub fn set_count(brdf: &Brdf, count: usize, subpixels: u32) -> usize {
+pub fn set_count(lobe: &LobeShape, count: usize, subpixels: u32) -> usize {
     let subpixels = (subpixels * subpixels) as usize;
-    let fewest = if subpixels == 1 || brdf.is_isotropic() { 1 } else { FEWEST_OF_LONG_LOBE };
+    let fewest = if subpixels == 1 || lobe.is_isotropic { 1 } else { FEWEST_OF_LONG_LOBE };
     (count / fewest).clamp(1, subpixels)
 }
 
@@ -21,5 +21,6 @@ const NARROW_RAD: f64 = 0.01;
 /// free threads are so sharp that all pixels pay for looking that up: 26 ms become 35 with 16 threads of alumina-oxide on a dragon. Nor of
 /// an anisotropic BRDF, whose fits take ten times as long.
 pub fn pixels_have_own(brdf: &Brdf) -> bool {
-    brdf.is_isotropic() && half_vector_width(brdf) >= NARROW_RAD
+    let lobe = LobeShape::of(brdf);
+    lobe.is_isotropic && lobe.width_rad >= NARROW_RAD
 }

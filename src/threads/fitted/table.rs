@@ -147,9 +147,8 @@ impl FittedTable {
         if weights > 0.0 { (squares / weights).sqrt() } else { self.relative_error.first().copied().unwrap_or(0.0) }
     }
 
-    /// The threads in the order of the device, with the sharpest level that each has in any row. In each set those that have weight in some row
-    /// are first, and of these the sharpest; what follows the last that has weight in any set is left out. A diffuse material has none.
-    fn used(&self) -> Vec<(usize, f32)> {
+    /// The threads that the device has. A diffuse material has none.
+    pub fn used(&self) -> UsedThreads<'_> {
         let of_thread = |thread: usize| {
             let kernels = self.kernels.iter().skip(thread).step_by(self.count).map(|kernel| kernel.unpack());
             let [mut has_weight, mut sharpest] = [0.0, f32::INFINITY];
@@ -167,28 +166,7 @@ impl FittedTable {
         let sets: Vec<_> = (0..self.sets).map(of_set).collect();
         let mut used: Vec<_> = (0..self.count).map(|place| sets[place % self.sets][place / self.sets]).collect();
         used.truncate(used.iter().rposition(|(_, sharpest)| sharpest.is_finite()).map_or(0, |last| last + 1));
-        used
-    }
-
-    /// How many threads there are on the device: up to the last one that has weight in some row.
-    pub fn used_count(&self) -> usize {
-        self.used().len()
-    }
-
-    /// How many of them, up to the last one that does, look up the environment as it is in some row, where its pyramid begins at `level`.
-    pub fn sharp_count(&self, level: f32) -> usize {
-        let is_sharp = |&(_, sharpest): &(usize, f32)| sharpest.is_finite() && sharp_part(sharpest, level) > 0.0;
-        self.used().iter().rposition(is_sharp).map_or(0, |last| last + 1)
-    }
-
-    /// The buffer of the shader. Row by row: the albedo, then the kernels that are used, those of threads that are sharp anywhere first.
-    pub fn device_words(&self) -> Vec<u32> {
-        let used = &self.used();
-        let row = |(row, albedo): (usize, &[f32; 3])| {
-            let kernels = used.iter().map(move |&(thread, _)| self.row(row)[thread].0);
-            std::iter::once(albedo.map(f32::to_bits)).chain(kernels)
-        };
-        self.albedo.iter().enumerate().flat_map(row).flatten().collect()
+        UsedThreads { table: self, threads: used }
     }
 
     /// Words of a row in a file, besides its threads.
@@ -241,5 +219,35 @@ impl FittedTable {
             kernels,
             of_subpixels: None,
         }
+    }
+}
+
+/// The threads of a table in the order of the device. In each set those that have weight in some row are first, and of these the sharpest;
+/// what follows the last that has weight in any set is left out.
+pub struct UsedThreads<'a> {
+    table: &'a FittedTable,
+    /// With the sharpest level that each has in any row; an infinite one of those without weight.
+    threads: Vec<(usize, f32)>,
+}
+
+impl UsedThreads<'_> {
+    /// How many there are.
+    pub fn count(&self) -> usize {
+        self.threads.len()
+    }
+
+    /// How many of them, up to the last one that does, look up the environment as it is in some row, where its pyramid begins at `level`.
+    pub fn sharp_count(&self, level: f32) -> usize {
+        let is_sharp = |&(_, sharpest): &(usize, f32)| sharpest.is_finite() && sharp_part(sharpest, level) > 0.0;
+        self.threads.iter().rposition(is_sharp).map_or(0, |last| last + 1)
+    }
+
+    /// The buffer of the shader. Row by row: the albedo, then their kernels.
+    pub fn device_words(&self) -> Vec<u32> {
+        let row = |(row, albedo): (usize, &[f32; 3])| {
+            let kernels = self.threads.iter().map(move |&(thread, _)| self.table.row(row)[thread].0);
+            std::iter::once(albedo.map(f32::to_bits)).chain(kernels)
+        };
+        self.table.albedo.iter().enumerate().flat_map(row).flatten().collect()
     }
 }

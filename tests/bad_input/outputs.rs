@@ -1,0 +1,33 @@
+//! Files that cannot be written, and those from before.
+use crate::{refuses, render, workplace};
+use std::fs;
+
+#[test]
+fn outputs_that_cannot_be_written_are_refused_before_any_work() {
+    let folder = workplace();
+    fs::create_dir(folder.path().join("folder.png")).unwrap();
+    fs::write(folder.path().join("file"), "").unwrap();
+    for (flags, name) in [
+        ("-o absent/image.png", "absent/image.png"),
+        ("-o folder.png", "folder.png"),
+        ("-o file/image.png", "file/image.png"),
+        ("-o out/image.jpg", "image.jpg"),
+        ("-o out/image", "out/image"),
+        ("-o out/image.png --stats absent/stats.json", "absent/stats.json"),
+        ("-o out/image.png --stats folder.png", "folder.png"),
+    ] {
+        refuses(&folder, &format!("render --threads 1 {flags}"), &[name]);
+    }
+    refuses(&folder, "threads gold -o absent/gold.threads", &["absent/gold.threads"]);
+    refuses(&folder, "threads gold -o out/gold.threads --plot absent/gold.png", &["absent/gold.png"]);
+    // Nothing was computed in vain.
+    assert!(!folder.path().join("cache").exists());
+}
+
+#[test]
+fn a_picture_from_before_survives_a_refusal() {
+    let folder = workplace();
+    fs::write(folder.path().join("out/image.png"), "precious").unwrap();
+    refuses(&folder, &render("--mesh missing.obj"), &["missing.obj"]);
+    assert_eq!(fs::read(folder.path().join("out/image.png")).unwrap(), b"precious");
+}
