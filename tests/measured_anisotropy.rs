@@ -208,7 +208,7 @@ fn threads_shade_measured_anisotropy_and_what_needs_the_brdf_in_a_shader_refuses
     let comparable = |radiance: &[[f32; 4]]| Comparable::from_radiance(40, 30, radiance, true, display);
     let rms = compare(&comparable(&rendering.radiance), &comparable(&truth.radiance), true).unwrap().rms;
     println!("2 threads: RMS {rms:.5}");
-    assert!(rms < 0.03, "{rms}");
+    assert!(rms < 0.045, "{rms}");
 
     for method in ["importance", "mis"] {
         let prepared = ready(&scene(&file, method, 4));
