@@ -313,7 +313,7 @@ impl Prepared {
     }
 
     /// The light as the method shades by it. What it shades by kernels alone has its small sources among all other light: so it
-    /// is where the BRDF of a material, by which it would shade them, is none that shaders can evaluate. A notice says so.
+    /// is where the BRDF of a material, by which it would shade them, is none that shaders can evaluate.
     ///
     /// # Errors
     /// Cancelled.
@@ -322,12 +322,7 @@ impl Prepared {
         let are_kernels = method.threads().is_some_and(ThreadKind::are_kernels);
         let mut unknown = materials.iter().filter(|material| !material.brdf.has_shader_form(&material.lobe));
         match unknown.next().filter(|_| are_kernels && method.evaluates_brdf(environment)) {
-            Some(PreparedMaterial { name, .. }) => {
-                tracing::warn!(
-                    "\"{name}\" is anisotropic, and shaders have no form of it: lamps are left to threads, which blur them"
-                );
-                round.ask(&LeaveSources(environment))
-            }
+            Some(PreparedMaterial { name, .. }) => round.ask(&LeaveSources { environment, material: name }),
             None => Ok(environment.clone()),
         }
     }

@@ -101,19 +101,28 @@ impl Step for Part<'_> {
     }
 }
 
-/// An environment whose small sources are left to kernels.
-pub struct LeaveSources<'a>(pub &'a Keyed<Environment>);
+/// An environment whose small sources are left to kernels. A notice says so when it is made, not at each frame that has it.
+pub struct LeaveSources<'a> {
+    /// Which one.
+    pub environment: &'a Keyed<Environment>,
+    /// The name of a material that is why.
+    pub material: &'a str,
+}
 
 impl Step for LeaveSources<'_> {
     type Output = Environment;
     const NAME: &'static str = "sources";
 
     fn key(&self, _: &Memo) -> Result<Key> {
-        Ok(Key::builder("sources left in").key(self.0.key).build())
+        Ok(Key::builder("sources left in").key(self.environment.key).build())
     }
 
     fn make(&self, _: &Round) -> Result<Environment> {
-        Ok(self.0.with_sources_left_in())
+        let name = self.material;
+        tracing::warn!(
+            "\"{name}\" is anisotropic, and shaders have no form of it: lamps are left to threads, which blur them"
+        );
+        Ok(self.environment.with_sources_left_in())
     }
 }
 
