@@ -83,7 +83,7 @@ impl Lookups {
 macro_rules! methods {
     ($($name:ident => $Method:ident: $properties:expr,)+) => {
         /// A way to estimate the radiance that leaves a surface; [`Method::summary`] says which.
-        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
         pub enum Method {
             $(#[doc = concat!("Method `", stringify!($name), "`.")] $Method,)+
             /// Quadrature on the CPU: the truth.

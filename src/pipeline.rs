@@ -231,6 +231,11 @@ impl Rendering {
     pub fn gpu_ms(&self) -> f64 {
         self.passes.iter().filter(|pass| !pass.is_readback()).map(|pass| pass.gpu_ms).sum()
     }
+
+    /// Time on the GPU of pass 2 alone, in milliseconds.
+    pub fn shade_ms(&self) -> f64 {
+        self.passes.iter().filter(|pass| pass.name == "shade").map(|pass| pass.gpu_ms).sum()
+    }
 }
 
 impl PassTime {

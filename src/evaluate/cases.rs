@@ -1,4 +1,5 @@
 //! What evaluations go through: every material in every environment in every scene, by every method at every count.
+use std::collections::BTreeMap;
 use std::fmt;
 use std::ops::Range;
 use std::str::FromStr;
@@ -162,7 +163,7 @@ impl Cases {
         let mut environments = Vec::new();
         for (index, (name, source)) in self.environments.iter().enumerate() {
             if (0..self.materials.len()).any(|material| self.has(material, index)) {
-                environments.push((index, name, round.ask(&LoadEnvironment(source))?, None));
+                environments.push((index, name, round.ask(&LoadEnvironment(source))?, BTreeMap::new()));
             }
         }
         let mut scenes = Vec::new();
@@ -181,7 +182,7 @@ impl Cases {
                 std::mem::swap(&mut prepared.materials, &mut material);
                 prepared.place_tangents(&round)?;
                 let own = environments.iter_mut().filter(|(environment, ..)| self.has(number, *environment));
-                for (_, environment_name, environment, renderer) in own {
+                for (_, environment_name, environment, renderers) in own {
                     observer.check()?;
                     std::mem::swap(&mut prepared.environment, environment);
                     visit(&mut Place {
@@ -193,7 +194,7 @@ impl Cases {
                         memo,
                         cases: self,
                         tables: &mut tables,
-                        renderer,
+                        renderers,
                         observer,
                     })?;
                     std::mem::swap(&mut prepared.environment, environment);
@@ -239,8 +240,9 @@ pub struct Place<'a> {
     cases: &'a Cases,
     /// The threads made for the material so far.
     tables: &'a mut Vec<Keyed<Threads>>,
-    /// The last renderer in the environment: what the next one has in common with it is filtered, uploaded and compiled once.
-    renderer: &'a mut Option<DeviceScene>,
+    /// The last renderer in the environment by each method: what the next ones have in common with these is filtered, uploaded and
+    /// compiled once.
+    renderers: &'a mut BTreeMap<Method, DeviceScene>,
     observer: &'a dyn Observer,
 }
 
@@ -272,7 +274,7 @@ impl Place<'_> {
     /// As for [`DeviceScene::new`].
     pub fn renderer(&mut self, device: &Arc<Device>) -> Result<DeviceScene> {
         let renderer = DeviceScene::new(device, self.prepared, &self.round())?;
-        *self.renderer = Some(renderer.clone());
+        self.renderers.insert(self.prepared.method, renderer.clone());
         Ok(renderer)
     }
 }

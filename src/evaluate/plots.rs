@@ -82,7 +82,7 @@ enum Drawn {
     Points,
 }
 
-/// RMS over the number of threads, `rms_over_threads`, and over time on the GPU, `rms_over_gpu_ms`: a line a method, means over
+/// RMS over the number of threads, `rms_over_threads`, and over the time of shading, `rms_over_shade_ms`: a line a method, means over
 /// all rows; and where there are several materials, the same for each, its name in front.
 pub fn error_charts(rows: &[Row]) -> Vec<Chart> {
     let materials = in_order(rows.iter().map(|row| &row.material));
@@ -97,10 +97,10 @@ pub fn error_charts(rows: &[Row]) -> Vec<Chart> {
         }
     }
     let threads = Axis { label: "threads or samples".to_owned(), ticks: counts(rows.iter().map(|row| row.threads)) };
-    let time = Axis { label: "time on the GPU, ms".to_owned(), ticks: Vec::new() };
+    let time = Axis { label: "time of shading, ms".to_owned(), ticks: Vec::new() };
     let over_threads: fn(&Row) -> f64 = |row| f64::from(row.threads);
-    let over_time: fn(&Row) -> f64 = |row| row.gpu_ms;
-    let axes = [("rms_over_threads", threads, over_threads), ("rms_over_gpu_ms", time, over_time)];
+    let over_time: fn(&Row) -> f64 = |row| row.shade_ms;
+    let axes = [("rms_over_threads", threads, over_threads), ("rms_over_shade_ms", time, over_time)];
     let mut charts = Vec::new();
     for (prefix, subject, rows) in subjects {
         for (name, axis, value) in &axes {
@@ -184,7 +184,7 @@ pub fn speed_charts(timings: &Timings) -> Vec<Chart> {
             label: "threads or samples".to_owned(),
             ticks: counts(timings.frames.iter().map(|frame| frame.threads)),
         },
-        y: Axis { label: "time on the GPU, ms".to_owned(), ticks: Vec::new() },
+        y: Axis { label: "time of shading, ms".to_owned(), ticks: Vec::new() },
         curves,
     }];
     let times = |label: &str| Axis { label: label.to_owned(), ticks: (0..8).map(|power| 2_f64.powi(power)).collect() };
@@ -361,7 +361,7 @@ mod tests {
     #[test]
     fn curves_are_means_by_count_in_rising_order() {
         let rows = rows();
-        let curves = error_curves(&rows.iter().rev().collect::<Vec<_>>(), |row| row.gpu_ms);
+        let curves = error_curves(&rows.iter().rev().collect::<Vec<_>>(), |row| row.shade_ms);
         let paper = curves.iter().find(|curve| curve.name == "paper").unwrap();
         let expected = [(0.61, 0.3), (2.26, 0.3 * 16_f64.powf(-0.7)), (11.5, 0.3 * 100_f64.powf(-0.7))];
         for ((x, y), (expected_x, expected_y)) in paper.points.iter().zip(expected) {
@@ -382,14 +382,14 @@ mod tests {
                 assert!(svg.contains(text), "{} lacks {text}", path.display());
             }
         }
-        assert!(folder.join("shiny_rms_over_gpu_ms.svg").exists());
+        assert!(folder.join("shiny_rms_over_shade_ms.svg").exists());
     }
 
     #[test]
     fn charts_of_nothing_of_one_point_and_of_zeros_are_charts() {
         let folder = tempfile::tempdir().unwrap();
         let one = rows().remove(0);
-        let zero = Row { rms: 0.0, gpu_ms: 0.0, ..one.clone() };
+        let zero = Row { rms: 0.0, shade_ms: 0.0, ..one.clone() };
         for rows in [vec![], vec![one], vec![zero]] {
             write(&error_charts(&rows), folder.path()).unwrap();
         }

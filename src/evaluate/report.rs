@@ -161,14 +161,14 @@ fn all_rows(rows: &[Row]) -> Markup {
                     thead { tr {
                         @for head in [
                             "method", "threads", "environment", "scene", "rms", "rms linear", "ssim", "flip", "max", "nan",
-                            "gpu ms", "frame ms", "lookups", "a pixel",
+                            "gpu ms", "shade ms", "frame ms", "lookups", "a pixel",
                         ] { th { (head) } }
                     } }
                     tbody { @for row in rows.iter().filter(|row| row.material == *material) { tr {
                         td { (row.method) } td { (row.threads) } td { (row.environment) } td { (row.scene) }
                         @for value in [row.rms, row.rms_linear, row.ssim, row.flip, row.max] { td { (format!("{value:.5}")) } }
                         td { (row.nan) }
-                        @for ms in [row.gpu_ms, row.frame_ms] { td { (format!("{ms:.3}")) } }
+                        @for ms in [row.gpu_ms, row.shade_ms, row.frame_ms] { td { (format!("{ms:.3}")) } }
                         td { (row.lookups) } td { (format!("{:.1}", row.lookups_a_pixel())) }
                     } } }
                 } } }

@@ -71,6 +71,9 @@ pub struct Row {
     /// Pixels that see a surface; 0 in measurements that were written before this was counted.
     #[serde(default)]
     pub covered_pixels: u64,
+    /// What of `gpu_ms` is shading: the rest hardly depends on the method. 0 in measurements that were written before this was kept.
+    #[serde(default)]
+    pub shade_ms: f64,
     /// How it was measured; none in measurements that were written before this was kept.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub settings: Option<Settings>,
@@ -210,6 +213,7 @@ fn row(place: &Place, metrics: &Metrics, rendering: &Rendering) -> Row {
         frame_ms: rendering.frame_ms,
         lookups: rendering.lookups,
         covered_pixels: rendering.counters.covered_pixels(),
+        shade_ms: rendering.shade_ms(),
         settings: None,
         shard: None,
         expected_rms: None,

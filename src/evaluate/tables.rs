@@ -60,8 +60,8 @@ pub fn text(sections: &[Section]) -> String {
 /// Tables for each material where there are several (the paper's tables 2 and 3), and over all of them (table 4).
 ///
 /// Each has the mean RMS and SSIM over its environments and scenes; the last also FLIP, the largest RMS of any material,
-/// environment and scene, lookups for each pixel that sees a surface, the mean time on the GPU, that of other methods at the error of
-/// fitted threads, and how good expectations were.
+/// environment and scene, lookups for each pixel that sees a surface, the mean time on the GPU, that of shading alone, that of other
+/// methods at the error of fitted threads, and how good expectations were.
 pub fn error_tables(rows: &[Row]) -> Vec<Section> {
     let materials = in_order(rows.iter().map(|row| &row.material));
     let places = in_order(rows.iter().map(|row| (&row.environment, &row.scene))).len();
@@ -87,6 +87,7 @@ pub fn error_tables(rows: &[Row]) -> Vec<Section> {
     tables.push(error_table("RMS, worst", &rows, largest, |row| row.rms, 5));
     tables.push(error_table("lookups/pixel", &rows, mean, Row::lookups_a_pixel, 1));
     tables.push(error_table("GPU ms", &rows, mean, |row| row.gpu_ms, 3));
+    tables.push(error_table("shade ms", &rows, mean, |row| row.shade_ms, 3));
     tables.extend(equal_error_table(&rows));
     tables.extend(expectation_table(&rows));
     sections.push(Section { title: format!("{title}{over_places}"), tables });
@@ -114,12 +115,12 @@ fn error_table(
     }
 }
 
-/// How many times as long as fitted threads the other methods take for the same error: a column for each count of fitted threads, in
+/// How many times as long as fitted threads the other methods shade for the same error: a column for each count of fitted threads, in
 /// which time and RMS are means over all rows. Between the counts of a method, time is a power of the error. A method that is still
 /// worse at the highest of its counts takes longer (`>`) than that does; one that is better with its lowest, less (`<`).
 fn equal_error_table(rows: &[&Row]) -> Option<Table> {
     let curve = |method: &str| -> Vec<(u32, f64, f64)> {
-        let (errors, times) = (by_count(rows, method, |row| row.rms), by_count(rows, method, |row| row.gpu_ms));
+        let (errors, times) = (by_count(rows, method, |row| row.rms), by_count(rows, method, |row| row.shade_ms));
         errors.iter().zip(times.values()).map(|((&count, rms), ms)| (count, mean(rms), mean(ms))).collect()
     };
     let fitted = curve(Method::Fitted.name());
@@ -134,7 +135,7 @@ fn equal_error_table(rows: &[&Row]) -> Option<Table> {
         (method.clone(), fitted.iter().map(cell).collect())
     };
     let table = Table {
-        title: "time, same RMS".to_owned(),
+        title: "shade, same RMS".to_owned(),
         head: fitted.iter().map(|(count, ..)| count.to_string()).collect(),
         rows: others.map(row).collect(),
     };
@@ -293,6 +294,7 @@ pub(super) mod tests {
                             frame_ms: 1.0 + cost * f64::from(threads),
                             lookups: u64::from(threads) * 1000,
                             covered_pixels: 800,
+                            shade_ms: 0.11 + cost * f64::from(threads),
                             settings: None,
                             shard: None,
                             expected_rms: None,
@@ -335,17 +337,20 @@ mean of 2 materials, mean over 2 lights and scenes
   GPU ms                 1        16       100
   paper              0.610     2.260    11.500
   uniform            0.570     1.620     7.500
+  shade ms               1        16       100
+  paper              0.220     1.870    11.110
+  uniform            0.180     1.230     7.110
 ";
         assert!(text.ends_with(expected), "{text}");
     }
 
     #[test]
     fn times_are_compared_at_equal_error() {
-        let row = |method: &str, threads: u32, rms: f64, gpu_ms: f64| Row {
+        let row = |method: &str, threads: u32, rms: f64, shade_ms: f64| Row {
             method: method.into(),
             threads,
             rms,
-            gpu_ms,
+            shade_ms,
             ..rows()[0].clone()
         };
         let rows = [
@@ -359,7 +364,7 @@ mean of 2 materials, mean over 2 lights and scenes
         // Between its counts: 3 * 100^log10(0.1 / 0.02) = 75 ms, against 2.
         assert!(
             text.contains(
-                "time, same RMS         1         4        16\n  paper               <3.0      37.5     >75.0\n"
+                "shade, same RMS        1         4        16\n  paper               <3.0      37.5     >75.0\n"
             ),
             "{text}"
         );
@@ -415,6 +420,7 @@ mean of 2 materials, mean over 2 lights and scenes
             "frame_ms",
             "lookups",
             "covered_pixels",
+            "shade_ms",
         ];
         let places: Vec<_> = names.iter().map(|name| json.find(&format!("\"{name}\":")).unwrap()).collect();
         assert!(places.is_sorted(), "{json}");

@@ -20,8 +20,8 @@ Examples:
 
 Each picture is compared with the reference picture of its material, environment and scene, over the pixels that see a
 surface. Tables are printed: mean RMS and SSIM for each material (the paper's tables 2 and 3), and over all of them
-(table 4) with FLIP, the worst RMS, lookups for each pixel that sees a surface, the time on the GPU and, where fitted threads
-were measured, how many times as long as they the other methods take for the same RMS.
+(table 4) with FLIP, the worst RMS, lookups for each pixel that sees a surface, the time on the GPU, that of
+shading alone and, where fitted threads were measured, how many times as long as they the other methods shade for the same RMS.
 
 The JSON is a list of rows with these fields, in this order:
   method, threads, material, environment, scene     what was measured
@@ -29,12 +29,13 @@ The JSON is a list of rows with these fields, in this order:
   gpu_ms                                            time of the passes that make linear radiance
   frame_ms                                          from recording until the picture is read back
   lookups, covered_pixels                           lookups in the environment, and pixels that see a surface
+  shade_ms                                          what of gpu_ms is shading
   settings                                          width, height, subpixels, seed, repeat and whole_picture of the run
   shard                                             only with --shard: which part it is of
   expected_rms                                      only with --expected: what rms was expected to be
 
-The plots are SVG, log-log, a line a method: rms_over_threads.svg (the paper's figure 12) and rms_over_gpu_ms.svg, and
-where there are several materials, MATERIAL_rms_over_threads.svg and MATERIAL_rms_over_gpu_ms.svg; with --expected, also
+The plots are SVG, log-log, a line a method: rms_over_threads.svg (the paper's figure 12) and rms_over_shade_ms.svg, and
+where there are several materials, MATERIAL_rms_over_threads.svg and MATERIAL_rms_over_shade_ms.svg; with --expected, also
 expected_over_measured.svg.";
 
 /// Measures RMS, SSIM, FLIP and time on the GPU against the reference. Lists are separated by commas.
