@@ -169,7 +169,7 @@ fn the_parts_of_a_sweep_together_are_the_whole() {
         let mut is_time = false;
         let kept = text.lines().filter(is_kept).filter(|line| {
             if line.split("  ").any(|cell| cell.trim() == "1") {
-                is_time = line.contains(" ms ") || line.contains("shade,");
+                is_time = line.contains(" ms ") || line.contains("time,");
             }
             !is_time
         });

@@ -125,31 +125,55 @@ vec2 risen(float z, float deviation) {
     return vec2(above * above / (4.0 * half_side), 0.5 * above);
 }
 
-// Adds a source.
+// Point i of side x side on a square of light of variance 1, and its weight: Gauss and Legendre's; of a square that sets the middles of
+// equal parts, for what has risen of these adds up to what has risen of it.
+vec3 on_square(int i, int side, bool sets) {
+    vec2 place = vec2(i % side, i / side) - 0.5 * float(side - 1);
+    if (sets || side == 1) {
+        return vec3(sqrt(12.0) / float(side) * place, 1.0 / float(side * side));
+    }
+    if (side == 2) {
+        return vec3(2.0 * place, 0.25);
+    }
+    vec2 weights = mix(vec2(4.0 / 9.0), vec2(2.5 / 9.0), notEqual(place, vec2(0.0)));
+    return vec3(sqrt(3.0 * 0.6) * place, weights.x * weights.y);
+}
+
+// Point i of four on the same square, a quarter of it each: equal steps up, by turns to both sides as far as its standard deviation.
+vec3 on_stairs(int i, vec2 up) {
+    float to_side = i == 0 || i == 3 ? 1.0 : -1.0;
+    return vec3(sqrt(12.0) / 4.0 * (float(i) - 1.5) * up + to_side * vec2(-up.y, up.x), 0.25);
+}
+
+// Adds a source, as a square of its variance.
 void add_source(inout AtSources sum, Source source, float clear, Surface surface, Material material, vec3 w_o) {
     vec3 n = surface.frame[2];
-    float deviation = length(vec2(dot(source.axis[0].xyz, n), dot(source.axis[1].xyz, n)));
-    // None of it has risen: the points below are at most sqrt(3.6) deviations away, and light around them reaches sqrt(3) further.
-    if (dot(source.direction.xyz, n) < -4.0 * deviation) {
+    float z = dot(source.direction.xyz, n);
+    vec2 slope = vec2(dot(source.axis[0].xyz, n), dot(source.axis[1].xyz, n));
+    float deviation = length(slope);
+    float lowest = z - sqrt(3.0) * deviation;
+    if (z + sqrt(3.0) * deviation <= 0.0) {
         return;
     }
-    // Gauss and Legendre's points on a square of the source's variance: fewer from afar, where f changes less within it. Tails of
-    // Gaussian lobes go on falling steeply, so only from very far does the middle alone do.
+    // Tails of Gaussian lobes go on falling steeply, so only from very far does the middle alone do. Near the horizon f cos of measured
+    // materials bends within a few degrees of theta_i: four steps up there, for wide light also higher up.
     int side = clear > 40.0 ? 1 : clear > FAR ? 2 : 3;
+    bool is_low = clear > FAR && lowest < (side == 1 ? 20.0 * deviation : 0.3);
+    // Light straight above has no slope.
+    vec2 up = slope / max(deviation, 1e-6);
+    int count = is_low ? 4 : side * side;
     int i = 0;
     do {
-        vec2 place = vec2(i % side, i / side) - 0.5 * float(side - 1);
-        vec2 at = (side == 2 ? 2.0 : sqrt(3.0 * 0.6)) * place;
-        vec2 weights = side == 3 ? mix(vec2(4.0 / 9.0), vec2(2.5 / 9.0), notEqual(place, vec2(0.0))) : vec2(1.0 / float(side));
+        vec3 at = is_low ? on_stairs(i, up) : on_square(i, side, lowest < 0.0);
         vec3 w_i = normalize((source.direction.xyz + at.x * source.axis[0].xyz + at.y * source.axis[1].xyz) * surface.frame);
-        vec2 above = risen(w_i.z, deviation / float(side));
+        vec2 above = risen(w_i.z, deviation / float(is_low ? 4 : side));
         if (above.x > 0.0) {
-            vec3 power = weights.x * weights.y * above.x * source.power.rgb;
+            vec3 power = at.z * above.x * source.power.rgb;
             w_i = normalize(vec3(w_i.xy, above.y));
             sum.f_cos += power * brdf_at(surface, material, w_i, w_o);
             sum.cosine += power;
         }
-    } while (++i < side * side);
+    } while (++i < count);
 }
 
 AtSources at_sources(Surface surface, Material material, Lobe lobe) {

@@ -363,7 +363,7 @@ mod tests {
         let rows = rows();
         let curves = error_curves(&rows.iter().rev().collect::<Vec<_>>(), |row| row.shade_ms);
         let paper = curves.iter().find(|curve| curve.name == "paper").unwrap();
-        let expected = [(0.61, 0.3), (2.26, 0.3 * 16_f64.powf(-0.7)), (11.5, 0.3 * 100_f64.powf(-0.7))];
+        let expected = [(0.22, 0.3), (1.87, 0.3 * 16_f64.powf(-0.7)), (11.11, 0.3 * 100_f64.powf(-0.7))];
         for ((x, y), (expected_x, expected_y)) in paper.points.iter().zip(expected) {
             assert!((x - expected_x).abs() < 1e-9 && (y - expected_y).abs() < 1e-9, "{:?}", paper.points);
         }

@@ -135,7 +135,7 @@ fn equal_error_table(rows: &[&Row]) -> Option<Table> {
         (method.clone(), fitted.iter().map(cell).collect())
     };
     let table = Table {
-        title: "shade, same RMS".to_owned(),
+        title: "time, same RMS".to_owned(),
         head: fitted.iter().map(|(count, ..)| count.to_string()).collect(),
         rows: others.map(row).collect(),
     };
@@ -364,7 +364,7 @@ mean of 2 materials, mean over 2 lights and scenes
         // Between its counts: 3 * 100^log10(0.1 / 0.02) = 75 ms, against 2.
         assert!(
             text.contains(
-                "shade, same RMS        1         4        16\n  paper               <3.0      37.5     >75.0\n"
+                "time, same RMS         1         4        16\n  paper               <3.0      37.5     >75.0\n"
             ),
             "{text}"
         );

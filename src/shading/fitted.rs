@@ -155,6 +155,25 @@ fn risen(z: f32, deviation: f32) -> [f32; 2] {
     [above * above / (4.0 * half_side), 0.5 * above]
 }
 
+/// Twin of `on_square`: the point, and its weight.
+fn on_square(i: i32, side: i32, sets: bool) -> (Vec2, f32) {
+    let place = IVec2::new(i % side, i / side).as_vec2() - 0.5 * (side - 1) as f32;
+    if sets || side == 1 {
+        return (12.0_f32.sqrt() / side as f32 * place, 1.0 / (side * side) as f32);
+    }
+    if side == 2 {
+        return (2.0 * place, 0.25);
+    }
+    let weight = |place: f32| if place == 0.0 { 4.0 / 9.0 } else { 2.5 / 9.0 };
+    ((3.0 * 0.6_f32).sqrt() * place, weight(place.x) * weight(place.y))
+}
+
+/// Twin of `on_stairs`: the point, and its weight.
+fn on_stairs(i: i32, up: Vec2) -> (Vec2, f32) {
+    let to_side = if i == 0 || i == 3 { 1.0 } else { -1.0 };
+    (12.0_f32.sqrt() / 4.0 * (i as f32 - 1.5) * up + to_side * up.perp(), 0.25)
+}
+
 /// What all sources are to a surface. Twin of `AtSources`.
 struct AtSources {
     f_cos: Vec3,
@@ -168,8 +187,10 @@ impl AtSources {
         let point = lobe.point;
         let n = point.surface.frame.z_axis;
         let [x, y] = source.axes.map(Vec4::truncate);
-        let deviation = x.dot(n).hypot(y.dot(n));
-        if source.direction.truncate().dot(n) < -4.0 * deviation {
+        let slope = Vec2::new(x.dot(n), y.dot(n));
+        let (z, deviation) = (source.direction.truncate().dot(n), slope.length());
+        let half_side = 3.0_f32.sqrt() * deviation;
+        if z + half_side <= 0.0 {
             return;
         }
         let side = if clear > 40.0 {
@@ -179,19 +200,17 @@ impl AtSources {
         } else {
             3
         };
-        for i in 0..side * side {
-            let place = IVec2::new(i % side, i / side).as_vec2() - 0.5 * (side - 1) as f32;
-            let at = if side == 2 { 2.0 } else { (3.0 * 0.6_f32).sqrt() } * place;
-            let weight = |place: f32| match side {
-                3 if place == 0.0 => 4.0 / 9.0,
-                3 => 2.5 / 9.0,
-                _ => 1.0 / side as f32,
-            };
+        let lowest = z - half_side;
+        let is_low = clear > FAR && lowest < if side == 1 { 20.0 * deviation } else { 0.3 };
+        let up = slope / deviation.max(1e-6);
+        let (count, steps) = if is_low { (4, 4) } else { (side * side, side) };
+        for i in 0..count {
+            let (at, weight) = if is_low { on_stairs(i, up) } else { on_square(i, side, lowest < 0.0) };
             let towards = source.direction.truncate() + at.x * x + at.y * y;
             let w_i = (point.surface.frame.transpose() * towards).normalize();
-            let [cos, middle] = risen(w_i.z, deviation / side as f32);
+            let [cos, middle] = risen(w_i.z, deviation / steps as f32);
             if cos > 0.0 {
-                let power = weight(place.x) * weight(place.y) * cos * source.power.truncate();
+                let power = weight * cos * source.power.truncate();
                 let w_i = w_i.with_z(middle).normalize();
                 self.f_cos += power * point.brdf(w_i, lobe.w_o);
                 self.cosine += power;
@@ -308,6 +327,39 @@ mod tests {
             let [mean, part] = [high * high - low * low, 2.0 * (high - low)].map(|sum| sum / (4.0 * half_side));
             assert!((cos - mean).abs() < 1e-6, "{z}: {cos} instead of {mean}");
             assert!(cos == 0.0 || (cos / middle - part).abs() < 1e-5, "{z}: {} instead of {part}", cos / middle);
+        }
+    }
+
+    #[test]
+    fn points_of_a_source_have_its_mean_its_variance_and_what_has_risen_of_it() {
+        let up = Vec2::from_angle(0.7);
+        type Points = Vec<(Vec2, f32)>;
+        let square = |side: i32, sets| -> Points { (0..side * side).map(|i| on_square(i, side, sets)).collect() };
+        let stairs: Points = (0..4).map(|i| on_stairs(i, up)).collect();
+        let mean = |points: &Points, value: &dyn Fn(Vec2) -> f32| -> f32 {
+            points.iter().map(|&(at, weight)| weight * value(at)).sum()
+        };
+        for points in [square(1, false), square(2, false), square(3, false), square(3, true), stairs.clone()] {
+            let first = [mean(&points, &|_| 1.0) - 1.0, mean(&points, &|at| at.x), mean(&points, &|at| at.y)];
+            assert!(first.iter().all(|error| error.abs() < 1e-6), "{points:?}");
+        }
+        // Equal parts lack the variance within them, 1 / side^2.
+        for (points, variance) in [(square(2, false), 1.0), (square(3, false), 1.0), (square(3, true), 1.0 - 1.0 / 9.0)]
+        {
+            for value in [mean(&points, &|at| at.x * at.x), mean(&points, &|at| at.y * at.y)] {
+                assert!((value - variance).abs() < 1e-6, "{value} of {points:?}");
+            }
+        }
+        for (value, expected) in [(up, 1.0 - 1.0 / 16.0), (up.perp(), 1.0)] {
+            assert!((mean(&stairs, &|at| at.dot(value).powi(2)) - expected).abs() < 1e-6);
+        }
+        assert!(mean(&stairs, &|at| at.dot(up) * at.dot(up.perp())).abs() < 1e-6);
+        // Along the way up, 1 of which is a standard deviation: parts against the whole.
+        for z in [-2.0_f32, -1.7, -1.0, -0.3, 0.0, 0.4, 1.1, 1.7, 2.0] {
+            let [whole, _] = risen(z, 1.0);
+            let of_stairs = mean(&stairs, &|at| risen(z + at.dot(up), 0.25)[0]);
+            let of_square = mean(&square(3, true), &|at| risen(z + at.x, 1.0 / 3.0)[0]);
+            assert!((of_stairs - whole).abs() < 1e-6 && (of_square - whole).abs() < 1e-6, "{z}");
         }
     }
 }
