@@ -17,6 +17,29 @@ pub struct Light {
     pub prefiltered: Option<PrefilteredLight>,
 }
 
+impl Light {
+    /// The same as half floats hold it: each pyramid over its scale.
+    pub fn in_half_floats(&self) -> Self {
+        let half = |pyramid: &Keyed<Pyramid>| Keyed::new(pyramid.key, pyramid.in_half_floats());
+        let blurred_half = |pyramid: &Keyed<VmfPyramid>| {
+            Keyed::new(pyramid.key, VmfPyramid { levels: pyramid.levels.in_half_floats() })
+        };
+        Self {
+            box_filtered: self.box_filtered.as_ref().map(half),
+            blurred: self.blurred.as_ref().map(|light| BlurredLight {
+                rest: blurred_half(&light.rest),
+                sources: light.sources.as_ref().map(blurred_half),
+                irradiance: half(&light.irradiance),
+                needs: light.needs,
+            }),
+            prefiltered: self
+                .prefiltered
+                .as_ref()
+                .map(|light| PrefilteredLight { by_ggx: half(&light.by_ggx), irradiance: half(&light.irradiance) }),
+        }
+    }
+}
+
 /// What the split sum looks up.
 #[derive(Clone)]
 pub struct PrefilteredLight {

@@ -262,17 +262,18 @@ fn hard_cases_are_shaded_as_on_the_cpu() {
 }
 
 #[test]
-fn coarser_fractions_err_more() {
+fn coarser_fractions_err_more_and_each_rounding_little() {
     let folder = tempfile::tempdir().unwrap();
-    bench(&folder, "fractions --materials clay --environments studio --counts 2 --size 24x18 --json rows.json");
+    bench(&folder, "rounding --materials clay --environments studio --counts 2 --size 24x18 --json rows.json");
     let rows = json(&folder, "rows.json");
-    let rms = |texel: u64, level: u64| {
-        let row = rows
-            .as_array()
-            .unwrap()
-            .iter()
-            .find(|row| row["bits"] == serde_json::json!({"texel": texel, "level": level}));
+    let rms = |rounding: &str| {
+        let row = rows.as_array().unwrap().iter().find(|row| row["rounding"] == rounding);
         row.expect("a row")["rms"].as_f64().expect("a number")
     };
-    assert!(rms(8, 8) < rms(4, 4) && rms(4, 4) < 1e-2, "{rows}");
+    let coarse = rms("fractions of 4 and 4 bits");
+    assert!(rms("fractions of 8 and 8 bits") < coarse && coarse < 1e-2, "{rows}");
+    for small in ["light in half floats", "normals a step off", "threads a step off", "the device"] {
+        assert!((1e-9..1e-3).contains(&rms(small)), "{small}: {rows}");
+    }
+    assert!(rms("sums backwards") < 1e-6, "{rows}");
 }

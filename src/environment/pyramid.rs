@@ -133,6 +133,14 @@ impl Pyramid {
         self.levels[level].par_iter().map(|&[r, g, b]| [encode(r), encode(g), encode(b), f16::ONE]).collect()
     }
 
+    /// What the GPU has of it where it has half floats.
+    pub fn in_half_floats(&self) -> Self {
+        let scale = self.radiance_scale();
+        let decode = |[r, g, b, _]: [f16; 4]| [r, g, b].map(|value| scale * value.to_f32());
+        let level = |level| self.texels_rgba16f(level, scale).into_iter().map(decode).collect();
+        Self { face_size: self.face_size, levels: (0..self.levels.len()).map(level).collect() }
+    }
+
     /// Texels of a level divided by `scale`, alpha 1, for the GPU.
     pub fn texels_rgba32f(&self, level: usize, scale: f32) -> Vec<[f32; 4]> {
         self.levels[level].par_iter().map(|&[r, g, b]| [r / scale, g / scale, b / scale, 1.0]).collect()

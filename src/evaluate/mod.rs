@@ -12,7 +12,7 @@
 //! | what threads cost to make, beside what they are worth | [`fit`] |
 //! | what a driver's compiler makes of the shaders | [`shaders`] |
 //! | what drafts of threads are worth while a parameter is dragged | [`live`] |
-//! | what a device's lookups by coarse fractions cost | [`fractions`] |
+//! | what each rounding of a device costs | [`rounding`] |
 //! | whether hard cases are shaded as on the CPU | [`stress`] |
 //! | what a measured material is in words of a model | [`material_fit`] |
 //! | what a material is by itself: curves and image, and these drawn | [`material_curves`], [`material_plot`] |
@@ -24,7 +24,6 @@ pub mod cases;
 pub mod difference;
 pub mod expected;
 pub mod fit;
-pub mod fractions;
 pub mod gallery;
 pub mod live;
 pub mod material_curves;
@@ -36,6 +35,7 @@ pub mod plots;
 pub mod reference;
 mod reference_picture;
 pub mod report;
+pub mod rounding;
 pub mod shaders;
 pub mod sheet;
 pub mod speed;

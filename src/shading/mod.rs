@@ -22,7 +22,7 @@ use random::random_bits;
 mod importance_sampling;
 mod light_sampling;
 mod low_discrepancy;
-mod random;
+pub(crate) mod random;
 
 /// Makes the modules and the dispatch from the table in methods.rs.
 macro_rules! methods {
@@ -192,6 +192,11 @@ impl<'a> CpuShader<'a> {
     /// The same as on a device whose lookups in cube maps blend by fractions of so many bits.
     pub fn with_fractions(self, fractions: FractionBits) -> Self {
         Self { fractions, ..self }
+    }
+
+    /// The same as on a device whose cube maps hold half floats.
+    pub fn with_half_light(self) -> Self {
+        Self { light: self.light.in_half_floats(), ..self }
     }
 
     /// Linear radiance times coverage, and coverage, of the pixel that sees `texels`: its sub-pixels, row by row.

@@ -2,7 +2,7 @@
 use glam::{UVec2, Vec4};
 
 /// PCG4D (Jarzynski and Olano 2020, Hash Functions for GPU Rendering).
-pub(super) fn pcg4d(words: [u32; 4]) -> [u32; 4] {
+pub(crate) fn pcg4d(words: [u32; 4]) -> [u32; 4] {
     let mut v = words.map(|word| word.wrapping_mul(1_664_525).wrapping_add(1_013_904_223));
     let mix = |v: &mut [u32; 4]| {
         for (to, a, b) in [(0, 1, 3), (1, 2, 0), (2, 0, 1), (3, 1, 2)] {

@@ -2,10 +2,10 @@
 mod arguments;
 mod error;
 mod fit;
-mod fractions;
 mod gallery;
 mod live;
 mod report;
+mod rounding;
 mod shaders;
 mod speed;
 mod stress;
@@ -25,7 +25,7 @@ enum What {
     Speed(Box<speed::BenchSpeed>),
     Fit(fit::BenchFit),
     Shaders(Box<shaders::BenchShaders>),
-    Fractions(fractions::BenchFractions),
+    Rounding(rounding::BenchRounding),
     Live(Box<live::BenchLive>),
     Stress(stress::BenchStress),
     Gallery(Box<gallery::BenchGallery>),
@@ -39,7 +39,7 @@ impl Bench {
             What::Speed(bench) => bench.run(),
             What::Fit(bench) => bench.run(),
             What::Shaders(bench) => bench.run(),
-            What::Fractions(bench) => bench.run(),
+            What::Rounding(bench) => bench.run(),
             What::Live(bench) => bench.run(),
             What::Stress(bench) => bench.run(),
             What::Gallery(bench) => bench.run(),

@@ -1,9 +1,9 @@
-//! `threadlight bench fractions`: what it costs that devices blend texels and levels by fractions of few bits.
+//! `threadlight bench rounding`: what each rounding of a device costs.
 use super::arguments::{CasesArguments, Defaults, write_json};
 use crate::cli::progress::TerminalProgress;
 use std::io::Write;
 use std::path::PathBuf;
-use threadlight::low_level::evaluate::{fractions, tables};
+use threadlight::low_level::evaluate::{rounding, tables};
 use threadlight::low_level::method::Method;
 use threadlight::low_level::output;
 
@@ -11,20 +11,23 @@ const EXAMPLES: &str = "\
 Without --materials gold and clay are measured; without --methods, fitted; without --counts, 16; without --size, 80x60.
 
 Examples:
-  threadlight bench fractions
-  threadlight bench fractions --materials nickel.binary,steel.binary --environments room.hdr,studio.hdr
+  threadlight bench rounding
+  threadlight bench rounding --materials nickel.binary,steel.binary --environments room.hdr,studio.hdr
 
-The CPU's form of a method shades the same surfaces by lookups in cube maps with all bits, with 8 bits and with 4.
+The CPU's form of a method shades the same surfaces without a rounding and with it. Fractions: lookups in cube maps blend texels and
+levels by so many bits; Vulkan promises 4, and 8 are usual. Light in half floats: cube maps hold these. A step off: all numbers of the
+normals, or of fitted threads, are the next ones that their 16 bits have; to round to the nearest is 1/sqrt(12) of that, RMS. Sums backwards:
+from the last thread to the first. The device: its own picture, with all that it does.
 
 The JSON is a list of rows with these fields, in this order:
   material, environment, scene, method, count   what was shaded
-  bits                                          of the fractions between texels and between levels
+  rounding                                      which
   rms, most                                     of display values, over the pixels that see a surface";
 
-/// Measures what it costs that devices blend texels and levels by fractions of few bits.
+/// Measures what each rounding of a device costs: of fractions, light, normals, threads and sums.
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES)]
-pub struct BenchFractions {
+pub struct BenchRounding {
     #[command(flatten)]
     cases: CasesArguments,
     /// Write all measurements as JSON.
@@ -32,7 +35,7 @@ pub struct BenchFractions {
     json: Option<PathBuf>,
 }
 
-impl BenchFractions {
+impl BenchRounding {
     pub fn run(self) -> anyhow::Result<()> {
         self.json.as_deref().map_or(Ok(()), output::check_writable)?;
         let cases = self.cases.cases(&Defaults {
@@ -42,12 +45,12 @@ impl BenchFractions {
             size: Some((80, 60)),
         })?;
         let (device, memo) = (self.cases.open_device()?, self.cases.memo());
-        let progress = TerminalProgress::of("bench fractions", "pictures")?;
+        let progress = TerminalProgress::of("bench rounding", "pictures")?;
         let mut found = Vec::new();
-        let result = fractions::run(&cases, &device, &memo, &progress, &mut found);
+        let result = rounding::run(&cases, &device, &memo, &progress, &mut found);
         progress.finish();
         if !found.is_empty() {
-            write!(std::io::stdout().lock(), "{}", tables::text(&[fractions::tables(&found)]))?;
+            write!(std::io::stdout().lock(), "{}", tables::text(&[rounding::tables(&found)]))?;
             write_json(self.json.as_deref(), &found)?;
         }
         Ok(result?)
