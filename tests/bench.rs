@@ -264,7 +264,7 @@ fn hard_cases_are_shaded_as_on_the_cpu() {
 #[test]
 fn coarser_fractions_err_more_and_each_rounding_little() {
     let folder = tempfile::tempdir().unwrap();
-    bench(&folder, "rounding --materials clay --environments studio --counts 2 --size 24x18 --json rows.json");
+    bench(&folder, "rounding --materials gold --environments studio --counts 2 --size 24x18 --json rows.json");
     let rows = json(&folder, "rows.json");
     let rms = |rounding: &str| {
         let row = rows.as_array().unwrap().iter().find(|row| row["rounding"] == rounding);

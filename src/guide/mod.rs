@@ -25,6 +25,7 @@ pub mod method {}
 pub mod architecture {}
 
 #[doc = include_str!("results.md")]
+#[doc = include_str!("../../assets/error_over_time.svg")]
 pub mod results {}
 
 #[doc = include_str!("limits.md")]
