@@ -141,7 +141,7 @@ fn differences(place: &mut Place, device: &Arc<Device>) -> Result<Vec<(Rounding,
                 let Some(changed) = with_threads(prepared, change) else { return Ok(None) };
                 shade(&CpuShader::new(&changed, &round)?, prepared, &geometry)
             }
-            Rounding::Device => return Ok(None),
+            Rounding::Device => of_device.clone(),
         }))
     };
     let mut found = Vec::new();
@@ -150,7 +150,6 @@ fn differences(place: &mut Place, device: &Arc<Device>) -> Result<Vec<(Rounding,
             found.push((rounding, difference(place, &exact, &picture)));
         }
     }
-    found.push((Rounding::Device, difference(place, &exact, &of_device)));
     Ok(found)
 }
 
