@@ -3,7 +3,6 @@ mod common;
 
 use common::{EVERYTHING, Validated, analytic_materials, model, pixels, ready, sphere, texels_of};
 use glam::{DVec3, UVec2, Vec3, Vec4};
-use rayon::prelude::*;
 use std::path::Path;
 use threadlight::low_level::brdf::luminance;
 use threadlight::low_level::environment::Environment;
@@ -74,6 +73,7 @@ fn small_environment(folder: &Path, name: &str) -> Source {
 
 #[test]
 fn every_estimator_agrees_with_its_cpu_twin() {
+    let gpu = Validated::new();
     // A folder of its own: what the CPU blurs is compared with what the device does.
     let folder = tempfile::tempdir().unwrap();
     let cpu = Memo::new(Some(folder.path()));
@@ -81,9 +81,7 @@ fn every_estimator_agrees_with_its_cpu_twin() {
     let table = folder.path().join("table.binary");
     std::fs::write(&table, common::merl_like_table()).unwrap();
     let studio = small_environment(folder.path(), "studio");
-    // Side by side, since SwiftShader takes 20 s to compile a shader, on one core.
-    estimators().into_par_iter().for_each(|method| {
-        let gpu = Validated::new();
+    for method in estimators() {
         // Two spheres side by side, so that materials beyond the first are met too.
         let (_, metal) = analytic_materials().remove(1);
         let mut scene = scene(metal, studio.clone(), method, 30, (48, 24));
@@ -96,8 +94,8 @@ fn every_estimator_agrees_with_its_cpu_twin() {
         scene.environment.intensity = 1.7;
         scene.shading.seed = 1 << 40 | 5;
         compare_with_twin(&gpu, &cpu, &scene, &method.name());
-        gpu.finish();
-    });
+    }
+    gpu.finish();
 }
 
 /// Compares a picture of `scene`, which is 48 pixels wide, with that of the CPU.

@@ -8,7 +8,7 @@
 
 #include "partition.glsl"
 
-const int CANDIDATES = 8; // even
+const uint CANDIDATES = 8; // even
 
 vec3 estimate(Surface surface, Material material, uint first, uint stride) {
     vec3 w_o = view_direction(surface);
@@ -17,22 +17,25 @@ vec3 estimate(Surface surface, Material material, uint first, uint stride) {
     for (uint k = first; k < push.sample_count; k += stride) {
         float weight_sum = 0.0;
         vec3 kept = vec3(0.0);
-        [[unroll]] for (int c = 0; c < CANDIDATES; ++c) {
-            uint index = k * uint(CANDIDATES) + uint(c);
-            uvec4 bits = random_bits(2 * index);
-            vec3 w_i = c % 2 == 0 ? sample_brdf(rows, w_o, bits).w_i : sample_light(bits) * surface.frame;
-            if (w_i.z > 0.0) {
-                vec3 direction = surface.frame * w_i;
-                ++lookups;
-                vec4 texel = environment_texel(direction);
-                vec3 value = brdf_at(surface, material, w_i, w_o) * texel.rgb * w_i.z;
-                float q = dot(value, vec3(0.2126, 0.7152, 0.0722));
-                float p = 0.5 * (brdf_pdf(rows, w_i, w_o, normalize(w_i + w_o)) + light_pdf(texel, direction));
-                float weight = q / p; // p > 0: brdf_pdf has a diffuse share
-                weight_sum += weight;
-                // Kept with probability weight / weight_sum: by the last candidate each in proportion.
-                if (weight > 0.0 && to_unit(random_bits(2 * index + 1)).x * weight_sum < weight) {
-                    kept = value / q;
+        // Not all unrolled: drivers take minutes to compile eight BRDFs.
+        for (uint c = 0; c < CANDIDATES; c += 2) {
+            [[unroll]] for (uint way = 0; way < 2; ++way) {
+                uint index = k * CANDIDATES + c + way;
+                uvec4 bits = random_bits(2 * index);
+                vec3 w_i = way == 0 ? sample_brdf(rows, w_o, bits).w_i : sample_light(bits) * surface.frame;
+                if (w_i.z > 0.0) {
+                    vec3 direction = surface.frame * w_i;
+                    ++lookups;
+                    vec4 texel = environment_texel(direction);
+                    vec3 value = brdf_at(surface, material, w_i, w_o) * texel.rgb * w_i.z;
+                    float q = dot(value, vec3(0.2126, 0.7152, 0.0722));
+                    float p = 0.5 * (brdf_pdf(rows, w_i, w_o, normalize(w_i + w_o)) + light_pdf(texel, direction));
+                    float weight = q / p; // p > 0: brdf_pdf has a diffuse share
+                    weight_sum += weight;
+                    // Kept with probability weight / weight_sum: by the last candidate each in proportion.
+                    if (weight > 0.0 && to_unit(random_bits(2 * index + 1)).x * weight_sum < weight) {
+                        kept = value / q;
+                    }
                 }
             }
         }
