@@ -178,7 +178,8 @@ fn anisotropic_models_are_the_same_in_glsl() {
         differences.sort_by(f32::total_cmp);
         let [median, most] = [differences[differences.len() / 2], differences[differences.len() * 19 / 20]];
         println!("{text:?}: {} pixels, median {median:.1e}, 95 % below {most:.1e}", differences.len());
-        let bounds = if gpu.has_exact_functions() { (1e-4, 1e-3) } else { (4e-4, 3e-3) };
+        // SwiftShader: 3.3e-4 and 3.5e-3 for the narrowest lobe.
+        let bounds = if gpu.has_exact_functions() { (1e-4, 1e-3) } else { (4e-4, 4e-3) };
         assert!(differences.len() > 100 && median < bounds.0 && most < bounds.1, "{text}: {median} {most}");
     }
     gpu.finish();
