@@ -151,22 +151,24 @@ void add_source(inout AtSources sum, Source source, float clear, Surface surface
     float z = dot(source.direction.xyz, n);
     vec2 slope = vec2(dot(source.axis[0].xyz, n), dot(source.axis[1].xyz, n));
     float deviation = length(slope);
-    float lowest = z - sqrt(3.0) * deviation;
-    if (z + sqrt(3.0) * deviation <= 0.0) {
+    float half_side = sqrt(3.0) * deviation;
+    if (z + half_side <= 0.0) {
         return;
     }
+    float lowest = z - half_side;
     // Tails of Gaussian lobes go on falling steeply, so only from very far does the middle alone do. Near the horizon f cos of measured
     // materials bends within a few degrees of theta_i: four steps up there, for wide light also higher up.
     int side = clear > 40.0 ? 1 : clear > FAR ? 2 : 3;
     bool is_low = clear > FAR && lowest < (side == 1 ? 20.0 * deviation : 0.3);
     // Light straight above has no slope.
     vec2 up = slope / max(deviation, 1e-6);
+    int steps = is_low ? 4 : side;
     int count = is_low ? 4 : side * side;
     int i = 0;
     do {
         vec3 at = is_low ? on_stairs(i, up) : on_square(i, side, lowest < 0.0);
         vec3 w_i = normalize((source.direction.xyz + at.x * source.axis[0].xyz + at.y * source.axis[1].xyz) * surface.frame);
-        vec2 above = risen(w_i.z, deviation / float(is_low ? 4 : side));
+        vec2 above = risen(w_i.z, deviation / float(steps));
         if (above.x > 0.0) {
             vec3 power = at.z * above.x * source.power.rgb;
             w_i = normalize(vec3(w_i.xy, above.y));
