@@ -29,15 +29,13 @@ const LIGHTS_SEED: usize = 0;
 const TIED: f64 = 1e-6;
 
 /// By [`most_moved`] kernels must not move by more than this between rows a degree apart: what moves by more, since some changed places,
-/// shows as a line, however well each of both rows is fitted. Where they would the row is fitted again, tied ten times as strongly, up to the
-/// most. What carrying misses of a steady motion grows with the square of the step.
+/// shows as a line, however well each of both rows is fitted. Where they would, they go part of the way, and further in the next rows. What
+/// carrying misses of a steady motion grows with the square of the step.
 pub(super) const MOST_MOVED: f64 = 0.06;
-const MOST_TIED_BEFORE: f64 = 1e-4;
 
 /// The same for an anisotropic BRDF, whose rows have two neighbours, where kernels err between rows by more than this part of what the
 /// worse of both does.
 const MOST_BETWEEN: f64 = 1.1;
-const MOST_TIED: f64 = 1e-3;
 
 /// Test lights of a row: so many, and so many more for each thread. Of too few, many threads answer each alone and err between them: with
 /// 64 threads 1536 lights leave a tenth less error than 1200. Up to 16 threads have the same lights, which are made once for all of them.
@@ -157,30 +155,24 @@ fn fit_all(
             [one] => one.clone(),
             [a, b, ..] => all_between(a, b, 0.5),
         };
-        let effort = if neighbours.is_empty() { FIRST } else { NEXT };
-        let mut tied = TIED;
-        let (kernels, error) = loop {
-            let mut kernels = start.clone();
-            let fit = Fit::new(lights, *albedo / lights.unit).in_sets(settings.sets);
-            let fit = if neighbours.is_empty() { fit } else { fit.tied(&start, tied) };
-            fit.solve(&mut kernels, effort, observer)?;
-            let error = fit.relative_error(&kernels);
-            let is_near = |neighbour: &Vec<Kernel>| {
-                let between = fit.relative_error(&all_between(neighbour, &kernels, 0.5));
-                between < MOST_BETWEEN * error.max(fit.relative_error(neighbour))
-            };
-            let (is_steady, most_tied) = match (&before[..], targets.azimuths) {
-                ([before], 1) => {
-                    let moved = most_moved([before, &start], &kernels, *albedo / lights.unit);
-                    (moved < MOST_MOVED * (90.0 / rows as f64).powi(2), MOST_TIED_BEFORE)
-                }
-                _ => (neighbours.iter().all(is_near), MOST_TIED),
-            };
-            if is_steady || tied >= most_tied {
-                break (kernels, error);
+        let fit = Fit::new(lights, *albedo / lights.unit).in_sets(settings.sets);
+        let mut free = start.clone();
+        match neighbours.is_empty() {
+            true => fit.solve(&mut free, FIRST, observer)?,
+            false => fit.tied(&start, TIED).solve(&mut free, NEXT, observer)?,
+        }
+        let is_steady = |kernels: &[Kernel]| match (&before[..], targets.azimuths) {
+            ([before], 1) => {
+                let moved = most_moved([before, &start], kernels, *albedo / lights.unit);
+                moved < MOST_MOVED * (90.0 / rows as f64).powi(2)
             }
-            tied *= 10.0;
+            _ => neighbours.iter().all(|neighbour| {
+                let worse = fit.relative_error(kernels).max(fit.relative_error(neighbour));
+                fit.relative_error(&all_between(neighbour, kernels, 0.5)) < MOST_BETWEEN * worse
+            }),
         };
+        let kernels = fit.part_of_the_way(&start, &free, is_steady);
+        let error = fit.relative_error(&kernels);
         row_is_done();
         Ok((scaled(&kernels, lights.unit), *albedo, error))
     };

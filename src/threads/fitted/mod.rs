@@ -11,12 +11,14 @@
 //! | of all rows | [`generate()`] |
 //! | sets of them, for sub-pixels | [`ThreadSettings::for_picture`](super::ThreadSettings::for_picture) |
 //! | of an edited BRDF, at once and coarsely | [`draft()`] |
+//! | what the edit does to all rows | `edit` |
 //! | what a fit leaves, under other lights | [`validation_error`] |
 //! | as stored and looked up, 12 bytes a thread and row | [`FittedTable`] |
 pub mod answers;
 pub mod cells;
 mod directions;
 mod draft;
+mod edit;
 mod generate;
 pub mod kernel;
 pub mod lights;

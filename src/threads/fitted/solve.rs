@@ -5,7 +5,7 @@ use faer::{Accum, Mat, MatRef, Par, Side};
 use glam::{DVec3, dvec3};
 
 use super::answers::Answers;
-use super::kernel::{Kernel, WIDEST_LEVEL, scale_rad};
+use super::kernel::{Kernel, WIDEST_LEVEL, all_between, scale_rad};
 use super::lights::TestLights;
 use crate::error::{Error, Result};
 use crate::progress::Observer;
@@ -22,6 +22,9 @@ pub struct Effort {
 /// Less would be lost in the rounding of the products.
 const LEAST_DAMPING: f32 = 1e-6;
 
+/// Steps to the best weights: the first is exact but for weights that would be negative and for what rounding makes of kernels that are alike.
+const WEIGHT_STEPS: usize = 4;
+
 /// How much the squared residuals of sets alone, in their mean, count beside those of all together. With less, sub-pixels whose normals are
 /// so far apart that their errors do not cancel err more; with more, all others do. Of ten measured materials in three maps, with 16 threads
 /// and at 80 x 60, a dragon has 0.0018, 0.0016 and 0.0015 with 0.5, 0.7 and 1.5, a sphere 0.0016, 0.0015 and 0.0017.
@@ -35,6 +38,7 @@ struct Rest {
 }
 
 /// The state of a fit.
+#[derive(Clone, Copy)]
 pub struct Fit<'a> {
     lights: &'a TestLights,
     albedo: DVec3,
@@ -60,6 +64,11 @@ impl<'a> Fit<'a> {
     /// squared responses.
     pub fn tied(self, before: &'a [Kernel], strength: f64) -> Self {
         Self { prior: Some((before, strength * self.squared_responses())), ..self }
+    }
+
+    /// How many sets of kernels there are.
+    pub fn sets(&self) -> usize {
+        self.sets
     }
 
     fn squared_responses(&self) -> f64 {
@@ -147,15 +156,20 @@ impl<'a> Fit<'a> {
         (0..kernels.len()).map(bounds).collect()
     }
 
+    /// What the answers of each kernel differ by from those of the cosine kernel, whose weight is what kernels leave of the albedo.
+    fn differences(&self, answers: &Answers) -> Vec<f32> {
+        let cosine = &self.lights.cosine;
+        let of_kernel = |answers: &[f32]| answers.iter().zip(cosine).map(|(answer, cosine)| answer - cosine).collect();
+        answers.value.chunks(cosine.len()).flat_map::<Vec<f32>, _>(of_kernel).collect()
+    }
+
     /// The weighted design, a row a light: answers of each kernel less the cosine's, then their derivatives by two tangents and the level,
     /// towards `levels`; last what is left to answer.
     fn design(&self, kernels: &[Kernel], answers: &Answers, levels: &[[f64; 2]], rest: &Rest) -> Vec<f32> {
-        let TestLights { direction: [lights_x, lights_y, lights_z], cosine, .. } = self.lights;
+        let [lights_x, lights_y, lights_z] = &self.lights.direction;
         let count = self.lights.count();
-        let mut columns = Vec::with_capacity(count * (4 * kernels.len() + 3 * self.sets));
-        for answers in answers.value.chunks(count) {
-            columns.extend(answers.iter().zip(cosine).map(|(answer, cosine)| answer - cosine));
-        }
+        let mut columns = self.differences(answers);
+        columns.reserve_exact(count * 3 * (kernels.len() + self.sets));
         for (k, kernel) in kernels.iter().enumerate() {
             let of_kernel = k * count..(k + 1) * count;
             let (x, y) = kernel.direction.any_orthonormal_pair();
@@ -170,6 +184,90 @@ impl<'a> Fit<'a> {
         }
         rest.of_sets.iter().flatten().for_each(|residuals| columns.extend_from_slice(residuals));
         columns
+    }
+
+    /// The best weights of `kernels` that stay where they are.
+    pub fn solve_weights(&self, kernels: &mut [Kernel]) {
+        let answers = Answers::new(kernels, self.lights);
+        let mut rest = self.rest(kernels, &answers);
+        let mut damping = LEAST_DAMPING;
+        for _ in 0..WEIGHT_STEPS {
+            let mut columns = self.differences(&answers);
+            rest.of_sets.iter().flatten().for_each(|residuals| columns.extend_from_slice(residuals));
+            let products = products(&columns, self.lights.count());
+            let next = self.with_better_weights(kernels, &products, damping);
+            let next_rest = self.rest(&next, &answers);
+            if next_rest.cost < rest.cost {
+                kernels.copy_from_slice(&next);
+                rest = next_rest;
+            } else {
+                // Kernels that answer nearly alike: single precision does not tell their weights apart.
+                damping *= 100.0;
+            }
+        }
+    }
+
+    /// A step to the best weights, of the damped normal equations of each channel: a weight at zero that would fall stays there. `products` are
+    /// those of the columns of [`Fit::differences`] and of what is left to answer.
+    fn with_better_weights(&self, kernels: &[Kernel], products: &Mat<f32>, damping: f32) -> Vec<Kernel> {
+        let m = kernels.len();
+        let largest = (0..m).map(|k| products[(k, k)]).fold(0.0, f32::max);
+        let mut next = kernels.to_vec();
+        for c in 0..3 {
+            let gradient = |k: usize| products[(m + 3 * (k % self.sets) + c, k)];
+            let is_frozen = |k: usize| kernels[k].weight[c] <= 0.0 && gradient(k) > 0.0;
+            let matrix = Mat::from_fn(m, m, |k, l| match k == l {
+                true if is_frozen(k) => 1.0,
+                true => (1.0 + damping) * self.coupling(k, l) * products[(k, l)] + 1e-12 * largest,
+                false if k < l || is_frozen(k) || is_frozen(l) => 0.0,
+                false => self.coupling(k, l) * products[(k, l)],
+            });
+            let Ok(factor) = Llt::new(matrix.as_ref(), Side::Lower) else { return next };
+            let change = factor.solve(&Mat::from_fn(m, 1, |k, _| if is_frozen(k) { 0.0 } else { -gradient(k) }));
+            for (k, kernel) in next.iter_mut().enumerate() {
+                kernel.weight[c] = (kernel.weight[c] + f64::from(change[(k, 0)])).max(0.0);
+            }
+        }
+        next
+    }
+
+    /// Kernels on the way from `start` to `end`, with the best weights there: at the end, or else half as far, again and again, until
+    /// `is_steady`; but no nearer to the start than a 32nd, and not where the error is more than twice that at the end.
+    pub fn part_of_the_way(
+        &self,
+        start: &[Kernel],
+        end: &[Kernel],
+        is_steady: impl Fn(&[Kernel]) -> bool,
+    ) -> Vec<Kernel> {
+        const PARTS: [f64; 5] = [0.5, 0.25, 0.125, 0.0625, 0.03125];
+        const MOST_WORSE: f64 = 2.0;
+        let mut kernels = end.to_vec();
+        let most = MOST_WORSE * self.relative_error(end);
+        for part in PARTS {
+            if is_steady(&kernels) {
+                break;
+            }
+            let mut nearer = all_between(start, end, part);
+            self.solve_weights(&mut nearer);
+            if self.relative_error(&nearer) > most {
+                break;
+            }
+            kernels = nearer;
+        }
+        kernels
+    }
+
+    /// Which of `candidates` takes most of what `kernels` leave, if it is one of `set` and they stay as they are; none if none takes any.
+    pub fn best_place(&self, kernels: &[Kernel], set: usize, candidates: &[Kernel]) -> Option<Kernel> {
+        let rest = self.rest(kernels, &Answers::new(kernels, self.lights));
+        let columns = self.differences(&Answers::new(candidates, self.lights));
+        let taken = |column: &[f32]| -> f32 {
+            let product = |other: &[f32]| column.iter().zip(other).map(|(a, b)| a * b).sum::<f32>();
+            rest.of_sets[set].iter().map(|rest| product(rest).min(0.0).powi(2)).sum::<f32>() / product(column)
+        };
+        let taken = columns.chunks(self.lights.count()).map(taken).zip(candidates);
+        let (most, place) = taken.max_by(|(a, _), (b, _)| a.total_cmp(b))?;
+        (most > 0.0).then_some(*place)
     }
 
     /// Improves `kernels`.
@@ -211,14 +309,18 @@ impl<'a> Fit<'a> {
         Ok(())
     }
 
+    /// How often the product of the answers of kernels k and l is in the cost. Those of a set are in its residuals too, with as many times
+    /// the weights as there are sets.
+    fn coupling(&self, k: usize, l: usize) -> f32 {
+        let is_within = self.sets > 1 && k % self.sets == l % self.sets;
+        if is_within { 1.0 + SHARE_OF_SETS * self.sets as f32 } else { 1.0 }
+    }
+
     /// The lower half of Gauss and Newton's matrix, and the gradient. Unknowns: red, green and blue weights of all kernels, then two
     /// tangents and the level of each kernel. `products` are those of the columns of [`Fit::design`]: its lower half.
     fn normal_equations(&self, kernels: &[Kernel], products: &Mat<f32>) -> (Mat<f32>, Vec<f32>) {
         let m = kernels.len();
         let weights: Vec<_> = kernels.iter().map(|kernel| kernel.weight.as_vec3()).collect();
-        // Kernels of a set are in its residuals too, with as many times the weights as there are sets.
-        let within = if self.sets == 1 { 1.0 } else { 1.0 + SHARE_OF_SETS * self.sets as f32 };
-        let coupling = |k: usize, l: usize| if k % self.sets == l % self.sets { within } else { 1.0 };
         let mut hessian = Mat::zeros(6 * m, 6 * m);
         let mut gradient = vec![0.0; 6 * m];
         for c in 0..3 {
@@ -228,12 +330,12 @@ impl<'a> Fit<'a> {
                 let products = products.col_as_slice(l);
                 let column = hessian.col_as_slice_mut(c * m + l);
                 for k in l..m {
-                    column[c * m + k] = coupling(k, l) * products[k];
+                    column[c * m + k] = self.coupling(k, l) * products[k];
                 }
                 for (k, (column, products)) in
                     column[3 * m..].chunks_exact_mut(3).zip(products[m..4 * m].chunks_exact(3)).enumerate()
                 {
-                    (0..3).for_each(|i| column[i] = coupling(k, l) * weights[k][c] * products[i]);
+                    (0..3).for_each(|i| column[i] = self.coupling(k, l) * weights[k][c] * products[i]);
                 }
                 gradient[c * m + l] = products[rest_of(l)];
             }
@@ -245,7 +347,7 @@ impl<'a> Fit<'a> {
             let products = &products.col_as_slice(m + q)[m..4 * m];
             let column = &mut hessian.col_as_slice_mut(3 * m + q)[3 * m..];
             for k in q / 3..m {
-                let scale = coupling(k, q / 3) * weights[k].dot(weights[q / 3]);
+                let scale = self.coupling(k, q / 3) * weights[k].dot(weights[q / 3]);
                 (3 * k..3 * k + 3).for_each(|p| column[p] = scale * products[p]);
             }
         }

@@ -1,17 +1,19 @@
 //! What fitted threads promise, for every kind of material.
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-use glam::DVec3;
+use glam::{DVec3, dvec3};
 
 use super::generate::{MOST_MOVED, carried, most_moved};
 use super::kernel::{Kernel, SHARPEST_LEVEL, WIDEST_LEVEL, kappa_of_level, scale_rad, vmf_peak};
+use super::lights::{Quadrature, TestLights};
 use super::sets::pixels_have_own;
+use super::solve::{Effort, Fit};
 use super::{FittedTable, MAX_COUNT, PackedKernel, draft, generate, validation_error};
 use crate::brdf::{Brdf, CustomBrdf, LobeShape, SeenBrdf};
 use crate::error::Error;
 use crate::progress::Observer;
 use crate::threads::azimuths::View;
-use crate::threads::slice::{Slice, fibonacci_lattice};
+use crate::threads::slice::{Resolution, Slice, fibonacci_lattice};
 use crate::threads::{ThreadKind, ThreadSettings, Threads, read, test_materials, theta_o, write};
 
 fn small(count: usize, rows: usize) -> ThreadSettings {
@@ -60,6 +62,51 @@ fn kernels_do_not_jump_between_rows() {
         // What is packed is rounded.
         assert!(moved < 1.05 * MOST_MOVED, "row {row}, {} sets: {moved}", table.sets);
     }
+}
+
+/// The lights of a view of gold, and its albedo in their units.
+fn seen_gold() -> (TestLights, DVec3) {
+    let gold = gold(0.3);
+    let slices = Slice::with_lobes(&SeenBrdf::from_azimuth(&gold, 0.0), 0.7, Resolution::DRAFT);
+    let lights = TestLights::new(&slices, 512, 0, Quadrature::DRAFT);
+    let albedo = slices[0].albedo() / lights.unit;
+    (lights, albedo)
+}
+
+#[test]
+fn the_best_weights_are_those_of_the_fit_and_no_others_do_better() {
+    let (lights, albedo) = seen_gold();
+    for sets in [1, 4] {
+        let fit = Fit::new(&lights, albedo).in_sets(sets);
+        let place = |k: usize| Kernel {
+            direction: dvec3(-0.65 + 0.05 * (k % 3) as f64, 0.04 * (k / 3) as f64 - 0.1, 0.75).normalize(),
+            level: 4.0 + 0.5 * (k % 5) as f64,
+            weight: DVec3::splat(0.01),
+        };
+        let mut fitted: Vec<_> = (0..12).map(place).collect();
+        fit.solve(&mut fitted, Effort { steps: 200, least_gain: 1e-6 }, &()).unwrap();
+        let error = fit.relative_error(&fitted);
+        let mut kernels = fitted.clone();
+        kernels.iter_mut().for_each(|kernel| kernel.weight = DVec3::splat(0.01));
+        let started = fit.relative_error(&kernels);
+        fit.solve_weights(&mut kernels);
+        let solved = fit.relative_error(&kernels);
+        println!("{sets} sets: from {started:.4} to {solved:.5}, fitted {error:.5}");
+        assert!(solved < 1.02 * error && started > 2.0 * error, "{sets} sets: {started} {solved} {error}");
+        assert!(kernels.iter().all(|kernel| kernel.weight.min_element() >= 0.0));
+    }
+}
+
+#[test]
+fn a_kernel_without_weight_is_put_where_the_others_left_a_gap() {
+    let (lights, albedo) = seen_gold();
+    let fit = Fit::new(&lights, albedo);
+    let at = |x: f64, level: f64| Kernel { direction: dvec3(x, 0.0, (1.0 - x * x).sqrt()), level, weight: DVec3::ZERO };
+    // Nothing mirrors the view but the first.
+    let places = [at(-0.65, 5.5), at(0.8, 5.5), at(0.2, 2.0)];
+    assert_eq!(fit.best_place(&[], 0, &places), Some(places[0]));
+    assert_eq!(fit.best_place(&[], 0, &places[1..2]), None);
+    assert_eq!(fit.best_place(&[], 0, &[]), None);
 }
 
 #[test]
@@ -371,6 +418,24 @@ fn drafts_follow_an_edited_parameter_with_up_to_three_times_the_error() {
     for row in [0, 32, 60, 85] {
         let albedo = gold(0.29).albedo(theta_o(row, drafted.rows));
         assert!(((furnace(row) - albedo) / albedo).abs().max_element() < 4e-3, "{row}: {} {albedo}", furnace(row));
+    }
+}
+
+#[test]
+fn drafts_follow_a_lobe_that_becomes_ten_times_narrower_with_up_to_three_times_the_error() {
+    let settings = ThreadSettings { sets: 4, ..small(16, 90) };
+    let mut drafted = generate(&gold(0.6), &settings, &()).unwrap();
+    const STEPS: u32 = 30;
+    let alpha = |step: u32| 0.6 - 0.54 * f64::from(step) / f64::from(STEPS);
+    for step in 1..=STEPS {
+        drafted = draft(&gold(alpha(step)), &drafted, &()).unwrap();
+    }
+    let narrow = gold(alpha(STEPS));
+    let finished = generate(&narrow, &settings, &()).unwrap();
+    for [drafted, finished] in [[&drafted, &finished], [drafted.for_subpixels(), finished.for_subpixels()]] {
+        let [found, finished] = [drafted, finished].map(|table| validation_error(table, &narrow));
+        println!("after {STEPS} drafts {found:.5}, finished {finished:.5}");
+        assert!(found < 3.0 * finished, "{found} {finished}");
     }
 }
 
