@@ -124,16 +124,14 @@ impl DeviceScene {
         let way_around = round.ask(&CheckDevice(device))?.way_around(device)?;
         let geometry_cache = ask_geometry_cache(device, prepared, round)?;
         let materials: Vec<_> = prepared.materials.iter().map(|m| (&m.brdf, m.threads.as_ref())).collect();
-        let shading_light = &prepared.shading_light(round)?;
-        let evaluates_brdf = method.evaluates_brdf(shading_light);
-        let light = light(round, Some(device), method, shading_light, &prepared.shaded())?;
+        let evaluates_brdf = method.evaluates_brdf(environment);
+        let light = light(round, Some(device), method, environment, &prepared.shaded())?;
         let finest_level = light.blurred.as_ref().map(|blurred| finest_level(&blurred.rest));
         let upload = UploadMaterials { device, method, materials: &materials, evaluates_brdf, finest_level };
         let materials = round.ask(&upload)?;
         let needs = light.blurred.as_ref().map(|blurred| blurred.needs);
         let constants = shade_constants(prepared, materials.models_used, needs);
-        let light =
-            round.ask(&UploadLight { device, method, environment: shading_light, light: &light, way_around })?;
+        let light = round.ask(&UploadLight { device, method, environment, light: &light, way_around })?;
         let pipeline = compile(shader, &constants)?;
         let background = match prepared.show_environment {
             true => Some(Background {

@@ -6,10 +6,8 @@ use crate::memo::{Key, Keyed, Memo, Round, Step};
 use crate::method::{Method, Variant};
 use crate::passes::{PlacedMesh, PlacedTangent, Sampling, View};
 use crate::scene::{Camera, MaterialSource, Mesh, Scene, Source, TangentRule};
-use crate::steps::{
-    DraftThreads, FindLobe, FitThreads, LeaveSources, LoadBrushedMesh, LoadEnvironment, LoadMaterial, LoadMesh,
-};
-use crate::threads::{ThreadKind, ThreadSettings, Threads, WithThreads};
+use crate::steps::{DraftThreads, FindLobe, FitThreads, LoadBrushedMesh, LoadEnvironment, LoadMaterial, LoadMesh};
+use crate::threads::{ThreadSettings, Threads, WithThreads};
 use crate::{Error, Result};
 use glam::{DAffine3, DVec3};
 use std::cell::Cell;
@@ -310,21 +308,6 @@ impl Prepared {
     /// Centre and radius of a sphere that holds all objects.
     pub fn bounding_sphere(&self) -> (DVec3, f64) {
         bounding_sphere(&self.meshes, &self.objects)
-    }
-
-    /// The light as the method shades by it. What it shades by kernels alone has its small sources among all other light: so it
-    /// is where the BRDF of a material, by which it would shade them, is none that shaders can evaluate.
-    ///
-    /// # Errors
-    /// Cancelled.
-    pub fn shading_light(&self, round: &Round) -> Result<Keyed<Environment>> {
-        let Self { method, environment, materials, .. } = self;
-        let are_kernels = method.threads().is_some_and(ThreadKind::are_kernels);
-        let mut unknown = materials.iter().filter(|material| !material.brdf.has_shader_form(&material.lobe));
-        match unknown.next().filter(|_| are_kernels && method.evaluates_brdf(environment)) {
-            Some(PreparedMaterial { name, .. }) => round.ask(&LeaveSources { environment, material: name }),
-            None => Ok(environment.clone()),
-        }
     }
 
     /// Gives objects the tangents that their materials need, and no others: to be called when materials were changed.

@@ -163,6 +163,9 @@ fn anisotropic_models_are_the_same_in_glsl() {
         "model = 'ashikhmin_shirley'\ndiffuse = [0.5, 0.1, 0.1]\nspecular = 0.05\nexponent_x = 1000\nexponent_y = 0",
         "model = 'principled'\nbase_colour = [1, 0.8, 0.4]\nmetallic = 0.7\nroughness = 0.4\nanisotropy = 0.5\nanisotropy_convention = 'gltf'",
         "model = 'principled'\nbase_colour = 0.2\nmetallic = 0\nroughness = 0.5\nanisotropy = 0.8\nanisotropy_convention = 'openpbr'\nrotation_deg = 60\ncoat = 0.5\ncoat_roughness = 0.3",
+        // Of these the twin has the table, too.
+        "model = 'principled'\nbase_colour = 0.3\nmetallic = 0.5\nroughness = 0.4\nanisotropy = 0.7\nanisotropy_convention = 'openpbr'\nrotation_deg = 70\nsheen = 0.5\nsheen_roughness = 0.4",
+        "model = 'layered'\nbase = { model = 'conductor', distribution = 'ggx', metal = 'Cu', alpha_x = 0.1, alpha_y = 0.3, rotation_deg = -20 }\ncoat = { alpha = 0.2, ior = 1.5 }",
     ] {
         let prepared = ready(&scene(model(text), Source::Builtin("studio".to_owned()), Method::Uniform, 32, (32, 24)));
         let rendering = render(&gpu, &prepared);

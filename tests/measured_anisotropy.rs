@@ -5,10 +5,9 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use std::path::Path;
 
 use common::{EVERYTHING, Validated, pixels, ready, sphere, texels_of};
-use glam::{DMat3, DVec2, DVec3};
+use glam::{DMat3, DVec2, DVec3, UVec2, Vec4};
 use threadlight::low_level::brdf::{Brdf, Symmetry};
 use threadlight::low_level::evaluate::{Comparable, Display, compare, reference::reference};
-use threadlight::low_level::pipeline::DeviceScene;
 use threadlight::low_level::scene::{Background, MaterialSource, Scene};
 use threadlight::low_level::shading::CpuShader;
 
@@ -185,35 +184,35 @@ fn scene(file: &Path, method: &str, threads: u32) -> Scene {
 }
 
 #[test]
-fn threads_shade_measured_anisotropy_and_what_needs_the_brdf_in_a_shader_refuses_it() {
+fn shaders_look_measured_anisotropy_up_in_a_table() {
     let gpu = Validated::new();
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("brushed.bsdf");
     std::fs::write(&file, rgl_file(&brushed(), false)).unwrap();
-    let prepared = ready(&scene(&file, "fitted", 2));
-    assert!(!prepared.environment.small_sources().nodes.is_empty(), "the sun is one");
-    let rendering = gpu.render(&prepared, EVERYTHING);
-
-    // The twin leaves the sun to threads as well.
-    let twin = CpuShader::new(&prepared, &gpu.round()).unwrap();
-    for (pixel, found) in pixels(&prepared).zip(&rendering.radiance) {
-        let expected = twin.shade(pixel, &texels_of(&prepared, &rendering, pixel));
-        let difference = (expected - glam::Vec4::from(*found)).abs().max_element();
-        assert!(difference < 1e-3 * (1.0 + expected.max_element()), "{pixel}: {found:?}, not {expected}");
-    }
-    drop(twin);
-
-    let truth = reference(&prepared, &gpu.device, &Default::default(), &gpu.round()).unwrap();
-    let display = Display { exposure: 1.0, gamma: 2.2 };
-    let comparable = |radiance: &[[f32; 4]]| Comparable::from_radiance(40, 30, radiance, true, display);
-    let rms = compare(&comparable(&rendering.radiance), &comparable(&truth.radiance), true).unwrap().rms;
-    println!("2 threads: RMS {rms:.5}");
-    assert!(rms < 0.045, "{rms}");
-
-    for method in ["importance", "mis"] {
+    for method in ["fitted", "importance", "mis"] {
         let prepared = ready(&scene(&file, method, 4));
-        let error = DeviceScene::new(&gpu.device, &prepared, &gpu.round()).map(|_| ()).unwrap_err().to_string();
-        assert!(error.contains("`rgl`: is anisotropic") && error.contains("--method fitted"), "{method}: {error}");
+        assert!(!prepared.environment.small_sources().nodes.is_empty(), "the sun is one");
+        let rendering = gpu.render(&prepared, EVERYTHING);
+        let twin = CpuShader::new(&prepared, &gpu.round()).unwrap();
+        let difference = |(pixel, found): (UVec2, &[f32; 4])| {
+            let expected = twin.shade(pixel, &texels_of(&prepared, &rendering, pixel));
+            (expected - Vec4::from(*found)).abs().max_element() / (1.0 + expected.max_element())
+        };
+        let mut differences: Vec<_> = pixels(&prepared).zip(&rendering.radiance).map(difference).collect();
+        differences.sort_by(f32::total_cmp);
+        // A sample on the other side of a step of a CDF makes another pixel: seldom.
+        let most = differences[differences.len() * if method == "fitted" { 100 } else { 97 } / 100 - 1];
+        println!("{method}: {most:.1e}");
+        assert!(most < 1e-3, "{method}: {most}");
+        drop(twin);
+        if method == "fitted" {
+            let truth = reference(&prepared, &gpu.device, &Default::default(), &gpu.round()).unwrap();
+            let display = Display { exposure: 1.0, gamma: 2.2 };
+            let comparable = |radiance: &[[f32; 4]]| Comparable::from_radiance(40, 30, radiance, true, display);
+            let rms = compare(&comparable(&rendering.radiance), &comparable(&truth.radiance), true).unwrap().rms;
+            println!("4 threads and a sun that is looked up: RMS {rms:.5}");
+            assert!(rms < 0.005, "{rms}");
+        }
     }
     gpu.finish();
 }

@@ -17,6 +17,7 @@ mod coat;
 mod ggx_lobe;
 mod interreflection;
 mod lobe;
+mod made_table;
 mod merl_export;
 mod metals;
 mod microfacet;
@@ -34,6 +35,7 @@ pub use coat::Coat;
 pub use custom::CustomBrdf;
 pub use ggx_lobe::{Tap, ggx_lobe};
 pub use lobe::{LobeShape, MIN_COS_THETA_D, half_vector_width, lobe_radius};
+pub use made_table::{MADE_TABLE_SIZE, MadeTable};
 pub use merl_export::merl_bytes;
 pub use microfacet::{Distribution, fresnel_conductor, fresnel_dielectric};
 pub use parameters::{Domain, Parameter, Parameters, Spacing, as_number, channels, parameter, set_parameter};
@@ -236,9 +238,13 @@ impl Brdf {
         builtin::FAMILIES.iter().map(|(family, materials)| (*family, materials.iter().map(|(name, _)| *name).collect()))
     }
 
-    /// Id of the model by which shaders evaluate it: its position in models.rs, or that of `tabulated` if it has no twin.
-    pub fn model_index(&self) -> u32 {
-        let twin = if self.has_twin() { self.model() } else { "tabulated" };
+    /// Id of the model by which shaders evaluate it, whose lobe this is: its position in models.rs, or that of a table if it has no twin.
+    pub fn model_index(&self, lobe: &LobeShape) -> u32 {
+        let twin = match self.has_twin() {
+            true => self.model(),
+            false if lobe.is_isotropic => "tabulated",
+            false => "tabulated_anisotropic",
+        };
         Brdf::MODELS.iter().position(|name| *name == twin).expect("MODELS holds every model") as u32
     }
 
@@ -247,9 +253,13 @@ impl Brdf {
         TWINS.contains(&self.model()) && !dispatch!(self, model => model.needs_table())
     }
 
-    /// Whether shaders can evaluate it at all, given its lobe: tables that are made hold isotropic BRDFs.
-    pub fn has_shader_form(&self, lobe: &LobeShape) -> bool {
-        self.has_twin() || lobe.is_isotropic
+    /// The texels of one that [`tabulate`] made; none of any other.
+    pub fn made_table(&self) -> Option<&MadeTable> {
+        match self {
+            Brdf::Tabulated(tabulated) => Some(tabulated.table()),
+            Brdf::TabulatedAnisotropic(tabulated) => Some(tabulated.table()),
+            _ => None,
+        }
     }
 
     /// The model's parameters for its GLSL twin, `BrdfParameters { vec4 a, b, c }` in memory order. Shaders have no rotation: see

@@ -22,6 +22,7 @@ brdf_models! {
     multiscatter_conductor => MultiscatterConductor,
     layered => Layered,
     tabulated => Tabulated,
+    tabulated_anisotropic => TabulatedAnisotropic,
     custom => Custom,
     rgl => Rgl,
     goniometric => Goniometric,

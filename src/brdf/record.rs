@@ -1,5 +1,5 @@
 //! A material as shaders have it. Twin of the layout: glsl/material.glsl.
-use super::{Brdf, LobeShape, Tabulated};
+use super::{Brdf, LobeShape};
 
 /// `ThreadTable` in glsl/material.glsl.
 #[repr(C)]
@@ -53,7 +53,7 @@ impl MaterialRecord {
     pub fn new(brdf: &Brdf, lobe: &LobeShape) -> Self {
         Self {
             parameters: brdf.gpu_parameters(),
-            model: brdf.model_index(),
+            model: brdf.model_index(lobe),
             first_slice: 0,
             lobe_width: lobe.width_rad as f32,
             narrowness: lobe.narrowness as f32,
@@ -70,9 +70,16 @@ impl MaterialRecord {
         self
     }
 
-    /// The same with `table` at this y and z in the atlas of tables that were made.
-    pub fn with_table_at(mut self, table: &Tabulated, place: [usize; 2]) -> Self {
-        self.parameters = table.parameters_at(place);
+    /// The same with `table`, which [`super::tabulate`] made, at this y and z in the atlas of such tables.
+    ///
+    /// # Panics
+    /// It is none.
+    pub fn with_made_table_at(mut self, table: &Brdf, place: [usize; 2]) -> Self {
+        self.parameters = match table {
+            Brdf::Tabulated(table) => table.parameters_at(place),
+            Brdf::TabulatedAnisotropic(table) => table.parameters_at(place),
+            _ => panic!("model `{}` is no table that was made", table.model()),
+        };
         self
     }
 }

@@ -81,7 +81,7 @@ fn tables_of_measured_files_err_by_what_the_guide_says() {
     ] {
         let brdf = Brdf::load(&folder.join(file)).unwrap();
         let (table, error) = tabulate(&brdf);
-        println!("{file}: {:?} nodes, error {:.2} %", table.size(), 100.0 * error);
+        println!("{file}: {:?} nodes, error {:.2} %", table.made_table().unwrap().size(), 100.0 * error);
         assert!(error < most, "{file}: {error}");
     }
 }

@@ -14,41 +14,28 @@
 //!
 //! Of a BRDF that is not reciprocal, as measured ones are not, there are two such tables, one behind the other: for light that is farther
 //! from the normal than the view, and for light that is nearer. They hold f (n . w_i), which is what was measured.
-use std::f64::consts::LN_2;
-use std::sync::Arc;
+use glam::{DVec3, dvec3};
 
-use glam::{DVec3, Vec3, dvec3};
-use half::f16;
-use rayon::prelude::*;
-
+use super::made_table::{
+    FROM_HORIZON, KNEE_THETA_D, MADE_TABLE_SIZE, MadeTable, around, exponential, logarithmic, nodes_per_doubling,
+    of_half_tangent, stored_cosine,
+};
 use super::{Model, Parameters};
 use crate::error::{Error, Result};
 
-/// 1 - tan(theta_d / 2) below which nodes are equally spaced rather than by factors.
-const KNEE_THETA_D: f64 = 0.2;
-
-/// Nodes stay this far, in parts of the cosine, from the horizon, where some BRDFs are infinite.
-const FROM_HORIZON: f64 = 1e-2;
-
-/// What the greatest value is stored as. Half precision then keeps eleven bits of all that is above a billionth of it.
-const GREATEST_TEXEL: f64 = 6e4;
-
 /// A BRDF as shaders look it up. Cheap to clone.
-#[derive(Clone)]
+#[derive(Clone, Debug)]
 pub struct Tabulated {
-    /// Values over `scale`, index (|cos phi_d|) + nodes[0] ((cos theta_d) + nodes[1] (tan(theta_h / 2) + nodes[2] side)); the fourth channel
-    /// is not used.
-    texels: Arc<[[f16; 4]]>,
+    /// In 1/sr; index (|cos phi_d|) + 17 ((cos theta_d) + 75 (tan(theta_h / 2) + tangents side)).
+    table: MadeTable,
     grid: Grid,
-    /// 1/sr: what a texel of 1 stands for.
-    scale: f64,
 }
 
-/// Where nodes lie.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// Where nodes lie: [`MADE_TABLE_SIZE`] along |cos phi_d| and 1 - tan(theta_d / 2).
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Grid {
-    /// Along |cos phi_d|, 1 - tan(theta_d / 2) and tan(theta_h / 2); at least two each.
-    pub nodes: [usize; 3],
+    /// Nodes along tan(theta_h / 2), at least two.
+    pub tangents: usize,
     /// tan(theta_h / 2) below which nodes are equally spaced rather than by factors.
     pub knee: f64,
     /// Whether f stays what it is when light and view change places. Otherwise there is a second side, for light that is nearer to the
@@ -57,18 +44,13 @@ pub(super) struct Grid {
 }
 
 impl Grid {
-    /// Those of one side.
-    pub fn cells(&self) -> usize {
-        self.nodes.iter().product()
-    }
-
     fn sides(&self) -> usize {
         if self.is_reciprocal { 1 } else { 2 }
     }
 
-    /// The cosine by which f is multiplied in the table.
-    fn cosine(&self, w_i: DVec3, w_o: DVec3) -> f64 {
-        if self.is_reciprocal { 0.5 * (w_i.z + w_o.z) } else { w_i.z }
+    fn nodes(&self) -> [usize; 3] {
+        let [columns, rows] = MADE_TABLE_SIZE;
+        [columns, rows, self.tangents]
     }
 
     /// The side of a pair of directions, and its position there in nodes, from 0 to nodes - 1.
@@ -88,12 +70,13 @@ impl Grid {
             logarithmic((sin_theta_h / (1.0 + h.z)).min(1.0), self.knee),
         );
         let side = usize::from(!self.is_reciprocal && along < 0.0);
-        (side, unit * DVec3::from_array(self.nodes.map(|count| (count - 1) as f64)))
+        (side, unit * DVec3::from_array(self.nodes().map(|count| (count - 1) as f64)))
     }
 
     /// The directions w_i and w_o at a node of the first side, moved above the horizon; on the second one they change places.
     fn directions(&self, node: [usize; 3]) -> (DVec3, DVec3) {
-        let [p, c, t] = std::array::from_fn(|axis| node[axis] as f64 / (self.nodes[axis] - 1) as f64);
+        let nodes = self.nodes();
+        let [p, c, t] = std::array::from_fn(|axis| node[axis] as f64 / (nodes[axis] - 1) as f64);
         let half_tangent = 1.0 - exponential(c, KNEE_THETA_D).clamp(1e-3, 1.0);
         let (sin_theta_d, cos_theta_d) = of_half_tangent(half_tangent);
         let tangent = exponential(t, self.knee).min(1.0 - 1e-6);
@@ -110,81 +93,40 @@ impl Grid {
     }
 }
 
-/// Sine and cosine of the angle whose half has this tangent.
-fn of_half_tangent(tangent: f64) -> (f64, f64) {
-    let square = tangent * tangent;
-    (2.0 * tangent / (1.0 + square), (1.0 - square) / (1.0 + square))
-}
-
-/// 0 to 1 for `x` of 0 to 1: linear below the knee, logarithmic above.
-fn logarithmic(x: f64, knee: f64) -> f64 {
-    (x / knee).ln_1p() / knee.recip().ln_1p()
-}
-
-/// The inverse of [`logarithmic`].
-fn exponential(x: f64, knee: f64) -> f64 {
-    knee * (x * knee.recip().ln_1p()).exp_m1()
-}
-
 impl Tabulated {
-    /// Nodes along |cos phi_d| and along 1 - tan(theta_d / 2): of all tables alike, so that an image packs them without gaps.
-    pub const NODES: [usize; 2] = [17, 75];
-
     /// The table of `f` on `grid`.
     pub(super) fn of(f: &(impl Fn(DVec3, DVec3) -> DVec3 + Sync), grid: Grid) -> Self {
+        let [columns, rows, layers] = grid.nodes();
         let value = |index: usize| {
-            let [columns, rows, layers] = grid.nodes;
-            let node = [index % columns, index / columns % rows, index / columns / rows % layers];
-            let (lower, higher) = grid.directions(node);
-            let (w_i, w_o) = if index < grid.cells() { (lower, higher) } else { (higher, lower) };
-            f(w_i, w_o) * grid.cosine(w_i, w_o)
+            let (side, layer) = (index / columns / rows / layers, index / columns / rows % layers);
+            let (lower, higher) = grid.directions([index % columns, index / columns % rows, layer]);
+            let (w_i, w_o) = if side == 0 { (lower, higher) } else { (higher, lower) };
+            f(w_i, w_o) * stored_cosine(w_i, w_o, grid.is_reciprocal)
         };
-        let values: Vec<DVec3> = (0..grid.sides() * grid.cells()).into_par_iter().map(value).collect();
-        let greatest = values.iter().fold(0.0, |greatest: f64, value| greatest.max(value.max_element()));
-        // A table that is black has any scale.
-        let scale = if greatest > 0.0 { greatest / GREATEST_TEXEL } else { 1.0 };
-        let texel = |value: &DVec3| (*value / scale).extend(1.0).to_array().map(f16::from_f64);
-        let texels = values.iter().map(texel).collect();
-        Self { texels, grid, scale }
+        Self { table: MadeTable::of(grid.sides() * columns * rows * layers, value), grid }
     }
 
-    /// Number of texels along x, y and z of a 3D texture: |cos phi_d|, 1 - tan(theta_d / 2), tan(theta_h / 2), of both sides if there are two.
-    pub fn size(&self) -> [usize; 3] {
-        let [x, y, z] = self.grid.nodes;
-        [x, y, z * self.grid.sides()]
-    }
-
-    /// The texels, x fastest. Between them one interpolates linearly.
-    pub fn texels(&self) -> &Arc<[[f16; 4]]> {
-        &self.texels
+    /// What shaders look up.
+    pub(super) fn table(&self) -> &MadeTable {
+        &self.table
     }
 
     /// What glsl/brdf/tabulated.glsl reads of a table whose first texel lies at this y and z in the atlas.
-    pub fn parameters_at(&self, [y, z]: [usize; 2]) -> [f32; 12] {
-        let Grid { nodes, knee, is_reciprocal } = self.grid;
-        let per_doubling = |count: usize, knee: f64| (count - 1) as f64 * LN_2 / knee.recip().ln_1p();
+    pub(super) fn parameters_at(&self, [y, z]: [usize; 2]) -> [f32; 12] {
+        let Grid { tangents, knee, is_reciprocal } = self.grid;
+        let [columns, rows] = MADE_TABLE_SIZE;
         let numbers = [
-            (nodes[0] - 1) as f64,
-            per_doubling(nodes[1], KNEE_THETA_D),
-            per_doubling(nodes[2], knee),
-            2.0 * self.scale,
+            (columns - 1) as f64,
+            nodes_per_doubling(rows, KNEE_THETA_D),
+            nodes_per_doubling(tangents, knee),
+            2.0 * self.table.scale,
             KNEE_THETA_D.recip(),
             knee.recip(),
             y as f64,
             z as f64,
-            if is_reciprocal { 0.0 } else { nodes[2] as f64 },
+            if is_reciprocal { 0.0 } else { tangents as f64 },
         ];
         std::array::from_fn(|i| numbers.get(i).map_or(0.0, |number| *number as f32))
-    }
-}
-
-impl std::fmt::Debug for Tabulated {
-    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        formatter
-            .debug_struct("Tabulated")
-            .field("grid", &self.grid)
-            .field("scale", &self.scale)
-            .finish_non_exhaustive()
     }
 }
 
@@ -193,16 +135,13 @@ impl Model for Tabulated {
 
     fn evaluate(&self, w_i: DVec3, w_o: DVec3) -> DVec3 {
         let (side, position) = self.grid.position(w_i, w_o);
-        let position = position.to_array();
-        let [columns, rows, _] = self.grid.nodes;
-        let first: [usize; 3] = std::array::from_fn(|axis| (position[axis] as usize).min(self.grid.nodes[axis] - 2));
-        let [x, y, z] = std::array::from_fn(|axis| (position[axis] - first[axis] as f64) as f32);
-        let start = first[0] + columns * (first[1] + rows * first[2]) + side * self.grid.cells();
-        let texel = |place: usize| Vec3::from_slice(&self.texels[place].map(f16::to_f32));
-        let line = |offset: usize| texel(start + offset).lerp(texel(start + offset + 1), x);
-        let plane = |offset: usize| line(offset).lerp(line(offset + columns), y);
-        let value = plane(0).lerp(plane(columns * rows), z);
-        value.as_dvec3() * (self.scale / self.grid.cosine(w_i, w_o))
+        let [(x, x_part), (y, y_part), (z, z_part)] = {
+            let (position, nodes) = (position.to_array(), self.grid.nodes());
+            std::array::from_fn(|axis| around(position[axis], nodes[axis]))
+        };
+        let part = dvec3(x_part, y_part, z_part).as_vec3();
+        let value = self.table.between([x, y, z + side * self.grid.tangents], part);
+        value / stored_cosine(w_i, w_o, self.grid.is_reciprocal)
     }
 
     fn from_parameters(_: &mut Parameters) -> Result<Self> {
@@ -210,9 +149,8 @@ impl Model for Tabulated {
     }
 
     fn hash_content(&self, hasher: &mut blake3::Hasher) {
-        super::hash_numbers(hasher, [self.scale, self.grid.knee]);
-        super::hash_numbers(hasher, self.grid.nodes.map(|count| count as f64));
-        super::hash_numbers(hasher, [self.grid.sides() as f64]);
-        hasher.update(bytemuck::cast_slice(&self.texels));
+        let Grid { tangents, knee, is_reciprocal } = self.grid;
+        super::hash_numbers(hasher, [tangents as f64, knee, f64::from(u8::from(is_reciprocal))]);
+        self.table.hash_content(hasher);
     }
 }

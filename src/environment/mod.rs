@@ -90,12 +90,6 @@ impl Environment {
         self.small_sources.get_or_init(|| SmallSources::of(self))
     }
 
-    /// The same, but its small sources count as all other light.
-    pub fn with_sources_left_in(&self) -> Self {
-        let none = SmallSources { nodes: Vec::new(), pixels: vec![false; self.texels.len()] };
-        Self { small_sources: none.into(), ..self.clone() }
-    }
-
     /// Its small sources alone, or this environment with them cut out.
     pub fn part(&self, of_sources: bool) -> Self {
         let pixels = &self.small_sources().pixels;

@@ -96,9 +96,8 @@ pub fn run(
 
 /// What a rendering of `prepared` specialises the shader of its method by.
 fn constants_of(prepared: &Prepared, round: &Round) -> Result<Vec<(&'static str, u32)>> {
-    let Prepared { method, materials, .. } = prepared;
-    let environment = &prepared.shading_light(round)?;
-    let models_used = models_used(materials.iter().map(|m| &*m.brdf), method.evaluates_brdf(environment));
+    let Prepared { method, environment, materials, .. } = prepared;
+    let models_used = models_used(materials.iter().map(|m| (&*m.brdf, &*m.lobe)), method.evaluates_brdf(environment));
     let needs = match method.lookups().blurred {
         true => Some(blurred_light(round, None, environment, &prepared.shaded())?.needs),
         false => None,

@@ -48,12 +48,20 @@ impl<T: Texel> BrdfAtlas<T> {
     /// Adds a table; returns its offset in y and z, in texels.
     ///
     /// # Errors
-    /// More tables than a 3D image of the device holds.
+    /// A larger table, or more of them, than a 3D image of the device holds.
     pub fn add(&mut self, device: &Device, texels: &Arc<[T]>) -> Result<[usize; 2]> {
         let limit = device.limits().max_image_dimension3_d as usize;
         let depth = self.depth(texels);
         if self.next[1] + depth > limit {
             self.next = [self.next[0] + self.size[1], 0];
+        }
+        if depth > limit {
+            let problem = format!("has a BRDF whose table is {depth} texels deep, and this device holds {limit}");
+            return Err(Error::input(
+                "the scene",
+                problem,
+                "use a model that shaders evaluate, or a device that holds more",
+            ));
         }
         if self.next[0] + self.size[1] > limit {
             let problem = format!("has more tables of BRDFs than the {} that this device holds", self.tables.len());

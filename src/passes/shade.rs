@@ -2,7 +2,7 @@
 use super::brdf_atlas::BrdfAtlas;
 use super::{CameraRays, Counters, DeviceLight, Tiles, View};
 use crate::Result;
-use crate::brdf::{Brdf, LobeShape, MaterialRecord, Tabulated, ThreadTableRecord, merl};
+use crate::brdf::{Brdf, LobeShape, MADE_TABLE_SIZE, MaterialRecord, ThreadTableRecord, merl};
 use crate::graph::{BufferDesc, BufferHandle, FrameGraph, ImageDesc, ImageHandle};
 use crate::memo::Keyed;
 use crate::method::Method;
@@ -28,8 +28,8 @@ pub struct DeviceMaterials {
 }
 
 /// Bit i: a material has the BRDF of model i, and it is evaluated.
-pub fn models_used<'a>(brdfs: impl IntoIterator<Item = &'a Brdf>, evaluates_brdf: bool) -> u32 {
-    let bits = brdfs.into_iter().filter(|_| evaluates_brdf).map(|brdf| 1 << brdf.model_index());
+pub fn models_used<'a>(materials: impl Iterator<Item = (&'a Brdf, &'a LobeShape)>, evaluates_brdf: bool) -> u32 {
+    let bits = materials.filter(|_| evaluates_brdf).map(|(brdf, lobe)| 1 << brdf.model_index(lobe));
     bits.fold(0, |all, bit| all | bit)
 }
 
@@ -42,8 +42,8 @@ pub struct ShadedMaterial<'a> {
     pub lobe: &'a LobeShape,
     /// Its threads, for methods that have any.
     pub threads: Option<&'a Threads>,
-    /// What shaders look up of a BRDF without a twin, where they evaluate it.
-    pub table: Option<&'a Tabulated>,
+    /// What shaders look up of a BRDF without a twin, where they evaluate it: [`Brdf::made_table`].
+    pub table: Option<&'a Brdf>,
 }
 
 impl DeviceMaterials {
@@ -67,9 +67,9 @@ impl DeviceMaterials {
         let mut threads = ThreadWords { words: Vec::new(), finest_level };
         let mut slices: Vec<f32> = Vec::new();
         let mut measured = BrdfAtlas::new([merl::PHI_D_BINS, merl::THETA_D_BINS]);
-        let mut made = BrdfAtlas::new(Tabulated::NODES);
+        let mut made = BrdfAtlas::new(MADE_TABLE_SIZE);
         let materials: Vec<_> = materials.into_iter().collect();
-        let models_used = models_used(materials.iter().map(|material| material.brdf), evaluates_brdf);
+        let models_used = models_used(materials.iter().map(|material| (material.brdf, material.lobe)), evaluates_brdf);
         for ShadedMaterial { brdf, lobe, threads: own_threads, table } in materials {
             let mut record = MaterialRecord::new(brdf, lobe);
             if evaluates_brdf {
@@ -77,7 +77,8 @@ impl DeviceMaterials {
                     record = record.with_measured_table_at(measured.add(device, table.texels())?);
                 } else if !brdf.has_twin() {
                     let table = table.expect("a table of a BRDF without a twin");
-                    record = record.with_table_at(table, made.add(device, table.texels())?);
+                    let texels = table.made_table().expect("a table that was made").texels();
+                    record = record.with_made_table_at(table, made.add(device, texels)?);
                 }
             }
             if let Some(kind) = method.threads() {

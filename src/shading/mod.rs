@@ -158,8 +158,7 @@ impl<'a> CpuShader<'a> {
     /// # Errors
     /// A shader that cannot be read.
     pub fn new(prepared: &'a Prepared, round: &Round) -> Result<Self> {
-        let Prepared { method, materials, .. } = prepared;
-        let environment = &prepared.shading_light(round)?;
+        let Prepared { method, environment, materials, .. } = prepared;
         let evaluates_brdf = method.evaluates_brdf(environment);
         let lookups = method.lookups();
         let light = light(round, None, *method, environment, &prepared.shaded())?;
@@ -171,7 +170,7 @@ impl<'a> CpuShader<'a> {
         let slices = lookups.slices.then(|| materials.iter().map(|material| SliceTable::new(&material.brdf)).collect());
         let table = |material: &PreparedMaterial| match evaluates_brdf && !material.brdf.has_twin() {
             false => Ok(None),
-            true => Ok(Some(Brdf::Tabulated((*round.ask(&Tabulate(&material.brdf))?).clone()))),
+            true => Ok(Some((*round.ask(&Tabulate(&material.brdf))?).clone())),
         };
         let split_sums =
             lookups.split_sum.then(|| materials.iter().map(|material| SplitSum::new(&material.brdf)).collect());

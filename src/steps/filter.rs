@@ -101,31 +101,6 @@ impl Step for Part<'_> {
     }
 }
 
-/// An environment whose small sources are left to kernels. A notice says so when it is made, not at each frame that has it.
-pub struct LeaveSources<'a> {
-    /// Which one.
-    pub environment: &'a Keyed<Environment>,
-    /// The name of a material that is why.
-    pub material: &'a str,
-}
-
-impl Step for LeaveSources<'_> {
-    type Output = Environment;
-    const NAME: &'static str = "sources";
-
-    fn key(&self, _: &Memo) -> Result<Key> {
-        Ok(Key::builder("sources left in").key(self.environment.key).build())
-    }
-
-    fn make(&self, _: &Round) -> Result<Environment> {
-        let name = self.material;
-        tracing::warn!(
-            "\"{name}\" is anisotropic, and shaders have no form of it: lamps are left to threads, which blur them"
-        );
-        Ok(self.environment.with_sources_left_in())
-    }
-}
-
 /// An environment blurred by the kernels of fitted threads.
 pub struct Blur<'a> {
     /// Of what.

@@ -1,6 +1,6 @@
 //! Loads what scenes name: meshes, environments and BRDFs, with their tables. A file is its contents, so an edited one is another.
 use crate::Result;
-use crate::brdf::{Brdf, LobeShape, Tabulated, base_files, base_files_of, tabulate};
+use crate::brdf::{Brdf, LobeShape, base_files, base_files_of, tabulate};
 use crate::environment::Environment;
 use crate::error::Error;
 use crate::file_format::FileKind;
@@ -154,23 +154,18 @@ impl Step for FindLobe<'_> {
     }
 }
 
-/// Makes the table by which shaders know a BRDF that they do not evaluate. Its error is logged. An anisotropic BRDF has none.
+/// Makes the table by which shaders know a BRDF that they do not evaluate. Its error is logged.
 pub struct Tabulate<'a>(pub &'a Keyed<Brdf>);
 
 impl Step for Tabulate<'_> {
-    type Output = Tabulated;
+    type Output = Brdf;
     const NAME: &'static str = "table of a BRDF";
 
     fn key(&self, _: &Memo) -> Result<Key> {
         Ok(self.0.key)
     }
 
-    fn make(&self, round: &Round) -> Result<Tabulated> {
-        if !self.0.has_shader_form(&*round.ask(&FindLobe(self.0))?) {
-            let problem = "is anisotropic, and shaders that evaluate BRDFs have no form of it";
-            let remedy = "use --method fitted or reference";
-            return Err(Error::input(format!("model `{}`", self.0.model()), problem, remedy));
-        }
+    fn make(&self, _: &Round) -> Result<Brdf> {
         Ok(tabulate(self.0).0)
     }
 }
@@ -178,23 +173,6 @@ impl Step for Tabulate<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn an_anisotropic_brdf_that_shaders_do_not_evaluate_is_refused() {
-        let memo = Memo::default();
-        let table_of = |anisotropy: &str| {
-            let text = format!(
-                "base_colour = 0.3\nmetallic = 1\nroughness = 0.4\nsheen = 0.5\nsheen_roughness = 0.4\n{anisotropy}"
-            );
-            let source = MaterialSource::Model { model: "principled".into(), parameters: text.parse().expect("TOML") };
-            let round = memo.round(&());
-            let brdf = round.ask(&LoadMaterial(&source)).unwrap();
-            round.ask(&Tabulate(&brdf)).map(|_| ())
-        };
-        assert!(table_of("").is_ok());
-        let error = table_of("anisotropy = 0.5\nanisotropy_convention = 'gltf'").unwrap_err().to_string();
-        assert!(error.contains("`principled`: is anisotropic"), "{error}");
-    }
 
     #[test]
     fn a_material_over_a_file_is_another_when_the_file_is() {

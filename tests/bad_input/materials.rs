@@ -69,16 +69,6 @@ fn hostile_rgl_files_are_refused() {
 }
 
 #[test]
-fn methods_that_evaluate_the_brdf_in_a_shader_refuse_measured_anisotropy() {
-    let folder = workplace();
-    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/rgl/half_turn_rgb.bsdf");
-    for method in ["importance", "paper"] {
-        let arguments = render(&format!("--material {file} --method {method}"));
-        refuses(&folder, &arguments, &["`rgl`: is anisotropic", "fitted"]);
-    }
-}
-
-#[test]
 fn hostile_goniometric_files_are_refused() {
     let folder = workplace();
     for (name, bytes, reason) in [
