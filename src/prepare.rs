@@ -7,6 +7,7 @@ use crate::method::{Method, Variant};
 use crate::passes::{PlacedMesh, PlacedTangent, Sampling, View};
 use crate::scene::{Camera, MaterialSource, Mesh, Scene, Source, TangentRule};
 use crate::steps::{DraftThreads, FindLobe, FitThreads, LoadBrushedMesh, LoadEnvironment, LoadMaterial, LoadMesh};
+use crate::threads::azimuths::azimuth_count;
 use crate::threads::{ThreadSettings, Threads, WithThreads};
 use crate::{Error, Result};
 use glam::{DAffine3, DVec3};
@@ -148,13 +149,15 @@ pub fn prepare_draft(scene: &Scene, before: &Prepared, round: &Round) -> Result<
         if let Some(finished) = round.known(&FitThreads { brdf, settings })? {
             return Ok(Some(finished));
         }
-        // Drafts are made for view angles only.
-        let is_drafted = |shown: &&PreparedMaterial| {
-            let are_isotropic = shown.lobe.is_isotropic && lobe.is_isotropic;
-            shown.name == *name && shown.brdf.model() == brdf.model() && are_isotropic
+        let is_shown = |shown: &&PreparedMaterial| shown.name == *name && shown.brdf.model() == brdf.model();
+        let mut shown = before.materials.iter().filter(is_shown);
+        let has_same_azimuths = |threads: &Threads| {
+            let azimuths = threads.fitted().map_or(1, |table| table.azimuths);
+            // Finding those of an anisotropic BRDF takes a millisecond.
+            if lobe.is_isotropic { azimuths == 1 } else { azimuths == azimuth_count(brdf) }
         };
-        let mut shown = before.materials.iter().filter(is_drafted);
-        let Some((shown, threads)) = shown.find_map(|shown| Some((shown, shown.threads.as_ref()?))) else {
+        let drafted = shown.find_map(|shown| Some((shown, shown.threads.as_ref()?)));
+        let Some((shown, threads)) = drafted.filter(|(_, threads)| has_same_azimuths(threads)) else {
             return ask_threads(round, method, material, sampling, subpixels);
         };
         is_draft.set(true);

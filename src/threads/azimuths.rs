@@ -35,11 +35,6 @@ impl View {
     pub fn of_row(index: usize, rows: usize) -> Self {
         Self { theta_o: theta_o(index % rows, rows), phi_o: (index / rows) as f64 * STEP_RAD }
     }
-
-    /// That of an isotropic BRDF.
-    pub fn of_angle(theta_o: f64) -> Self {
-        Self { theta_o, phi_o: 0.0 }
-    }
 }
 
 /// Where the azimuth `phi_o` (radians) of a view is among `count` of them, in steps, and whether what is seen is the mirror image of what is

@@ -3,7 +3,7 @@ use glam::DVec3;
 
 use super::edit::Edit;
 use super::generate::{Neighbour, Row, carried, from_the_middle, most_moved, scaled};
-use super::kernel::Kernel;
+use super::kernel::{Kernel, all_between};
 use super::lights::{Quadrature, TestLights};
 use super::solve::{Effort, Fit};
 use super::table::FittedTable;
@@ -12,10 +12,12 @@ use crate::error::Result;
 use crate::progress::Observer;
 use crate::threads::azimuths::View;
 use crate::threads::slice::{Resolution, Slice};
-use crate::threads::theta_o;
 
 /// Every so many rows one is fitted, and the last; the others are between them.
 const ROW_STEP: usize = 5;
+
+/// The same of azimuths of the view.
+const AZIMUTH_STEP: usize = 3;
 
 /// Steps of the first row, from where its threads were, and of the others.
 const FIRST: Effort = Effort { steps: 24, least_gain: 1e-3 };
@@ -36,7 +38,7 @@ const MOST_MOVED_AN_OCTAVE: f64 = 5.0;
 const FEWEST_LIGHTS: usize = 256;
 const LIGHTS_A_THREAD: usize = 16;
 
-/// Threads of `brdf`, which is isotropic, that continue those of `before`, of a BRDF not far away: with up to three times the error of
+/// Threads of `brdf` that continue those of `before`, of a BRDF not far away and of the same azimuths of the view: with up to three times the error of
 /// [`super::generate()`], in a tenth of the time. The same to the last bit on any number of cores.
 ///
 /// # Errors
@@ -50,34 +52,34 @@ pub fn draft(brdf: &Brdf, before: &FittedTable, observer: &dyn Observer) -> Resu
 
 /// The threads of `before`, but not those of its sub-pixels.
 fn continued(brdf: &Brdf, before: &FittedTable, observer: &dyn Observer) -> Result<FittedTable> {
-    let FittedTable { rows, count, sets, .. } = *before;
-    let mut places: Vec<usize> = (0..rows).step_by(ROW_STEP).collect();
-    if !places.contains(&(rows - 1)) {
-        places.push(rows - 1);
-    }
-    let view = |row: usize| View::of_angle(theta_o(row, rows));
-    let seen = SeenBrdf::from_azimuth(brdf, 0.0);
+    let FittedTable { rows, azimuths, count, sets, .. } = *before;
+    let (places, columns) = (every(ROW_STEP, rows), every(AZIMUTH_STEP, azimuths));
+    let view = |index: usize| View::of_row(index, rows);
     // The lights of a row, its albedo, and its kernels in units of the lights.
-    let of_row = |row: usize| {
-        let slices = Slice::with_lobes(&seen, view(row).theta_o, Resolution::DRAFT);
+    let of_row = |index: usize| {
+        let View { theta_o, phi_o } = view(index);
+        let slices = Slice::with_lobes(&SeenBrdf::from_azimuth(brdf, phi_o), theta_o, Resolution::DRAFT);
         let lights = TestLights::new(&slices, FEWEST_LIGHTS + LIGHTS_A_THREAD * count, 0, Quadrature::DRAFT);
         let albedo = slices[0].albedo();
-        let kernels = scaled(&in_proportion(before, row, albedo), 1.0 / lights.unit);
+        let kernels = scaled(&in_proportion(before, index, albedo), 1.0 / lights.unit);
         (lights, albedo, kernels)
     };
+    let middle = places[places.len() / 2];
     let edit = {
-        let middle = places[places.len() / 2];
         let (lights, albedo, kernels) = of_row(middle);
         let fit = Fit::new(&lights, albedo / lights.unit).in_sets(sets);
         Edit::found(&fit, &kernels, view(middle).theta_o)
     };
-    let fit = |at: usize, neighbour: Neighbour| -> Result<Row> {
+    let fit = |index: usize, neighbours: [Neighbour; 2]| -> Result<Row> {
         observer.check()?;
-        let row = places[at];
-        let (lights, albedo, kernels) = of_row(row);
+        let (lights, albedo, kernels) = of_row(index);
         // Only directions and levels are tied, so weights may be in any unit.
-        let beside = neighbour.map(|(from, (kernels, ..))| carried(kernels, view(places[from]), view(row)));
-        let mut start = edit.applied(&kernels, view(row).theta_o, beside.as_deref());
+        let carried = |(from, (kernels, ..)): (usize, &Row)| carried(kernels, view(from), view(index));
+        let beside = match neighbours {
+            [Some(a), Some(b)] => Some(all_between(&carried(a), &carried(b), 0.5)),
+            [a, b] => a.or(b).map(carried),
+        };
+        let mut start = edit.applied(&kernels, view(index).theta_o, beside.as_deref());
         let fit = Fit::new(&lights, albedo / lights.unit).in_sets(sets);
         fit.solve_weights(&mut start);
         let (tied_to, strength, effort) = match &beside {
@@ -92,20 +94,49 @@ fn continued(brdf: &Brdf, before: &FittedTable, observer: &dyn Observer) -> Resu
         let error = fit.relative_error(&kernels);
         Ok((scaled(&kernels, lights.unit), albedo, error))
     };
-    let fitted = from_the_middle(places.len(), &fit)?;
-    let row = |row: usize| {
-        let high = places.partition_point(|&place| place < row);
-        if places[high] == row {
-            return fitted[high].clone();
-        }
-        let low = high - 1;
-        let t = (row - places[low]) as f64 / (places[high] - places[low]) as f64;
-        let [a, b] = [low, high].map(|i| carried(&fitted[i].0, view(places[i]), view(row)));
-        let kernels = a.iter().zip(&b).map(|(a, b)| blended(a, b, t)).collect();
-        let ((_, albedo_a, error_a), (_, albedo_b, error_b)) = (&fitted[low], &fitted[high]);
-        (kernels, albedo_a.lerp(*albedo_b, t), error_a + t * (error_b - error_a))
+    let mut fitted: Vec<Vec<Row>> = Vec::new();
+    for (i, column) in columns.iter().enumerate() {
+        let index = |column: usize, at: usize| column * rows + places[at];
+        let rows_of_column = from_the_middle(places.len(), &|at, neighbour| {
+            let of_column = neighbour.map(|(before, row)| (index(*column, before), row));
+            let of_azimuth = i.checked_sub(1).map(|before| (index(columns[before], at), &fitted[before][at]));
+            fit(index(*column, at), [of_column, of_azimuth])
+        })?;
+        fitted.push(rows_of_column);
+    }
+    let row = |index: usize| {
+        let of_column = |at: usize| {
+            let row = |place: usize| {
+                let (kernels, albedo, error) = &fitted[at][place];
+                (carried(kernels, view(columns[at] * rows + places[place]), view(index)), *albedo, *error)
+            };
+            let (low, high, t) = around(&places, index % rows);
+            if t == 1.0 { row(high) } else { between(&row(low), &row(high), t) }
+        };
+        let (low, high, t) = around(&columns, index / rows);
+        if t == 1.0 { of_column(high) } else { between(&of_column(low), &of_column(high), t) }
     };
-    Ok(FittedTable::pack(&(0..rows).map(row).collect::<Vec<_>>(), 1, sets))
+    Ok(FittedTable::pack(&(0..azimuths * rows).map(row).collect::<Vec<_>>(), azimuths, sets))
+}
+
+/// Every so many of `count`, and the last.
+fn every(step: usize, count: usize) -> Vec<usize> {
+    let last = (count - 1) % step != 0;
+    (0..count).step_by(step).chain(last.then_some(count - 1)).collect()
+}
+
+/// Between which of `places`, which ascend, `at` is, and how far from the first to the second: above 0, but for the first of all.
+fn around(places: &[usize], at: usize) -> (usize, usize, f64) {
+    let high = places.partition_point(|&place| place < at);
+    let low = high.saturating_sub(1);
+    let t = if low == high { 1.0 } else { (at - places[low]) as f64 / (places[high] - places[low]) as f64 };
+    (low, high, t)
+}
+
+/// The row the part `t` of the way from `a` to `b`, which are both carried to its view.
+fn between((a, albedo_a, error_a): &Row, (b, albedo_b, error_b): &Row, t: f64) -> Row {
+    let kernels = a.iter().zip(b).map(|(a, b)| blended(a, b, t)).collect();
+    (kernels, albedo_a.lerp(*albedo_b, t), error_a + t * (error_b - error_a))
 }
 
 /// The kernels of `row` of `table` with weights for this albedo: another colour, or none, has them at once.
