@@ -241,7 +241,15 @@ mod tests {
     fn values_that_are_no_reflectance_count_as_none() {
         let brdf = Brdf::custom(Constant(dvec3(f64::NAN, -1.0, f64::INFINITY)));
         assert_eq!(brdf.evaluate(DVec3::Z, DVec3::Z), DVec3::ZERO);
-        assert!(tabulate(&brdf).0.made_table().unwrap().texels().iter().all(|texel| texel[..3].iter().all(|value| value.to_f32() == 0.0)));
+        assert!(
+            tabulate(&brdf)
+                .0
+                .made_table()
+                .unwrap()
+                .texels()
+                .iter()
+                .all(|texel| texel[..3].iter().all(|value| value.to_f32() == 0.0))
+        );
         assert_eq!((half_vector_width(&brdf), lobe_radius(&brdf)), (FRAC_PI_2, FRAC_PI_2));
         let brdf = Brdf::custom(Constant(dvec3(0.1, f64::NAN, 0.3)));
         let table = tabulate(&brdf).0;

@@ -58,7 +58,8 @@ impl AnisotropicGrid {
 
     /// The side of a pair of directions, and its position there in nodes: along phi_d, theta_d, h_x and h_y.
     fn position(&self, w_i: DVec3, w_o: DVec3) -> (usize, [f64; 4]) {
-        let own = |w: DVec3| DVec2::new(self.long_axis.dot(w.truncate()), self.long_axis.perp_dot(w.truncate())).extend(w.z);
+        let own =
+            |w: DVec3| DVec2::new(self.long_axis.dot(w.truncate()), self.long_axis.perp_dot(w.truncate())).extend(w.z);
         let (w_i, w_o) = (own(w_i), own(w_o));
         let h = (w_i + w_o).normalize();
         let cos_theta_d = w_i.dot(h);
@@ -175,7 +176,8 @@ impl Model for TabulatedAnisotropic {
 
     fn hash_content(&self, hasher: &mut blake3::Hasher) {
         let AnisotropicGrid { tangents, knees, long_axis, is_reciprocal } = self.grid;
-        let numbers = [tangents as f64, knees[0], knees[1], long_axis.x, long_axis.y, f64::from(u8::from(is_reciprocal))];
+        let numbers =
+            [tangents as f64, knees[0], knees[1], long_axis.x, long_axis.y, f64::from(u8::from(is_reciprocal))];
         super::hash_numbers(hasher, numbers);
         self.table.hash_content(hasher);
     }

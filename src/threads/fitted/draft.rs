@@ -19,6 +19,9 @@ const ROW_STEP: usize = 5;
 /// The same of azimuths of the view.
 const AZIMUTH_STEP: usize = 3;
 
+/// One more row is fitted, so many before the last: at the rim threads move most from row to row, and blends of rows further apart flicker.
+const RIM_STEP: usize = 2;
+
 /// Steps of the first row, from where its threads were, and of the others.
 const FIRST: Effort = Effort { steps: 24, least_gain: 1e-3 };
 const NEXT: Effort = Effort { steps: 12, least_gain: 3e-3 };
@@ -31,7 +34,7 @@ const TIED: f64 = 1e-5;
 
 /// By [`most_moved`] kernels do not move by more than this from where the edit brings them: what moves by more shows as a flicker. Where the
 /// edit changes the lobe they may, since they change with it and would lag behind it otherwise.
-const MOST_MOVED: f64 = 0.1;
+const MOST_MOVED: f64 = 0.03;
 const MOST_MOVED_AN_OCTAVE: f64 = 5.0;
 
 /// Test lights of a row: of 16 threads, half of those of a fit.
@@ -53,7 +56,11 @@ pub fn draft(brdf: &Brdf, before: &FittedTable, observer: &dyn Observer) -> Resu
 /// The threads of `before`, but not those of its sub-pixels.
 fn continued(brdf: &Brdf, before: &FittedTable, observer: &dyn Observer) -> Result<FittedTable> {
     let FittedTable { rows, azimuths, count, sets, .. } = *before;
-    let (places, columns) = (every(ROW_STEP, rows), every(AZIMUTH_STEP, azimuths));
+    let (mut places, columns) = (every(ROW_STEP, rows), every(AZIMUTH_STEP, azimuths));
+    let before_rim = rows.saturating_sub(RIM_STEP + 1);
+    if let Err(place) = places.binary_search(&before_rim) {
+        places.insert(place, before_rim);
+    }
     let view = |index: usize| View::of_row(index, rows);
     // The lights of a row, its albedo, and its kernels in units of the lights.
     let of_row = |index: usize| {
@@ -121,7 +128,7 @@ fn continued(brdf: &Brdf, before: &FittedTable, observer: &dyn Observer) -> Resu
 
 /// Every so many of `count`, and the last.
 fn every(step: usize, count: usize) -> Vec<usize> {
-    let last = (count - 1) % step != 0;
+    let last = !(count - 1).is_multiple_of(step);
     (0..count).step_by(step).chain(last.then_some(count - 1)).collect()
 }
 
