@@ -3,7 +3,7 @@ use glam::DVec3;
 
 use super::edit::Edit;
 use super::generate::{Neighbour, Row, carried, from_the_middle, most_moved, scaled};
-use super::kernel::{Kernel, all_between};
+use super::kernel::{Kernel, SHARPEST_LEVEL, WIDEST_LEVEL, all_between};
 use super::lights::{Quadrature, TestLights};
 use super::solve::{Effort, Fit};
 use super::table::FittedTable;
@@ -36,6 +36,9 @@ const TIED: f64 = 1e-5;
 /// edit changes the lobe they may, since they change with it and would lag behind it otherwise.
 const MOST_MOVED: f64 = 0.03;
 const MOST_MOVED_AN_OCTAVE: f64 = 5.0;
+
+/// Of what a row had besides a blend of fitted ones, this part is kept: else finished threads would jump to blends in the first draft.
+const REST: f64 = 0.7;
 
 /// Test lights of a row: of 16 threads, half of those of a fit.
 const FEWEST_LIGHTS: usize = 256;
@@ -111,17 +114,28 @@ fn continued(brdf: &Brdf, before: &FittedTable, observer: &dyn Observer) -> Resu
         })?;
         fitted.push(rows_of_column);
     }
-    let row = |index: usize| {
-        let of_column = |at: usize| {
-            let row = |place: usize| {
-                let (kernels, albedo, error) = &fitted[at][place];
-                (carried(kernels, view(columns[at] * rows + places[place]), view(index)), *albedo, *error)
+    // The row of this index by rows of columns and places.
+    let blend = |row_at: &dyn Fn(usize, usize) -> Row, index: usize| {
+        let of_column = |column: usize| {
+            let row = |at: usize| {
+                let (kernels, albedo, error) = row_at(column, at);
+                (carried(&kernels, view(columns[column] * rows + places[at]), view(index)), albedo, error)
             };
             let (low, high, t) = around(&places, index % rows);
             if t == 1.0 { row(high) } else { between(&row(low), &row(high), t) }
         };
         let (low, high, t) = around(&columns, index / rows);
         if t == 1.0 { of_column(high) } else { between(&of_column(low), &of_column(high), t) }
+    };
+    let moved = |index: usize| {
+        let kernels: Vec<_> = before.row(index).iter().map(|packed| packed.kernel()).collect();
+        let albedo = DVec3::from_array(before.albedo[index].map(f64::from));
+        (edit.applied(&kernels, view(index).theta_o, None), albedo, 0.0)
+    };
+    let row = |index: usize| {
+        let blended = blend(&|column, at| fitted[column][at].clone(), index);
+        let blended_before = blend(&|column, at| moved(columns[column] * rows + places[at]), index);
+        with_rest(blended, &blended_before, &moved(index))
     };
     Ok(FittedTable::pack(&(0..azimuths * rows).map(row).collect::<Vec<_>>(), azimuths, sets))
 }
@@ -144,6 +158,26 @@ fn around(places: &[usize], at: usize) -> (usize, usize, f64) {
 fn between((a, albedo_a, error_a): &Row, (b, albedo_b, error_b): &Row, t: f64) -> Row {
     let kernels = a.iter().zip(b).map(|(a, b)| blended(a, b, t)).collect();
     (kernels, albedo_a.lerp(*albedo_b, t), error_a + t * (error_b - error_a))
+}
+
+/// The row `blended` with the part [`REST`] of what `before` has besides its own blend.
+fn with_rest((kernels, albedo, error): Row, blended_before: &Row, before: &Row) -> Row {
+    let (kernels_blended, albedo_blended, _) = blended_before;
+    let (kernels_before, albedo_before, _) = before;
+    let over = |a: DVec3, b: DVec3, or: DVec3| DVec3::select(b.cmpgt(DVec3::ZERO), a / b, or);
+    let albedo = albedo * DVec3::ONE.lerp(over(*albedo_before, *albedo_blended, DVec3::ONE), REST);
+    let with_rest = |(kernel, (before, blended)): (&Kernel, (&Kernel, &Kernel))| {
+        let part_of = |weight: DVec3, albedo: DVec3| over(weight, albedo, DVec3::ZERO);
+        let part = part_of(before.weight, *albedo_before) - part_of(blended.weight, *albedo_blended);
+        Kernel {
+            direction: (kernel.direction + REST * (before.direction - blended.direction))
+                .normalize_or(kernel.direction),
+            level: (kernel.level + REST * (before.level - blended.level)).clamp(SHARPEST_LEVEL, WIDEST_LEVEL),
+            weight: (kernel.weight + REST * albedo * part).max(DVec3::ZERO),
+        }
+    };
+    let kernels = kernels.iter().zip(kernels_before.iter().zip(kernels_blended)).map(with_rest).collect();
+    (kernels, albedo, error)
 }
 
 /// The kernels of `row` of `table` with weights for this albedo: another colour, or none, has them at once.
