@@ -37,8 +37,7 @@ const TIED: f64 = 1e-5;
 const MOST_MOVED: f64 = 0.03;
 const MOST_MOVED_AN_OCTAVE: f64 = 5.0;
 
-/// Of what a row had besides a blend of fitted ones, this part is kept: else finished threads would jump to blends in the first draft. Not of
-/// anisotropic BRDFs: there lobes change in one direction, which the octaves of an edit do not follow, and drafts would err by a tenth more.
+/// Of what a row had besides a blend of fitted ones, this part is kept: else finished threads would jump to blends in the first draft.
 const REST: f64 = 0.7;
 
 /// Test lights of a row: of 16 threads, half of those of a fit.
@@ -135,9 +134,6 @@ fn continued(brdf: &Brdf, before: &FittedTable, observer: &dyn Observer) -> Resu
     };
     let row = |index: usize| {
         let blended = blend(&|column, at| fitted[column][at].clone(), index);
-        if azimuths > 1 {
-            return blended;
-        }
         let blended_before = blend(&|column, at| moved(columns[column] * rows + places[at]), index);
         with_rest(blended, &blended_before, &moved(index))
     };
