@@ -20,6 +20,7 @@ const ROW_STEP: usize = 5;
 const AZIMUTH_STEP: usize = 3;
 
 /// One more row is fitted, so many before the last: at the rim threads move most from row to row, and blends of rows further apart flicker.
+/// Not of anisotropic BRDFs: brushed aluminium's drafts had 1.1 times the error with it, for a quarter more time.
 const RIM_STEP: usize = 2;
 
 /// Steps of the first row, from where its threads were, and of the others.
@@ -61,7 +62,7 @@ fn continued(brdf: &Brdf, before: &FittedTable, observer: &dyn Observer) -> Resu
     let FittedTable { rows, azimuths, count, sets, .. } = *before;
     let (mut places, columns) = (every(ROW_STEP, rows), every(AZIMUTH_STEP, azimuths));
     let before_rim = rows.saturating_sub(RIM_STEP + 1);
-    if let Err(place) = places.binary_search(&before_rim) {
+    if let (Err(place), 1) = (places.binary_search(&before_rim), azimuths) {
         places.insert(place, before_rim);
     }
     let view = |index: usize| View::of_row(index, rows);
