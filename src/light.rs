@@ -79,6 +79,12 @@ pub fn finest_level(pyramid: &VmfPyramid) -> f32 {
 }
 
 impl KernelNeeds {
+    /// The most that any kernels may look up: what one frame needs and the next does not is there for all frames.
+    pub fn of_any(environment: &Environment) -> Self {
+        let sources = !environment.small_sources().nodes.is_empty();
+        Self { map: true, sources, mirrored_sources: sources }
+    }
+
     /// What those of `materials` do, where the environment without its small sources is blurred as `rest`.
     pub fn of(environment: &Environment, materials: &[WithThreads], rest: &VmfPyramid) -> Self {
         let finest_level = finest_level(rest);

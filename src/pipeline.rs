@@ -125,7 +125,9 @@ impl DeviceScene {
         let geometry_cache = ask_geometry_cache(device, prepared, round)?;
         let materials: Vec<_> = prepared.materials.iter().map(|m| (&m.brdf, m.threads.as_ref())).collect();
         let evaluates_brdf = method.evaluates_brdf(environment);
-        let light = light(round, Some(device), method, environment, &prepared.shaded())?;
+        let shaded = prepared.shaded();
+        // Drafts follow each other faster than light could be uploaded and shaders compiled for what each of them needs.
+        let light = light(round, Some(device), method, environment, (!prepared.is_draft).then_some(&*shaded))?;
         let finest_level = light.blurred.as_ref().map(|blurred| finest_level(&blurred.rest));
         let upload = UploadMaterials { device, method, materials: &materials, evaluates_brdf, finest_level };
         let materials = round.ask(&upload)?;

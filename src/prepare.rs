@@ -34,6 +34,8 @@ pub struct Prepared {
     pub objects: Vec<PlacedMesh>,
     /// Name, BRDF and threads of each material that an object has.
     pub materials: Vec<PreparedMaterial>,
+    /// Whether some of its threads only stand in for those that are being made, and others may follow at once.
+    pub is_draft: bool,
 }
 
 /// A mesh and its name in the scene.
@@ -132,6 +134,13 @@ pub fn can_draft(scene: &Scene, before: &Prepared) -> bool {
         && scene.used_materials().into_iter().all(was_edited)
 }
 
+/// Whether parameters of `prepared` can be changed such that threads are drafted: [`can_draft`].
+pub fn may_be_drafted(prepared: &Prepared) -> bool {
+    let with_parameters = Brdf::models_with_parameters();
+    prepared.method == Method::Fitted
+        && prepared.materials.iter().any(|material| with_parameters.contains(&material.brdf.model()))
+}
+
 /// As [`prepare`], but threads that are not known yet are drafted from those of `before`; none where that cannot be ([`can_draft`]) or
 /// nothing has to be.
 ///
@@ -169,7 +178,7 @@ pub fn prepare_draft(scene: &Scene, before: &Prepared, round: &Round) -> Result<
         round.ask(&DraftThreads { brdf, before: threads }).map(Some)
     };
     let prepared = prepare_by(scene, round, &ask)?;
-    Ok(is_draft.get().then_some(prepared))
+    Ok(is_draft.get().then_some(Prepared { is_draft: true, ..prepared }))
 }
 
 /// Gives the threads of a material that has none yet.
@@ -210,6 +219,7 @@ fn prepare_by(scene: &Scene, round: &Round, ask_threads: &AskThreads) -> Result<
         meshes,
         objects,
         materials,
+        is_draft: false,
     };
     prepared.place_tangents(round)?;
     Ok(prepared)

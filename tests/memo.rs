@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex};
 use threadlight::low_level::brdf::{Brdf, Custom, CustomBrdf};
 use threadlight::low_level::memo::Memo;
 use threadlight::low_level::pipeline::{DeviceScene, Wanted};
-use threadlight::low_level::prepare::{key_of, prepare};
+use threadlight::low_level::prepare::{Prepared, key_of, prepare, prepare_draft};
 use threadlight::low_level::progress::Observer;
 use threadlight::low_level::scene::{
     Background, Camera, MaterialSettings, MaterialSource, ObjectSettings, Scene, Source,
@@ -113,6 +113,32 @@ fn a_rotation_of_the_material_fits_nothing() {
         assert_ne!(keys[0], keys[1], "what is shown is another");
     }
     drop(renderer);
+    gpu.finish();
+}
+
+#[test]
+fn drafts_of_a_drag_share_light_and_shaders() {
+    let gpu = Validated::new();
+    let of_alpha = |alpha: f64| {
+        let metal = common::model(&format!("model = 'conductor'\ndistribution = 'ggx'\nmetal = 'Al'\nalpha = {alpha}"));
+        sphere(metal, "sun", 2, (32, 24))
+    };
+    let (shown, _) = ask(&gpu, &of_alpha(0.6));
+    let round = gpu.round();
+    let before = prepare(&of_alpha(0.6), &round).unwrap();
+    let first = Prepared { is_draft: true, ..before.clone() };
+    let ready = DeviceScene::new(&gpu.device, &first, &round).unwrap();
+    // From a lobe that is wider than the sun and the finest kernels to one that mirrors both.
+    for alpha in [0.5, 0.002] {
+        let round = gpu.round();
+        let draft = prepare_draft(&of_alpha(alpha), &before, &round).unwrap().expect("a draft");
+        DeviceScene::new(&gpu.device, &draft, &round).unwrap();
+        assert_eq!(round.made(), ["material", "lobe", "draft", "upload of materials"], "{alpha}");
+    }
+    drop((ready, round));
+    let (_, made) = ask(&gpu, &of_alpha(0.002));
+    assert!(["upload of the environment", "shaders"].iter().all(|step| made.contains(step)), "{made:?}");
+    drop(shown);
     gpu.finish();
 }
 

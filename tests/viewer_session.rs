@@ -95,7 +95,7 @@ fn of_two_materials_that_are_edited_in_turn_each_keeps_its_threads() {
             assert!(start.elapsed() < Duration::from_secs(100), "nothing was loaded");
         }
         let loaded = viewer.loaded().unwrap();
-        (loaded.is_draft, threads_of(&loaded.prepared))
+        (loaded.is_draft(), threads_of(&loaded.prepared))
     };
     let finished = threads_of(&viewer.loaded().unwrap().prepared);
     let (is_draft, of_metal) = next(&mut viewer, &set("metal", "alpha", 0.31.into()));
@@ -112,7 +112,7 @@ fn of_two_materials_that_are_edited_in_turn_each_keeps_its_threads() {
     wait(&mut viewer);
     let expected = common::ready(&scene(0.25, 0.31));
     let loaded = viewer.loaded().unwrap();
-    assert!(!loaded.is_draft);
+    assert!(!loaded.is_draft());
     assert!(threads_of(&loaded.prepared) == threads_of(&expected));
     viewer.handle(&Input::SavePicture(late.clone()));
     assert!(std::fs::read(early).unwrap() == std::fs::read(late).unwrap());
@@ -132,14 +132,14 @@ fn a_draft_is_finished_though_something_else_cannot_be_loaded_meanwhile() {
     let value = vec![0.75, 0.5, 0.5].into();
     viewer.handle(&Input::Set(Change::Parameter { material: "m".into(), key: "reflectance".into(), value }));
     let start = Instant::now();
-    while !viewer.loaded().unwrap().is_draft {
+    while !viewer.loaded().unwrap().is_draft() {
         viewer.take_loaded().unwrap();
         assert!(start.elapsed() < Duration::from_secs(100), "no draft");
     }
     viewer.handle(&Input::Drop(broken));
     wait(&mut viewer);
     assert!(viewer.notice.as_ref().is_some_and(|notice| notice.is_error));
-    assert!(!viewer.loaded().unwrap().is_draft && (red(&viewer) - 0.75).abs() < 1e-9);
+    assert!(!viewer.loaded().unwrap().is_draft() && (red(&viewer) - 0.75).abs() < 1e-9);
     drop(viewer);
     gpu.finish();
 }

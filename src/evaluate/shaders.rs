@@ -99,7 +99,7 @@ fn constants_of(prepared: &Prepared, round: &Round) -> Result<Vec<(&'static str,
     let Prepared { method, environment, materials, .. } = prepared;
     let models_used = models_used(materials.iter().map(|m| (&*m.brdf, &*m.lobe)), method.evaluates_brdf(environment));
     let needs = match method.lookups().blurred {
-        true => Some(blurred_light(round, None, environment, &prepared.shaded())?.needs),
+        true => Some(blurred_light(round, None, environment, Some(&prepared.shaded()))?.needs),
         false => None,
     };
     Ok(shade_constants(prepared, models_used, needs))

@@ -161,7 +161,7 @@ impl<'a> CpuShader<'a> {
         let Prepared { method, environment, materials, .. } = prepared;
         let evaluates_brdf = method.evaluates_brdf(environment);
         let lookups = method.lookups();
-        let light = light(round, None, *method, environment, &prepared.shaded())?;
+        let light = light(round, None, *method, environment, Some(&prepared.shaded()))?;
         let map = match lookups {
             Lookups { blurred: true, .. } => Some(LightMap::with_sources_marked(environment)),
             Lookups { map: true, .. } => Some(LightMap::new(environment)),

@@ -131,7 +131,7 @@ impl Step for Blur<'_> {
     }
 }
 
-/// What `method` looks up of `environment` for these materials; `device` blurs, if there is one.
+/// What `method` looks up of `environment` for these materials, or for any where there are none; `device` blurs, if there is one.
 ///
 /// # Errors
 /// Whatever Vulkan refuses; cancelled.
@@ -140,7 +140,7 @@ pub fn light(
     device: Option<&Arc<Device>>,
     method: Method,
     environment: &Keyed<Environment>,
-    materials: &[WithThreads],
+    materials: Option<&[WithThreads]>,
 ) -> Result<Light> {
     let lookups = method.lookups();
     Ok(Light {
@@ -162,7 +162,7 @@ pub fn light(
     })
 }
 
-/// What fitted threads look up of `environment` for these materials.
+/// What fitted threads look up of `environment` for these materials, or for any where there are none.
 ///
 /// # Errors
 /// Whatever Vulkan refuses; cancelled.
@@ -170,7 +170,7 @@ pub fn blurred_light(
     round: &Round,
     device: Option<&Arc<Device>>,
     environment: &Keyed<Environment>,
-    materials: &[WithThreads],
+    materials: Option<&[WithThreads]>,
 ) -> Result<BlurredLight> {
     let has_sources = !environment.small_sources().nodes.is_empty();
     let part = |of_sources| match has_sources {
@@ -180,7 +180,10 @@ pub fn blurred_light(
     let rest = part(false)?;
     let irradiance = round.ask(&Irradiance(&rest))?;
     let rest = round.ask(&Blur { environment: &rest, device })?;
-    let needs = KernelNeeds::of(environment, materials, &rest);
+    let needs = match materials {
+        Some(materials) => KernelNeeds::of(environment, materials, &rest),
+        None => KernelNeeds::of_any(environment),
+    };
     let sources = match needs.mirrored_sources {
         true => Some(round.ask(&Blur { environment: &part(true)?, device })?),
         false => None,

@@ -115,7 +115,7 @@ impl Viewer {
         let start = Instant::now();
         self.turn();
         let loaded = self.loaded.clone();
-        let is_draft = loaded.as_ref().is_some_and(|loaded| loaded.is_draft);
+        let is_draft = loaded.as_ref().is_some_and(Loaded::is_draft);
         let is_moving = (self.is_moving(is_held) || is_draft) && !screenshot;
         let view = match &loaded {
             Some(loaded) => {
@@ -183,7 +183,7 @@ impl Viewer {
         let Some(loaded) = self.loaded.clone() else {
             return Err(Error::input("the picture", "has not been loaded yet", "wait until it is shown"));
         };
-        let loaded = if loaded.is_draft { self.finished(&loaded)? } else { loaded };
+        let loaded = if loaded.is_draft() { self.finished(&loaded)? } else { loaded };
         let mut renderer = (*loaded.renderer).clone();
         renderer.view = self.view(&loaded)?;
         let wanted = Wanted { radiance: format == Format::Exr, display: format == Format::Png, geometry: false };

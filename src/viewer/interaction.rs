@@ -13,6 +13,7 @@ use super::plots::Plotter;
 use super::session::Session;
 use crate::memo::{Key, Memo};
 use crate::passes::Area;
+use crate::pipeline::DeviceScene;
 use crate::prepare::{Prepared, view_of};
 use crate::scene::{Background, Scene};
 use crate::vulkan::Device;
@@ -50,6 +51,10 @@ pub struct Viewer {
     pub cursor: Option<[f64; 2]>,
     pub(super) loaded: Option<Loaded>,
     pub(super) loading: LatestJob<Loaded>,
+    /// Makes what drafts need before there is one.
+    pub(super) getting_ready: LatestJob<DeviceScene>,
+    /// Keeps that for them.
+    pub(super) ready: Option<DeviceScene>,
     /// What is wanted is made of this; none where a file cannot be read.
     pub(super) wanted: Option<Key>,
     /// What was asked for last.
@@ -80,7 +85,7 @@ impl Viewer {
     /// A viewer of `scene`, which begins to load. `wake` is called when there is something new to be drawn.
     pub fn new(scene: Scene, device: &Arc<Device>, memo: Memo, wake: impl Fn() + Send + Sync + 'static) -> Self {
         let wake = Arc::new(wake);
-        let (wake_too, wake_for_plots) = (wake.clone(), wake.clone());
+        let (wake_too, wake_for_plots, wake_when_ready) = (wake.clone(), wake.clone(), wake.clone());
         #[cfg(feature = "hot-reload")]
         let wake_for_shaders = wake.clone();
         let area = Area { left: 0, top: 0, width: scene.image.width, height: scene.image.height };
@@ -95,6 +100,8 @@ impl Viewer {
             plotter: Plotter::new(move || wake_for_plots()),
             cursor: None,
             loading: LatestJob::new("loading", move || wake()),
+            getting_ready: LatestJob::new("getting ready", move || wake_when_ready()),
+            ready: None,
             wanted: None,
             requested: None,
             drafting_since: None,

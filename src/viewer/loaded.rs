@@ -15,13 +15,16 @@ pub struct Loaded {
     pub renderer: Arc<DeviceScene>,
     /// What it was made of.
     pub key: Option<Key>,
-    /// Whether some of its threads only stand in for those that are being made.
-    pub is_draft: bool,
     /// The change that it was asked for by: [`super::latency::Latency::asked`].
     pub change: u64,
 }
 
 impl Loaded {
+    /// Whether some of its threads only stand in for those that are being made.
+    pub fn is_draft(&self) -> bool {
+        self.prepared.is_draft
+    }
+
     /// What was loaded, looked at as `scene` says, which names nothing else.
     ///
     /// # Errors

@@ -3,8 +3,8 @@ use super::interaction::Viewer;
 use super::latest_job::Progress;
 use super::loaded::Loaded;
 use crate::memo::Round;
-use crate::pipeline::DeviceScene;
-use crate::prepare::{Prepared, can_draft, key_of, prepare, prepare_draft};
+use crate::pipeline::{DeviceScene, Wanted};
+use crate::prepare::{Prepared, can_draft, key_of, may_be_drafted, prepare, prepare_draft};
 #[cfg(feature = "hot-reload")]
 use crate::progress::Observer;
 use crate::{Error, Result};
@@ -46,7 +46,7 @@ impl Viewer {
 
     /// Whether anything is made in the background.
     pub fn is_busy(&self) -> bool {
-        self.is_loading() || self.comparer.is_busy() || self.plotter.is_busy()
+        self.is_loading() || self.getting_ready.is_busy() || self.comparer.is_busy() || self.plotter.is_busy()
     }
 
     /// Asks for what is wanted, if that is another than what was asked for last: for a draft of it first, where that can be.
@@ -65,21 +65,22 @@ impl Viewer {
             return;
         }
         (self.requested, self.drafting_since) = (key, before.is_some().then(Instant::now));
+        self.getting_ready.cancel();
         let (device, memo, change) = (self.device.clone(), self.memo.clone(), self.changes);
         self.loading.request(move |task| {
-            let loaded = |prepared: Prepared, round: &Round, is_draft: bool| -> Result<Loaded> {
+            let loaded = |prepared: Prepared, round: &Round| -> Result<Loaded> {
                 let renderer = Arc::new(DeviceScene::new(&device, &prepared, round)?);
-                Ok(Loaded { prepared: Arc::new(prepared), renderer, key, is_draft, change })
+                Ok(Loaded { prepared: Arc::new(prepared), renderer, key, change })
             };
             if let Some(before) = before {
                 let round = memo.round(task);
                 if let Some(draft) = prepare_draft(&scene, &before, &round)? {
-                    task.publish(loaded(draft, &round, true)?);
+                    task.publish(loaded(draft, &round)?);
                     task.rest(BEFORE_FINISHING)?;
                 }
             }
             let round = memo.round(task);
-            loaded(prepare(&scene, &round)?, &round, false)
+            loaded(prepare(&scene, &round)?, &round)
         });
     }
 
@@ -96,7 +97,24 @@ impl Viewer {
             let prepared = prepare(&scene, &round)?;
             let renderer = crate::vulkan::hot_reload::reload(|| DeviceScene::new(&device, &prepared, &round))?;
             let (prepared, renderer) = (Arc::new(prepared), Arc::new(renderer));
-            Ok(Loaded { prepared, renderer, key, is_draft: false, change })
+            Ok(Loaded { prepared, renderer, key, change })
+        });
+    }
+
+    /// Begins to make what drafts of what is `loaded` look up and are shaded by, if there can be any: else the first one of a drag would wait
+    /// for it.
+    fn get_ready_for_drafts(&mut self, loaded: &Loaded) {
+        self.ready = None;
+        if !may_be_drafted(&loaded.prepared) {
+            return;
+        }
+        let draft = Prepared { is_draft: true, ..(*loaded.prepared).clone() };
+        let (device, memo) = (self.device.clone(), self.memo.clone());
+        self.getting_ready.request(move |task| {
+            let renderer = DeviceScene::new(&device, &draft, &memo.round(task))?;
+            // Drivers may compile a shader where it first runs, and for the sizes that it meets.
+            renderer.render(Wanted::default(), 1)?;
+            Ok(renderer)
         });
     }
 
@@ -108,6 +126,10 @@ impl Viewer {
         #[cfg(feature = "hot-reload")]
         if self.shaders.take() {
             self.reload_shaders();
+        }
+        if let Some(ready) = self.getting_ready.take() {
+            // Where it cannot be made, drafts will tell.
+            self.ready = ready.ok();
         }
         let mut is_new = self.comparer.take().unwrap_or_else(|error| {
             self.tell_error(&error);
@@ -122,6 +144,9 @@ impl Viewer {
                     let before = self.loaded.replace(loaded.clone());
                     self.is_compiled &= before.is_some_and(|before| before.renderer.shades_as(&loaded.renderer));
                     self.request_after_frame |= was_drafting;
+                    if !loaded.is_draft() {
+                        self.get_ready_for_drafts(&loaded);
+                    }
                 }
                 Err(Error::Cancelled) => {}
                 Err(error) if self.loaded.is_none() => return Err(error),
@@ -129,7 +154,7 @@ impl Viewer {
                     self.session.failed();
                     self.latency.failed();
                     // A draft is still to be finished.
-                    let loaded = self.loaded.as_ref().filter(|loaded| !loaded.is_draft);
+                    let loaded = self.loaded.as_ref().filter(|loaded| !loaded.is_draft());
                     self.requested = loaded.and_then(|loaded| loaded.key);
                     self.tell_error(&error);
                     self.request();
@@ -144,6 +169,6 @@ impl Viewer {
         let round = self.memo.round(&());
         let prepared = prepare(&draft.prepared.scene, &round)?;
         let renderer = Arc::new(DeviceScene::new(&self.device, &prepared, &round)?);
-        Ok(Loaded { prepared: Arc::new(prepared), renderer, is_draft: false, ..draft.clone() })
+        Ok(Loaded { prepared: Arc::new(prepared), renderer, ..draft.clone() })
     }
 }

@@ -106,38 +106,35 @@ fn continued(brdf: &Brdf, before: &FittedTable, observer: &dyn Observer) -> Resu
         Ok((scaled(&kernels, lights.unit), albedo, error))
     };
     let mut fitted: Vec<Vec<Row>> = Vec::new();
-    for (i, column) in columns.iter().enumerate() {
-        let index = |column: usize, at: usize| column * rows + places[at];
+    let index = |column: usize, at: usize| columns[column] * rows + places[at];
+    for column in 0..columns.len() {
         let rows_of_column = from_the_middle(places.len(), &|at, neighbour| {
-            let of_column = neighbour.map(|(before, row)| (index(*column, before), row));
-            let of_azimuth = i.checked_sub(1).map(|before| (index(columns[before], at), &fitted[before][at]));
-            fit(index(*column, at), [of_column, of_azimuth])
+            let of_column = neighbour.map(|(before, row)| (index(column, before), row));
+            let of_azimuth = column.checked_sub(1).map(|before| (index(before, at), &fitted[before][at]));
+            fit(index(column, at), [of_column, of_azimuth])
         })?;
         fitted.push(rows_of_column);
     }
-    // The row of this index by rows of columns and places.
-    let blend = |row_at: &dyn Fn(usize, usize) -> Row, index: usize| {
+    let blend = |rows_of_columns: &[Vec<Row>], to: usize| {
         let of_column = |column: usize| {
             let row = |at: usize| {
-                let (kernels, albedo, error) = row_at(column, at);
-                (carried(&kernels, view(columns[column] * rows + places[at]), view(index)), albedo, error)
+                let (kernels, albedo, error) = &rows_of_columns[column][at];
+                (carried(kernels, view(index(column, at)), view(to)), *albedo, *error)
             };
-            let (low, high, t) = around(&places, index % rows);
+            let (low, high, t) = around(&places, to % rows);
             if t == 1.0 { row(high) } else { between(&row(low), &row(high), t) }
         };
-        let (low, high, t) = around(&columns, index / rows);
+        let (low, high, t) = around(&columns, to / rows);
         if t == 1.0 { of_column(high) } else { between(&of_column(low), &of_column(high), t) }
     };
-    let moved = |index: usize| {
-        let kernels: Vec<_> = before.row(index).iter().map(|packed| packed.kernel()).collect();
-        let albedo = DVec3::from_array(before.albedo[index].map(f64::from));
-        (edit.applied(&kernels, view(index).theta_o, None), albedo, 0.0)
+    let edited = |index: usize| {
+        (edit.applied(&before.unpacked_row(index), view(index).theta_o, None), albedo_of(before, index), 0.0)
     };
-    let row = |index: usize| {
-        let blended = blend(&|column, at| fitted[column][at].clone(), index);
-        let blended_before = blend(&|column, at| moved(columns[column] * rows + places[at]), index);
-        with_rest(blended, &blended_before, &moved(index))
-    };
+    let edited: Vec<Row> = (0..azimuths * rows).map(edited).collect();
+    let edited_where_fitted: Vec<Vec<Row>> = (0..columns.len())
+        .map(|column| (0..places.len()).map(|at| edited[index(column, at)].clone()).collect())
+        .collect();
+    let row = |to: usize| with_rest(blend(&fitted, to), &blend(&edited_where_fitted, to), &edited[to]);
     Ok(FittedTable::pack(&(0..azimuths * rows).map(row).collect::<Vec<_>>(), azimuths, sets))
 }
 
@@ -165,10 +162,9 @@ fn between((a, albedo_a, error_a): &Row, (b, albedo_b, error_b): &Row, t: f64) -
 fn with_rest((kernels, albedo, error): Row, blended_before: &Row, before: &Row) -> Row {
     let (kernels_blended, albedo_blended, _) = blended_before;
     let (kernels_before, albedo_before, _) = before;
-    let over = |a: DVec3, b: DVec3, or: DVec3| DVec3::select(b.cmpgt(DVec3::ZERO), a / b, or);
-    let albedo = albedo * DVec3::ONE.lerp(over(*albedo_before, *albedo_blended, DVec3::ONE), REST);
+    let albedo = albedo * DVec3::ONE.lerp(ratio_or(*albedo_before, *albedo_blended, DVec3::ONE), REST);
     let with_rest = |(kernel, (before, blended)): (&Kernel, (&Kernel, &Kernel))| {
-        let part_of = |weight: DVec3, albedo: DVec3| over(weight, albedo, DVec3::ZERO);
+        let part_of = |weight: DVec3, albedo: DVec3| ratio_or(weight, albedo, DVec3::ZERO);
         let part = part_of(before.weight, *albedo_before) - part_of(blended.weight, *albedo_blended);
         Kernel {
             direction: (kernel.direction + REST * (before.direction - blended.direction))
@@ -183,10 +179,18 @@ fn with_rest((kernels, albedo, error): Row, blended_before: &Row, before: &Row) 
 
 /// The kernels of `row` of `table` with weights for this albedo: another colour, or none, has them at once.
 fn in_proportion(table: &FittedTable, row: usize, albedo: DVec3) -> Vec<Kernel> {
-    let kernels: Vec<_> = table.row(row).iter().map(|packed| packed.kernel()).collect();
-    let before = DVec3::from_array(table.albedo[row].map(f64::from));
-    let factor = DVec3::select(before.cmpgt(DVec3::ZERO), albedo / before, DVec3::ZERO);
-    kernels.into_iter().map(|kernel| Kernel { weight: factor * kernel.weight, ..kernel }).collect()
+    let factor = ratio_or(albedo, albedo_of(table, row), DVec3::ZERO);
+    let kernels = table.unpacked_row(row).into_iter();
+    kernels.map(|kernel| Kernel { weight: factor * kernel.weight, ..kernel }).collect()
+}
+
+fn albedo_of(table: &FittedTable, row: usize) -> DVec3 {
+    DVec3::from_array(table.albedo[row].map(f64::from))
+}
+
+/// `a / b` in each channel, and `or` where `b` is 0.
+fn ratio_or(a: DVec3, b: DVec3, or: DVec3) -> DVec3 {
+    DVec3::select(b.cmpgt(DVec3::ZERO), a / b, or)
 }
 
 /// The kernel the part `t` of the way from `a` to `b`, of rows further apart than a degree. It is where most of its weight comes from: one

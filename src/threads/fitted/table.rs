@@ -116,14 +116,18 @@ impl FittedTable {
         &self.kernels[row * self.count..][..self.count]
     }
 
+    /// The same in the form that fits have them in.
+    pub(super) fn unpacked_row(&self, row: usize) -> Vec<Kernel> {
+        self.row(row).iter().map(|packed| packed.kernel()).collect()
+    }
+
     /// The kernels for the view angle `theta_o` and its azimuth `phi_o` from the tangent (radians): between rows as shading has them.
     pub fn seen_from(&self, theta_o: f64, phi_o: f64) -> Vec<Kernel> {
         let position = (theta_o / FRAC_PI_2 * self.rows as f64).clamp(0.0, (self.rows - 1) as f64);
         let (low, t) = (position as usize, position.fract());
         let high = (low + 1).min(self.rows - 1);
         let at_azimuth = |azimuth: usize| -> Vec<Kernel> {
-            let [low, high] = [low, high].map(|row| self.row(azimuth * self.rows + row));
-            let [low, high] = [low, high].map(|row| row.iter().map(|packed| packed.kernel()).collect::<Vec<_>>());
+            let [low, high] = [low, high].map(|row| self.unpacked_row(azimuth * self.rows + row));
             all_between(&low, &high, t)
         };
         if self.azimuths == 1 {

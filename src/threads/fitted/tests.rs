@@ -54,7 +54,7 @@ fn kernels_do_not_jump_between_rows() {
     let gold = Brdf::builtin("gold").unwrap();
     let table = generate(&gold, &ThreadSettings::default().for_picture(&LobeShape::of(&gold), 2), &()).unwrap();
     for (table, row) in table.tables().flat_map(|table| (1..table.rows).map(move |row| (table, row))) {
-        let at = |row: usize| table.row(row).iter().map(|packed| packed.kernel()).collect::<Vec<_>>();
+        let at = |row: usize| table.unpacked_row(row);
         let [from, to] = [row - 1, row].map(|row| View::of_row(row, table.rows));
         let albedo = glam::Vec3::from(table.albedo[row]).as_dvec3();
         let before = at(row - 1);
@@ -319,7 +319,7 @@ fn gaussians_of_a_brdf_made_of_gaussians_are_these() {
     for row in 0..table.rows {
         let theta_o = theta_o(row, table.rows);
         let expected = TwoGaussians::kernels(theta_o);
-        let mut found: Vec<_> = table.row(row).iter().map(|packed| packed.kernel()).collect();
+        let mut found = table.unpacked_row(row);
         found.sort_by(|a, b| a.level.total_cmp(&b.level));
         for (found, expected) in found.iter().zip(&expected) {
             let width = scale_rad(expected.level);
