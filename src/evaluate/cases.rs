@@ -25,7 +25,7 @@ use crate::vulkan::Device;
 pub struct Estimator {
     /// How radiance is estimated.
     pub variant: Variant,
-    /// 1 to 1024.
+    /// 1 to [`Method::max_count`].
     pub count: u32,
 }
 
@@ -81,7 +81,7 @@ impl FromStr for Shard {
 pub struct Cases {
     /// Estimators.
     pub methods: Vec<Variant>,
-    /// Numbers of threads, or of samples: each 1 to 1024.
+    /// Numbers of threads, or of samples: each at least 1.
     pub counts: Vec<u32>,
     /// Materials, by names that differ. One at a time is that of all objects.
     pub materials: Vec<(String, MaterialSource)>,

@@ -14,8 +14,7 @@ use threadlight::low_level::memo::{Memo, Round};
 use threadlight::low_level::method::{Method, Variant};
 use threadlight::low_level::output;
 use threadlight::low_level::progress::Observer;
-use threadlight::low_level::scene::{MAX_SUBPIXELS, MaterialSource, ObjectSettings, Scene, Source, mesh};
-use threadlight::low_level::threads::MAX_COUNT;
+use threadlight::low_level::scene::{MAX_SAMPLES, MAX_SUBPIXELS, MaterialSource, ObjectSettings, Scene, Source, mesh};
 use threadlight::low_level::vulkan::{Device, Instance};
 use threadlight::{Error, Result};
 
@@ -29,8 +28,8 @@ pub struct CasesArguments {
     /// Shading methods; `filtered_fixed` and `importance_fixed` are those at one set of points for all pixels.
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     methods: Vec<String>,
-    /// Numbers of threads, or of samples of the other estimators, each 1 to 1024.
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = value_parser!(u32).range(1..=MAX_COUNT as i64))]
+    /// Numbers of threads, or of samples of the other estimators, each 1 to 10000; a method is measured with those that it can have.
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = value_parser!(u32).range(1..=i64::from(MAX_SAMPLES)))]
     counts: Vec<u32>,
     #[arg(long, help = nameable::scenes("Scenes, each a mesh"), value_name = "LIST", value_delimiter = ',', default_value = "sphere")]
     scene: Vec<String>,
