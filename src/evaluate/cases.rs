@@ -96,9 +96,10 @@ pub struct Cases {
 }
 
 impl Cases {
-    /// Every method at every count that it can have, the count changing fastest.
+    /// Every method at every count that it can have in all scenes, the count changing fastest.
     pub fn estimators(&self) -> Vec<Estimator> {
-        let possible = |method: Method, count: u32| (1..=method.max_count(1)).contains(&count);
+        let most_subpixels = self.scenes.iter().map(|(_, scene)| scene.image.subpixels).max().unwrap_or(1);
+        let possible = |method: Method, count: u32| (1..=method.max_count(most_subpixels)).contains(&count);
         let of_method = |&variant: &Variant| {
             let counts = self.counts.iter().copied().filter(move |&count| possible(variant.method, count));
             counts.map(move |count| Estimator { variant, count })

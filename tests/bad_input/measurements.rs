@@ -45,8 +45,8 @@ fn pictures_that_cannot_be_compared_are_refused() {
 fn sweeps_that_cannot_be_measured_are_refused() {
     let folder = pictures();
     for (arguments, names) in [
-        ("--counts 4,0", &["--counts", "1..=1024"][..]),
-        ("--counts 4,1025", &["--counts", "1..=1024"]),
+        ("--counts 4,0", &["--counts", "1..=10000"][..]),
+        ("--counts 4,10001", &["--counts", "1..=10000"]),
         ("--counts 4,many", &["--counts", "many"]),
         ("--counts 4,4", &["--counts", "4 twice"]),
         ("--methods paper,magic", &["magic", "paper"]),
