@@ -81,7 +81,7 @@ pub fn finest_level(pyramid: &VmfPyramid) -> f32 {
 impl KernelNeeds {
     /// The most that any kernels may look up: what one frame needs and the next does not is there for all frames.
     pub fn of_any(environment: &Environment) -> Self {
-        let sources = !environment.small_sources().nodes.is_empty();
+        let sources = environment.has_small_sources();
         Self { map: true, sources, mirrored_sources: sources }
     }
 
@@ -99,7 +99,7 @@ impl KernelNeeds {
         };
         Self {
             map: materials.iter().any(|(_, threads)| is_sharp(*threads)),
-            sources: !sources.nodes.is_empty(),
+            sources: environment.has_small_sources(),
             mirrored_sources: materials.iter().any(|(lobe, _)| mirrors(lobe)),
         }
     }

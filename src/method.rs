@@ -178,7 +178,7 @@ impl Method {
     /// Whether its shader evaluates BRDFs under `environment`: fitted threads and Gaussians hold all that is needed, but for small bright sources.
     pub fn evaluates_brdf(self, environment: &Environment) -> bool {
         match self.threads() {
-            Some(kind) if kind.are_kernels() => !environment.small_sources().nodes.is_empty(),
+            Some(kind) if kind.are_kernels() => environment.has_small_sources(),
             _ => !self.lookups().split_sum,
         }
     }

@@ -90,6 +90,11 @@ impl Environment {
         self.small_sources.get_or_init(|| SmallSources::of(self))
     }
 
+    /// Whether it has any.
+    pub fn has_small_sources(&self) -> bool {
+        !self.small_sources().nodes.is_empty()
+    }
+
     /// Its small sources alone, or this environment with them cut out.
     pub fn part(&self, of_sources: bool) -> Self {
         let pixels = &self.small_sources().pixels;

@@ -172,7 +172,7 @@ pub fn blurred_light(
     environment: &Keyed<Environment>,
     materials: Option<&[WithThreads]>,
 ) -> Result<BlurredLight> {
-    let has_sources = !environment.small_sources().nodes.is_empty();
+    let has_sources = environment.has_small_sources();
     let part = |of_sources| match has_sources {
         true => round.ask(&Part { environment, of_sources }),
         false => Ok(environment.clone()),
