@@ -28,10 +28,11 @@ layout(set = 0, binding = 3, std430) writeonly buffer PixelList {
 
 layout(push_constant) uniform Push {
     uvec2 size_px;
-    // Sub-pixels whose normals lie within this angle of the first one's count as one smooth surface,
+    // Sub-pixels count as one smooth surface whose normals' variance along each of two axes is below the first, and whose tangents' around the
+    // normal below the second, in rad^2,
+    vec2 smooth_variance;
+    // if all normals lie within this angle of the first one's.
     float cos_smooth;
-    // if their variance along each of two axes, in rad^2, is below this; and that of their tangents around the normal.
-    float smooth_variance;
 } push;
 
 shared uint listed[2];
@@ -74,9 +75,9 @@ void main() {
                 && dot(normal, reference_normal) >= push.cos_smooth;
         }
         // With R the length of the mean normal, 1 - R is the variance.
-        smooth_surface = smooth_surface && 1.0 - length(normals) / float(covered) < push.smooth_variance;
+        smooth_surface = smooth_surface && 1.0 - length(normals) / float(covered) < push.smooth_variance.x;
         if (HAS_TANGENTS != 0 && has_tangent(reference)) {
-            smooth_surface = smooth_surface && 1.0 - length(tangents) / float(covered) < push.smooth_variance;
+            smooth_surface = smooth_surface && 1.0 - length(tangents) / float(covered) < push.smooth_variance.y;
         }
     }
     uint kind = smooth_surface && covered == SUBPIXELS * SUBPIXELS ? INTERIOR : EDGE;

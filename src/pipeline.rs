@@ -147,7 +147,7 @@ impl DeviceScene {
             geometry_cache,
             classify: Classify {
                 pipeline: compile(&compiled::CLASSIFY, &classify_constants(prepared))?,
-                smooth_variance: smooth_variance(method),
+                smooth_variance: prepared.smooth_variance(),
             },
             shade: Shade { pipeline, materials, light, sampling },
             background,

@@ -4,7 +4,7 @@ use crate::environment::Environment;
 use crate::geometry_texel::MAX_MATERIALS;
 use crate::memo::{Key, Keyed, Memo, Round, Step};
 use crate::method::{Method, Variant};
-use crate::passes::{PlacedMesh, PlacedTangent, Sampling, View};
+use crate::passes::{PlacedMesh, PlacedTangent, Sampling, SmoothVariance, View};
 use crate::scene::{Camera, MaterialSource, Mesh, Scene, Source, TangentRule};
 use crate::steps::{DraftThreads, FindLobe, FitThreads, LoadBrushedMesh, LoadEnvironment, LoadMaterial, LoadMesh};
 use crate::threads::azimuths::azimuth_count;
@@ -384,6 +384,14 @@ impl Prepared {
     /// Whether a material of it is anisotropic, so that objects have tangents.
     pub fn has_tangents(&self) -> bool {
         self.objects.iter().any(|object| object.tangent.is_some())
+    }
+
+    /// From which variances on sub-pixels are no smooth surface.
+    pub fn smooth_variance(&self) -> SmoothVariance {
+        SmoothVariance::of(
+            self.method,
+            self.materials.iter().map(|material| material.lobe.width_rad).fold(0.0, f64::max),
+        )
     }
 
     /// Lobe and threads of each material.

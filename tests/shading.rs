@@ -129,7 +129,7 @@ fn the_shader_agrees_with_its_cpu_twin() {
                 );
                 let here = texels.iter().filter(|texel| GeometryTexel::unpack(**texel).is_some()).count();
                 covered += here;
-                match shading::is_interior(prepared.method, &texels) {
+                match shading::is_interior(&prepared, &texels) {
                     true => interior += 1,
                     false => edge += usize::from(here > 0),
                 }
@@ -275,6 +275,25 @@ fn a_diffuse_material_has_one_lookup_a_surface_whatever_the_number_of_threads() 
         let Counters { interior_pixels, covered_edge_subpixels, .. } = rendering.counters;
         assert!(interior_pixels > 0 && covered_edge_subpixels > 0);
         assert_eq!(rendering.lookups, u64::from(interior_pixels + covered_edge_subpixels), "{threads} threads");
+    }
+    gpu.finish();
+}
+
+#[test]
+fn a_wide_lobe_has_one_sum_where_a_surface_is_too_curved_for_that_of_a_narrow_one() {
+    let gpu = Validated::new();
+    let lookups = |alpha: f64, environment: &str| {
+        let parameters = "model = 'conductor'\ndistribution = 'ggx'\neta = [1.5, 1.0, 0.6]\nk = [7.8, 6.7, 5.5]";
+        let scene = sphere(model(&format!("{parameters}\nalpha = {alpha}")), environment, 16, (80, 60));
+        let rendering = gpu.render(&ready(&scene), EVERYTHING);
+        (rendering.lookups as f64 / rendering.counters.covered_pixels() as f64, rendering.counters.interior_pixels)
+    };
+    for environment in ["sky", "sun"] {
+        let [(of_narrow, narrow_interior), (of_wide, wide_interior)] =
+            [0.05, 0.5].map(|alpha| lookups(alpha, environment));
+        assert!(wide_interior > 2 * narrow_interior, "{wide_interior} and {narrow_interior} pixels");
+        // A sum over 16 threads and the irradiance; or, in every fifth pixel, four sums over 4 threads and the irradiance each.
+        assert!(of_wide < 17.2 && of_narrow > 17.8, "{environment}: {of_wide} and {of_narrow} lookups a pixel");
     }
     gpu.finish();
 }

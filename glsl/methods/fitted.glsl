@@ -57,7 +57,7 @@ float clearance_of(Source source, Lobe lobe, Surface surface, Material material,
 bool opens(Source source, Lobe lobe, Surface surface, Material material, float least_width) {
     float width = source.direction.w;
     float away = away_from(lobe, surface, material, source.direction.xyz);
-    return away + 4.2 * lobe.width < 12.0 * max(width, least_width) || width > 0.1;
+    return width > least_width && (away + 4.2 * lobe.width < 12.0 * width || width > 0.1);
 }
 
 // Source s, or the first of its parts that is not to be taken part by part. Nothing but s leaves the loop: of other values, lavapipe
@@ -96,22 +96,19 @@ Lobe lobe_of(Surface surface, Material material) {
     return Lobe(w_o, surface.frame * vec3(-w_o.x, -w_o.y, w_o.z), material.lobe_width * max(w_o.z, 0.05));
 }
 
-// A sum at one normal does not do where normals vary more than half vectors within the lobe: what sub-pixels mirror there is not one
-// blur. Nor where a sun is mirrored within the pixel, or so near that its highlight bends within it.
+// A sum at one normal does not do where normals vary more than half vectors within a narrow lobe, or by a good part of a wide one: what
+// sub-pixels mirror there is not one blur. Nor where a sun is mirrored within the pixel, or so near that its highlight bends within it.
 bool needs_subpixels(Surface surface, Material material) {
     float deviation = sqrt(surface.normal_variance);
     // Normals mirrored turn twice as far; three standard deviations of that.
-    return deviation > material.lobe_width
+    return deviation > max(min(material.lobe_width, NEARLY_FLAT_RAD), 0.2 * material.lobe_width)
         || HAS_SOURCES != 0
         && share_of_brdf(least_clearance(lobe_of(surface, material), surface, material, 3.0 * 2.0 * deviation)) < 1.0;
 }
 
-// What all sources are to a surface.
-struct AtSources {
-    vec3 f_cos;  // their powers times what is to be integrated over them
-    vec3 cosine;
-    float least_clearance;
-};
+bool sources_vary(Surface surface) {
+    return HAS_SOURCES != 0 && surface.normal_variance > NEARLY_FLAT_RAD * NEARLY_FLAT_RAD;
+}
 
 // Of a square of light around a direction of this z, whose standard deviation along z is this: what part of it has risen above the
 // horizon, times z in the middle of that part; and that z.
@@ -145,11 +142,19 @@ vec3 on_stairs(int i, vec2 up) {
     return vec3(sqrt(12.0) / 4.0 * (float(i) - 1.5) * up + to_side * vec2(-up.y, up.x), 0.25);
 }
 
+// An axis of a source, longer by what the normals of the pixel add to its variance: mirrored directions turn twice as far.
+vec3 within_pixel(vec3 axis, Surface surface) {
+    // No source is smaller than a pixel of the environment.
+    return axis * sqrt(1.0 + 4.0 * surface.normal_variance / dot(axis, axis));
+}
+
 // Adds a source, as a square of its variance.
-void add_source(inout AtSources sum, Source source, float clear, Surface surface, Material material, vec3 w_o) {
+void add_source(inout SourceSum sum, Source source, float clear, Surface surface, Material material, vec3 w_o) {
     vec3 n = surface.frame[2];
+    vec3 x = source.axis[0].xyz;
+    vec3 y = source.axis[1].xyz;
     float z = dot(source.direction.xyz, n);
-    vec2 slope = vec2(dot(source.axis[0].xyz, n), dot(source.axis[1].xyz, n));
+    vec2 slope = vec2(dot(x, n), dot(y, n));
     float deviation = length(slope);
     float half_side = sqrt(3.0) * deviation;
     if (z + half_side <= 0.0) {
@@ -160,6 +165,11 @@ void add_source(inout AtSources sum, Source source, float clear, Surface surface
     // materials bends within a few degrees of theta_i: four steps up there, for wide light also higher up.
     int side = clear > 40.0 ? 1 : clear > FAR ? 2 : 3;
     bool is_low = clear > FAR && lowest < (side == 1 ? 20.0 * deviation : 0.3);
+    // Light sets by the angle of normals, not by twice as much.
+    if (!is_low && lowest > 0.0) {
+        x = within_pixel(x, surface);
+        y = within_pixel(y, surface);
+    }
     // Light straight above has no slope.
     vec2 up = slope / max(deviation, 1e-6);
     int steps = is_low ? 4 : side;
@@ -167,28 +177,38 @@ void add_source(inout AtSources sum, Source source, float clear, Surface surface
     int i = 0;
     do {
         vec3 at = is_low ? on_stairs(i, up) : on_square(i, side, lowest < 0.0);
-        vec3 w_i = normalize((source.direction.xyz + at.x * source.axis[0].xyz + at.y * source.axis[1].xyz) * surface.frame);
+        vec3 w_i = normalize((source.direction.xyz + at.x * x + at.y * y) * surface.frame);
         vec2 above = risen(w_i.z, deviation / float(steps));
         if (above.x > 0.0) {
             vec3 power = at.z * above.x * source.power.rgb;
             w_i = normalize(vec3(w_i.xy, above.y));
-            sum.f_cos += power * brdf_at(surface, material, w_i, w_o);
-            sum.cosine += power;
+            sum.radiance += power * brdf_at(surface, material, w_i, w_o);
+            sum.irradiance += power;
         }
     } while (++i < count);
 }
 
-AtSources at_sources(Surface surface, Material material, Lobe lobe) {
-    AtSources sum = AtSources(vec3(0.0), vec3(0.0), FAR);
+SourceSum at_sources(Surface surface, Material material) {
+    SourceSum sum = SourceSum(vec3(0.0), vec3(0.0), 0.0);
+    if (HAS_SOURCES == 0) {
+        return sum;
+    }
+    Lobe lobe = lobe_of(surface, material);
+    // To a pixel no source is narrower than what its normals make of it.
+    float least_width = 2.0 * sqrt(surface.normal_variance);
+    float least_clearance = FAR;
     uint s = 0;
     do {
-        s = descend(s, lobe, surface, material, 0.0);
+        s = descend(s, lobe, surface, material, least_width);
         Source source = sources[s];
-        float clear = clearance_of(source, lobe, surface, material, 0.0);
-        sum.least_clearance = min(sum.least_clearance, clear);
+        float clear = clearance_of(source, lobe, surface, material, least_width);
+        least_clearance = min(least_clearance, clear);
         add_source(sum, source, clear, surface, material, lobe.w_o);
         s += uint(source.axis[0].w);
     } while (s < source_count);
+    if (HAS_MIRRORED_SOURCES != 0) {
+        sum.of_kernels = 1.0 - share_of_brdf(least_clearance);
+    }
     return sum;
 }
 
@@ -256,7 +276,7 @@ vec3 albedo_at(Rows rows) {
 
 // Three loops, not one with three branches: where a driver masks lanes out, each pays for what none of its lanes does. For the same reason
 // tests are at the ends of loops.
-vec3 estimate(Surface surface, Material material, uint first, uint stride) {
+vec3 estimate(Surface surface, Material material, uint first, uint stride, SourceSum of_sources) {
     ThreadTable table = material.threads;
     Rows rows = rows_at(surface, table);
     vec3 weights = vec3(0.0);
@@ -269,14 +289,6 @@ vec3 estimate(Surface surface, Material material, uint first, uint stride) {
             sum += kernel.weight * blurred_radiance(looks_towards(kernel, surface), kernel.level);
         } while ((k += stride) < table.count);
     }
-    AtSources at = AtSources(vec3(0.0), vec3(0.0), FAR);
-    float of_kernels = 0.0;
-    if (HAS_SOURCES != 0) {
-        at = at_sources(surface, material, lobe_of(surface, material));
-        if (HAS_MIRRORED_SOURCES != 0) {
-            of_kernels = 1.0 - share_of_brdf(at.least_clearance);
-        }
-    }
     k = first;
     if (HAS_SHARP_KERNELS != 0 && k < table.sharp_count) {
         do {
@@ -284,7 +296,7 @@ vec3 estimate(Surface surface, Material material, uint first, uint stride) {
             weights += kernel.weight;
             float sharp = sharp_part(kernel.level);
             if (sharp > 0.0) {
-                sum += kernel.weight * sharp * sharp_radiance(looks_towards(kernel, surface), of_kernels);
+                sum += kernel.weight * sharp * sharp_radiance(looks_towards(kernel, surface), of_sources.of_kernels);
             }
             if (sharp < 1.0) {
                 sum += kernel.weight * (1.0 - sharp) * blurred_radiance(looks_towards(kernel, surface), kernel.level);
@@ -292,22 +304,21 @@ vec3 estimate(Surface surface, Material material, uint first, uint stride) {
         } while ((k += stride) < table.sharp_count);
     }
     k = first;
-    if (HAS_MIRRORED_SOURCES != 0 && of_kernels > 0.0 && k < table.count) {
+    if (HAS_MIRRORED_SOURCES != 0 && of_sources.of_kernels > 0.0 && k < table.count) {
         do {
             Kernel kernel = kernel_at(rows, k);
             float blurred = HAS_SHARP_KERNELS != 0 ? 1.0 - sharp_part(kernel.level) : 1.0;
             if (blurred > 0.0) {
-                sum += kernel.weight * blurred * of_kernels * blurred_sources(looks_towards(kernel, surface), kernel.level);
+                sum += kernel.weight * blurred * of_sources.of_kernels * blurred_sources(looks_towards(kernel, surface), kernel.level);
             }
         } while ((k += stride) < table.count);
     }
     vec3 cosine_part = albedo_at(rows) - float(stride) * weights;
     ++lookups;
     vec3 irradiance = textureLod(irradiance_map, surface.frame[2], 0.0).rgb;
-    sum = float(stride) * sum + cosine_part * irradiance;
-    if (HAS_SOURCES != 0) {
+    if (HAS_MIRRORED_SOURCES != 0) {
         // The irradiance map has no sources.
-        sum += mix(at.f_cos, at.cosine * cosine_part / radians(180.0), of_kernels);
+        irradiance += of_sources.of_kernels / radians(180.0) * of_sources.irradiance;
     }
-    return max(sum, vec3(0.0));
+    return float(stride) * sum + cosine_part * irradiance;
 }

@@ -3,6 +3,7 @@ use super::View;
 use crate::graph::{BufferDesc, BufferHandle, FrameGraph, ImageHandle};
 use crate::memo::Keyed;
 use crate::method::Method;
+use crate::threads::ThreadKind;
 use crate::vulkan::ComputePipeline;
 use bytemuck::{Pod, Zeroable};
 
@@ -12,8 +13,15 @@ use bytemuck::{Pod, Zeroable};
 pub const SMOOTH_DEG: f32 = 10.0;
 
 /// Variance of the normal along each of two axes, in rad^2, from which sub-pixels do not share one sum at their mean normal: normals
-/// 0.6 degrees from their mean, as at the rim of a sphere, where the view angle changes by more than a row of threads.
-pub const SHARED_VARIANCE: f32 = 1e-4;
+/// 0.6 degrees from their mean. `NEARLY_FLAT_RAD` in glsl/shared_sum.glsl is its root.
+pub const NEARLY_FLAT_VARIANCE: f32 = 1e-4;
+
+/// The same where there is a wide lobe: 3.6 degrees.
+const WIDE_LOBE_VARIANCE: f32 = 4e-3;
+
+/// What lobes are wide: those that normals may vary within by more than where they are nearly flat (`needs_subpixels` in
+/// glsl/methods/fitted.glsl).
+const WIDE_LOBE_RAD: f64 = 0.05;
 
 /// The tiles of one class: arguments of an indirect dispatch and a count. `TileClass` in glsl/tiles.glsl.
 #[repr(C)]
@@ -56,22 +64,41 @@ impl Counters {
 pub struct Classify {
     /// The shader, for a number of sub-pixels.
     pub pipeline: Keyed<ComputePipeline>,
-    /// From which variance of their normals on sub-pixels are no smooth surface to the method: see [`smooth_variance`].
-    pub smooth_variance: f32,
+    /// From which variances of their normals and tangents on sub-pixels are no smooth surface: see [`SmoothVariance::of`].
+    pub smooth_variance: SmoothVariance,
 }
 
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct Push {
     size_px: [u32; 2],
+    smooth_variance: SmoothVariance,
     cos_smooth: f32,
-    smooth_variance: f32,
 }
 
-/// From which variance of their normals on, in rad^2, sub-pixels are no smooth surface to `method`: `SHARED_VARIANCE` if they share a
-/// sum; otherwise none that [`SMOOTH_DEG`] allows.
-pub fn smooth_variance(method: Method) -> f32 {
-    if method.shares_surface() { SHARED_VARIANCE } else { 1.0 }
+/// From which variances on, in rad^2, sub-pixels are no smooth surface.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct SmoothVariance {
+    /// Of normals, along each of two axes.
+    pub of_normals: f32,
+    /// Of tangents, around the normal.
+    pub of_tangents: f32,
+}
+
+impl SmoothVariance {
+    /// What `method` asks for where the widest lobe is as wide as that in half vectors. If sub-pixels do not share a sum, nothing that
+    /// [`SMOOTH_DEG`] allows. Of two values for lobes, so that the lists of pixels seldom depend on materials.
+    pub fn of(method: Method, widest_lobe_rad: f64) -> Self {
+        let (of_normals, of_tangents) = match method.shares_surface() {
+            false => (1.0, 1.0),
+            true if method.threads().is_some_and(ThreadKind::are_kernels) && widest_lobe_rad > WIDE_LOBE_RAD => {
+                (WIDE_LOBE_VARIANCE, NEARLY_FLAT_VARIANCE)
+            }
+            true => (NEARLY_FLAT_VARIANCE, NEARLY_FLAT_VARIANCE),
+        };
+        Self { of_normals, of_tangents }
+    }
 }
 
 /// What is to be shaded.
@@ -105,8 +132,8 @@ pub fn classify<'a>(graph: &mut FrameGraph<'a>, classify: &'a Classify, geometry
         .write("pixel_list", &mut pixels)
         .push(&Push {
             size_px: [width, height],
-            cos_smooth: SMOOTH_DEG.to_radians().cos(),
             smooth_variance: classify.smooth_variance,
+            cos_smooth: SMOOTH_DEG.to_radians().cos(),
         })
         .cover([width, height, 1]);
     Tiles { counters, tiles, pixels }

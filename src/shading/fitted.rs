@@ -103,7 +103,7 @@ impl<'a> Lobe<'a> {
     fn opens(&self, source: &SourceRecord, least_width: f32) -> bool {
         let width = source.direction.w;
         let away = self.away(source.direction.truncate());
-        away + 4.2 * self.width < 12.0 * width.max(least_width) || width > 0.1
+        width > least_width && (away + 4.2 * self.width < 12.0 * width || width > 0.1)
     }
 
     /// Twin of `descend`.
@@ -139,10 +139,18 @@ pub(super) fn needs_subpixels(point: &Point) -> bool {
     if point.twin.light.blurred.is_none() {
         return false;
     }
-    let sources = &point.twin.sources;
+    let (sources, lobe_width) = (&point.twin.sources, point.record().lobe_width);
     let deviation = point.surface.normal_variance.sqrt();
-    deviation > point.record().lobe_width
+    deviation > lobe_width.min(NEARLY_FLAT_RAD).max(0.2 * lobe_width)
         || share_of_brdf(Lobe::of(point).least_clearance(sources, 3.0 * 2.0 * deviation)) < 1.0
+}
+
+/// Twin of `NEARLY_FLAT_RAD` in glsl/shared_sum.glsl.
+const NEARLY_FLAT_RAD: f32 = 0.01;
+
+/// Twin of `sources_vary`.
+pub(super) fn sources_vary(point: &Point) -> bool {
+    !point.twin.sources.is_empty() && point.surface.normal_variance > NEARLY_FLAT_RAD * NEARLY_FLAT_RAD
 }
 
 /// Twin of `risen`.
@@ -174,19 +182,25 @@ fn on_stairs(i: i32, up: Vec2) -> (Vec2, f32) {
     (12.0_f32.sqrt() / 4.0 * (i as f32 - 1.5) * up + to_side * up.perp(), 0.25)
 }
 
-/// What all sources are to a surface. Twin of `AtSources`.
-struct AtSources {
-    f_cos: Vec3,
-    cosine: Vec3,
-    least_clearance: f32,
+/// What all sources are to a surface. Twin of `SourceSum` in glsl/shared_sum.glsl.
+#[derive(Default)]
+pub(super) struct SourceSum {
+    pub radiance: Vec3,
+    irradiance: Vec3,
+    of_kernels: f32,
 }
 
-impl AtSources {
+/// Twin of `within_pixel`.
+fn within_pixel(axis: Vec3, surface: &Surface) -> Vec3 {
+    axis * (1.0 + 4.0 * surface.normal_variance / axis.length_squared()).sqrt()
+}
+
+impl SourceSum {
     /// Twin of `add_source`.
     fn add(&mut self, source: &SourceRecord, clear: f32, lobe: &Lobe) {
         let point = lobe.point;
         let n = point.surface.frame.z_axis;
-        let [x, y] = source.axes.map(Vec4::truncate);
+        let [mut x, mut y] = source.axes.map(Vec4::truncate);
         let slope = Vec2::new(x.dot(n), y.dot(n));
         let (z, deviation) = (source.direction.truncate().dot(n), slope.length());
         let half_side = 3.0_f32.sqrt() * deviation;
@@ -202,6 +216,9 @@ impl AtSources {
         };
         let lowest = z - half_side;
         let is_low = clear > FAR && lowest < if side == 1 { 20.0 * deviation } else { 0.3 };
+        if !is_low && lowest > 0.0 {
+            [x, y] = [x, y].map(|axis| within_pixel(axis, &point.surface));
+        }
         let up = slope / deviation.max(1e-6);
         let (count, steps) = if is_low { (4, 4) } else { (side * side, side) };
         for i in 0..count {
@@ -212,21 +229,29 @@ impl AtSources {
             if cos > 0.0 {
                 let power = weight * cos * source.power.truncate();
                 let w_i = w_i.with_z(middle).normalize();
-                self.f_cos += power * point.brdf(w_i, lobe.w_o);
-                self.cosine += power;
+                self.radiance += power * point.brdf(w_i, lobe.w_o);
+                self.irradiance += power;
             }
         }
     }
 }
 
 /// Twin of `at_sources`.
-fn at_sources(lobe: &Lobe, sources: &[SourceRecord]) -> AtSources {
-    let mut sum = AtSources { f_cos: Vec3::ZERO, cosine: Vec3::ZERO, least_clearance: FAR };
-    for source in lobe.sources(sources, 0.0) {
-        let clear = lobe.clearance(source, 0.0);
-        sum.least_clearance = sum.least_clearance.min(clear);
-        sum.add(source, clear, lobe);
+pub(super) fn at_sources(point: &Point) -> SourceSum {
+    let mut sum = SourceSum::default();
+    let sources = &point.twin.sources;
+    if point.twin.light.blurred.is_none() || sources.is_empty() {
+        return sum;
     }
+    let lobe = Lobe::of(point);
+    let least_width = 2.0 * point.surface.normal_variance.sqrt();
+    let mut least_clearance = FAR;
+    for source in lobe.sources(sources, least_width) {
+        let clear = lobe.clearance(source, least_width);
+        least_clearance = least_clearance.min(clear);
+        sum.add(source, clear, &lobe);
+    }
+    sum.of_kernels = 1.0 - share_of_brdf(least_clearance);
     sum
 }
 
@@ -286,7 +311,7 @@ fn between(a: UnpackedKernel, b: UnpackedKernel, t: f32) -> UnpackedKernel {
     }
 }
 
-/// Twin of `estimate`.
+/// Twin of `estimate`, and of a sub-pixel that shares no sum with what the BRDF makes of sources.
 ///
 /// # Panics
 /// A scene prepared for another method has other threads.
@@ -294,23 +319,21 @@ pub(super) fn estimate(point: &Point) -> Vec3 {
     let threads = point.fitted_threads().expect("fitted threads or Gaussians are there");
     let surface = &point.surface;
     let light = blurred_light(point.twin);
-    let sources = &point.twin.sources;
+    let sources = if point.is_pixel { SourceSum::default() } else { at_sources(point) };
     let rows = Rows::at(surface, threads);
-    let at = at_sources(&Lobe::of(point), sources);
-    let of_kernels = 1.0 - share_of_brdf(at.least_clearance);
     let (mut weights, mut sum) = (Vec3::ZERO, Vec3::ZERO);
     for k in (point.first as usize..threads.count).step_by(point.stride) {
         let kernel = rows.kernel(threads, k);
         let level = level_within_pixel(kernel.level, variance_of_pixel(surface.normal_variance));
         let direction = surface.frame * stereographic_decode(kernel.place);
         weights += kernel.weight;
-        sum += kernel.weight * blurred_radiance(point.twin, direction, level, of_kernels);
+        sum += kernel.weight * blurred_radiance(point.twin, direction, level, sources.of_kernels);
     }
     let share = point.stride as f32;
     let cosine_part = rows.albedo(threads) - share * weights;
-    sum = share * sum + cosine_part * light.irradiance.lookup_by(surface.frame.z_axis, 0.0, point.twin.fractions);
-    sum += at.f_cos.lerp(at.cosine * cosine_part / PI, of_kernels);
-    sum.max(Vec3::ZERO)
+    let irradiance = light.irradiance.lookup_by(surface.frame.z_axis, 0.0, point.twin.fractions);
+    sum = share * sum + cosine_part * irradiance;
+    sum + sources.radiance.lerp(sources.irradiance * cosine_part / PI, sources.of_kernels)
 }
 
 #[cfg(test)]

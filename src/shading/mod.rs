@@ -9,7 +9,7 @@ use crate::geometry_texel::GeometryTexel;
 use crate::light::Light;
 use crate::memo::Round;
 use crate::method::{Lookups, Method};
-use crate::passes::{SMOOTH_DEG, View, smooth_variance};
+use crate::passes::{SMOOTH_DEG, SmoothVariance, View};
 use crate::prepare::{Prepared, PreparedMaterial};
 use crate::scene::Pattern;
 use crate::steps::{Tabulate, light};
@@ -101,18 +101,18 @@ pub fn texels_of_pixel(view: &View, geometry: &[[u32; 2]], pixel: UVec2) -> Vec<
     (0..s * s).map(texel).collect()
 }
 
-/// Whether the sub-pixels of a pixel lie on one surface that is smooth to `method`. Twin of glsl/classify.comp.
-pub fn is_interior(method: Method, texels: &[UVec2]) -> bool {
+/// Whether the sub-pixels of a pixel of `prepared` lie on one smooth surface. Twin of glsl/classify.comp.
+pub fn is_interior(prepared: &Prepared, texels: &[UVec2]) -> bool {
     let Some(first) = texels.first().copied().and_then(GeometryTexel::unpack) else { return false };
     let is_near = |texel: &UVec2| {
         GeometryTexel::unpack(*texel).is_some_and(|GeometryTexel { normal, material, .. }| {
             material == first.material && normal.dot(first.normal) >= SMOOTH_DEG.to_radians().cos()
         })
     };
-    let tangents_agree = || {
-        first.tangent.is_none() || 1.0 - tangent_sum(texels).length() / (texels.len() as f32) < smooth_variance(method)
-    };
-    texels.iter().all(is_near) && normal_variance(texels) < smooth_variance(method) && tangents_agree()
+    let SmoothVariance { of_normals, of_tangents } = prepared.smooth_variance();
+    let tangents_agree =
+        || first.tangent.is_none() || 1.0 - tangent_sum(texels).length() / (texels.len() as f32) < of_tangents;
+    texels.iter().all(is_near) && normal_variance(texels) < of_normals && tangents_agree()
 }
 
 /// The sum of the tangents of these sub-pixels, as far as they have any.
@@ -201,7 +201,7 @@ impl<'a> CpuShader<'a> {
     /// Linear radiance times coverage, and coverage, of the pixel that sees `texels`: its sub-pixels, row by row.
     /// Twin of glsl/shade.comp.
     pub fn shade(&self, pixel: UVec2, texels: &[UVec2]) -> Vec4 {
-        let interior = is_interior(self.prepared.method, texels);
+        let interior = is_interior(self.prepared, texels);
         let shaded = match self.prepared.method.shares_surface() {
             true => self.shade_shared(pixel, texels, interior),
             false => self.shade_partition(pixel, texels, interior),
@@ -234,7 +234,14 @@ impl<'a> CpuShader<'a> {
             point.surface.normal_variance = normal_variance(texels);
             if !fitted::needs_subpixels(&point) {
                 point.is_pixel = true;
-                return point.estimate().extend(1.0);
+                let subpixels = texels.iter().enumerate().filter_map(|(j, texel)| self.subpixel(pixel, j, *texel));
+                let of_sources = match fitted::sources_vary(&point) {
+                    true => {
+                        subpixels.map(|point| fitted::at_sources(&point).radiance).sum::<Vec3>() / texels.len() as f32
+                    }
+                    false => fitted::at_sources(&point).radiance,
+                };
+                return (point.estimate() + of_sources).max(Vec3::ZERO).extend(1.0);
             }
         }
         let points = texels.iter().enumerate().filter_map(|(j, texel)| {
@@ -243,7 +250,7 @@ impl<'a> CpuShader<'a> {
             (point.first, point.stride) = ((j % sets) as u32, sets);
             Some(point)
         });
-        points.map(|point| point.estimate().extend(1.0)).sum::<Vec4>() / texels.len() as f32
+        (points.map(|point| point.estimate().extend(1.0)).sum::<Vec4>() / texels.len() as f32).max(Vec4::ZERO)
     }
 
     /// The surface that is seen at a place in the picture, from 0 to 1. Twin of `surface_at` in glsl/shade.comp.

@@ -14,7 +14,7 @@ pub fn set_count(lobe: &LobeShape, count: usize, subpixels: u32) -> usize {
 }
 
 /// Lobes narrower than this in half vectors, in radians, are narrower than normals are apart in the pixels of most meshes, so that these have a
-/// sum for each sub-pixel: the root of `SHARED_VARIANCE` in src/passes/classify.rs.
+/// sum for each sub-pixel: the root of `NEARLY_FLAT_VARIANCE` in src/passes/classify.rs.
 const NARROW_RAD: f64 = 0.01;
 
 /// Whether pixels that share one sum have threads of their own, not in sets. Not of a narrow lobe, for which there are few such pixels, and whose
