@@ -19,6 +19,7 @@ struct Material {
     vec2 long_axis;    // of the lobe, from the tangent; across it the lobe has lobe_width
     ThreadTable threads;          // of a pixel whose sub-pixels share one sum
     ThreadTable subpixel_threads; // of each sub-pixel of another pixel
+    float shared_deviation; // of normals, up to which sub-pixels share one sum where the view is along them: src/threads/fitted/sets.rs
 };
 
 layout(set = 0, binding = 5, std430) readonly buffer Materials {

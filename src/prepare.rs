@@ -78,6 +78,11 @@ impl PreparedMaterial {
         Ok(Self { name, turned_brdf, brdf, rotation_deg, lobe, threads: None })
     }
 
+    /// [`Threads::shared_deviation`]; 0 without threads.
+    pub(crate) fn shared_deviation(&self) -> f64 {
+        self.threads.as_deref().map_or(0.0, |threads| threads.shared_deviation(&self.lobe))
+    }
+
     /// Its lobe and threads.
     pub fn shaded(&self) -> WithThreads<'_> {
         (&self.lobe, self.threads.as_deref())
@@ -388,10 +393,8 @@ impl Prepared {
 
     /// From which variances on sub-pixels are no smooth surface.
     pub fn smooth_variance(&self) -> SmoothVariance {
-        SmoothVariance::of(
-            self.method,
-            self.materials.iter().map(|material| material.lobe.width_rad).fold(0.0, f64::max),
-        )
+        let deviations = self.materials.iter().map(PreparedMaterial::shared_deviation);
+        SmoothVariance::of(self.method, deviations.fold(0.0, f64::max))
     }
 
     /// Lobe and threads of each material.

@@ -100,10 +100,10 @@ Lobe lobe_of(Surface surface, Material material) {
 // sub-pixels mirror there is not one blur. Nor where a sun is mirrored within the pixel, or so near that its highlight bends within it.
 bool needs_subpixels(Surface surface, Material material) {
     float deviation = sqrt(surface.normal_variance);
+    Lobe lobe = lobe_of(surface, material);
     // Normals mirrored turn twice as far; three standard deviations of that.
-    return deviation > max(min(material.lobe_width, NEARLY_FLAT_RAD), 0.2 * material.lobe_width)
-        || HAS_SOURCES != 0
-        && share_of_brdf(least_clearance(lobe_of(surface, material), surface, material, 3.0 * 2.0 * deviation)) < 1.0;
+    return deviation > max(min(material.lobe_width, NEARLY_FLAT_RAD), material.shared_deviation * lobe.w_o.z)
+        || HAS_SOURCES != 0 && share_of_brdf(least_clearance(lobe, surface, material, 3.0 * 2.0 * deviation)) < 1.0;
 }
 
 bool sources_vary(Surface surface) {

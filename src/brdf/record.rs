@@ -44,8 +44,10 @@ pub struct MaterialRecord {
     pub threads: ThreadTableRecord,
     /// Those of a sub-pixel that does not share a sum with the others.
     pub subpixel_threads: ThreadTableRecord,
+    /// Deviation of normals up to which sub-pixels share one sum, seen along them, in radians.
+    pub shared_deviation: f32,
     /// The size of a structure in the buffer is a multiple of 16 bytes.
-    pub padding: [u32; 2],
+    pub padding: u32,
 }
 
 impl MaterialRecord {
@@ -60,7 +62,8 @@ impl MaterialRecord {
             long_axis: lobe.long_axis.as_vec2().to_array(),
             threads: ThreadTableRecord::NONE,
             subpixel_threads: ThreadTableRecord::NONE,
-            padding: [0; 2],
+            shared_deviation: 0.0,
+            padding: 0,
         }
     }
 

@@ -3,7 +3,6 @@ use super::View;
 use crate::graph::{BufferDesc, BufferHandle, FrameGraph, ImageHandle};
 use crate::memo::Keyed;
 use crate::method::Method;
-use crate::threads::ThreadKind;
 use crate::vulkan::ComputePipeline;
 use bytemuck::{Pod, Zeroable};
 
@@ -16,12 +15,8 @@ pub const SMOOTH_DEG: f32 = 10.0;
 /// 0.6 degrees from their mean. `NEARLY_FLAT_RAD` in glsl/shared_sum.glsl is its root.
 pub const NEARLY_FLAT_VARIANCE: f32 = 1e-4;
 
-/// The same where there is a wide lobe: 3.6 degrees.
+/// The same where some lobe is so wide that sub-pixels share more than that: 3.6 degrees.
 const WIDE_LOBE_VARIANCE: f32 = 4e-3;
-
-/// What lobes are wide: those that normals may vary within by more than where they are nearly flat (`needs_subpixels` in
-/// glsl/methods/fitted.glsl).
-const WIDE_LOBE_RAD: f64 = 0.05;
 
 /// The tiles of one class: arguments of an indirect dispatch and a count. `TileClass` in glsl/tiles.glsl.
 #[repr(C)]
@@ -87,14 +82,12 @@ pub struct SmoothVariance {
 }
 
 impl SmoothVariance {
-    /// What `method` asks for where the widest lobe is as wide as that in half vectors. If sub-pixels do not share a sum, nothing that
-    /// [`SMOOTH_DEG`] allows. Of two values for lobes, so that the lists of pixels seldom depend on materials.
-    pub fn of(method: Method, widest_lobe_rad: f64) -> Self {
+    /// What `method` asks for where sub-pixels of some material share a sum up to a deviation of normals, `most_shared` in radians. If they
+    /// never do, nothing that [`SMOOTH_DEG`] allows. Two values for all materials, so that the lists of pixels seldom depend on these.
+    pub fn of(method: Method, most_shared: f64) -> Self {
         let (of_normals, of_tangents) = match method.shares_surface() {
             false => (1.0, 1.0),
-            true if method.threads().is_some_and(ThreadKind::are_kernels) && widest_lobe_rad > WIDE_LOBE_RAD => {
-                (WIDE_LOBE_VARIANCE, NEARLY_FLAT_VARIANCE)
-            }
+            true if most_shared.powi(2) > f64::from(NEARLY_FLAT_VARIANCE) => (WIDE_LOBE_VARIANCE, NEARLY_FLAT_VARIANCE),
             true => (NEARLY_FLAT_VARIANCE, NEARLY_FLAT_VARIANCE),
         };
         Self { of_normals, of_tangents }

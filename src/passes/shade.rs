@@ -86,6 +86,7 @@ impl DeviceMaterials {
             }
             if let Some(own_threads) = own_threads {
                 [record.threads, record.subpixel_threads] = threads.add(own_threads);
+                record.shared_deviation = own_threads.shared_deviation(lobe) as f32;
             }
             record.first_slice = slices.len() as u32;
             if lookups.slices {

@@ -141,8 +141,9 @@ pub(super) fn needs_subpixels(point: &Point) -> bool {
     }
     let (sources, lobe_width) = (&point.twin.sources, point.record().lobe_width);
     let deviation = point.surface.normal_variance.sqrt();
-    deviation > lobe_width.min(NEARLY_FLAT_RAD).max(0.2 * lobe_width)
-        || share_of_brdf(Lobe::of(point).least_clearance(sources, 3.0 * 2.0 * deviation)) < 1.0
+    let lobe = Lobe::of(point);
+    deviation > lobe_width.min(NEARLY_FLAT_RAD).max(point.record().shared_deviation * lobe.w_o.z)
+        || share_of_brdf(lobe.least_clearance(sources, 3.0 * 2.0 * deviation)) < 1.0
 }
 
 /// Twin of `NEARLY_FLAT_RAD` in glsl/shared_sum.glsl.

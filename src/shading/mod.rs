@@ -172,6 +172,10 @@ impl<'a> CpuShader<'a> {
             false => Ok(None),
             true => Ok(Some((*round.ask(&Tabulate(&material.brdf))?).clone())),
         };
+        let record = |material: &PreparedMaterial| MaterialRecord {
+            shared_deviation: material.shared_deviation() as f32,
+            ..MaterialRecord::new(&material.brdf, &material.lobe)
+        };
         let split_sums =
             lookups.split_sum.then(|| materials.iter().map(|material| SplitSum::new(&material.brdf)).collect());
         Ok(Self {
@@ -181,7 +185,7 @@ impl<'a> CpuShader<'a> {
             map,
             slices: slices.unwrap_or_default(),
             split_sums: split_sums.unwrap_or_default(),
-            records: materials.iter().map(|material| MaterialRecord::new(&material.brdf, &material.lobe)).collect(),
+            records: materials.iter().map(record).collect(),
             tables: materials.iter().map(table).collect::<Result<_>>()?,
             sources: environment.small_sources().records(1.0),
             fractions: FractionBits::ALL,

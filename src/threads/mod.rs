@@ -122,6 +122,12 @@ impl Threads {
         }
     }
 
+    /// Deviation of the normals within a pixel, in radians, up to which its sub-pixels share one sum over these threads, where the lobe is this
+    /// one and the view is along the normals: 0 if they do so only where they are nearly flat.
+    pub fn shared_deviation(&self, lobe: &LobeShape) -> f64 {
+        self.fitted().map_or(0.0, |table| fitted::shared_deviation(lobe, table))
+    }
+
     /// These, if they are kernels: fitted, or Gaussians.
     pub fn fitted(&self) -> Option<&FittedTable> {
         match self {

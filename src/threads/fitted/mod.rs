@@ -31,7 +31,7 @@ mod validate;
 
 pub use draft::draft;
 pub use generate::generate;
-pub(super) use sets::set_count;
+pub(super) use sets::{set_count, shared_deviation};
 pub use table::{FittedTable, PackedKernel, UnpackedKernel, UsedThreads};
 pub use validate::validation_error;
 
