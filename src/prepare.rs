@@ -394,7 +394,7 @@ impl Prepared {
     /// From which variances on sub-pixels are no smooth surface.
     pub fn smooth_variance(&self) -> SmoothVariance {
         let deviations = self.materials.iter().map(PreparedMaterial::shared_deviation);
-        SmoothVariance::of(self.method, deviations.fold(0.0, f64::max))
+        SmoothVariance::of(self.method, &self.environment, deviations.fold(0.0, f64::max))
     }
 
     /// Lobe and threads of each material.

@@ -96,6 +96,10 @@ Lobe lobe_of(Surface surface, Material material) {
     return Lobe(w_o, surface.frame * vec3(-w_o.x, -w_o.y, w_o.z), material.lobe_width * max(w_o.z, 0.05));
 }
 
+// Up to this deviation of their normals, in radians, sub-pixels are one surface to any lobe that is not narrower: the root of
+// NEARLY_FLAT_VARIANCE in src/passes/classify.rs.
+const float NEARLY_FLAT_RAD = 0.01;
+
 // A sum at one normal does not do where normals vary more than half vectors within a narrow lobe, or by a good part of a wide one: what
 // sub-pixels mirror there is not one blur. Nor where a sun is mirrored within the pixel, or so near that its highlight bends within it.
 bool needs_subpixels(Surface surface, Material material) {
@@ -106,9 +110,12 @@ bool needs_subpixels(Surface surface, Material material) {
         || HAS_SOURCES != 0 && share_of_brdf(least_clearance(lobe, surface, material, 3.0 * 2.0 * deviation)) < 1.0;
 }
 
-bool sources_vary(Surface surface) {
-    return HAS_SOURCES != 0 && surface.normal_variance > NEARLY_FLAT_RAD * NEARLY_FLAT_RAD;
-}
+// What all sources are to a surface.
+struct AtSources {
+    vec3 f_cos;  // their powers times what is to be integrated over them
+    vec3 cosine;
+    float least_clearance;
+};
 
 // Of a square of light around a direction of this z, whose standard deviation along z is this: what part of it has risen above the
 // horizon, times z in the middle of that part; and that z.
@@ -149,7 +156,7 @@ vec3 within_pixel(vec3 axis, Surface surface) {
 }
 
 // Adds a source, as a square of its variance.
-void add_source(inout SourceSum sum, Source source, float clear, Surface surface, Material material, vec3 w_o) {
+void add_source(inout AtSources sum, Source source, float clear, Surface surface, Material material, vec3 w_o) {
     vec3 n = surface.frame[2];
     vec3 x = source.axis[0].xyz;
     vec3 y = source.axis[1].xyz;
@@ -182,33 +189,25 @@ void add_source(inout SourceSum sum, Source source, float clear, Surface surface
         if (above.x > 0.0) {
             vec3 power = at.z * above.x * source.power.rgb;
             w_i = normalize(vec3(w_i.xy, above.y));
-            sum.radiance += power * brdf_at(surface, material, w_i, w_o);
-            sum.irradiance += power;
+            sum.f_cos += power * brdf_at(surface, material, w_i, w_o);
+            sum.cosine += power;
         }
     } while (++i < count);
 }
 
-SourceSum at_sources(Surface surface, Material material) {
-    SourceSum sum = SourceSum(vec3(0.0), vec3(0.0), 0.0);
-    if (HAS_SOURCES == 0) {
-        return sum;
-    }
-    Lobe lobe = lobe_of(surface, material);
+AtSources at_sources(Surface surface, Material material, Lobe lobe) {
+    AtSources sum = AtSources(vec3(0.0), vec3(0.0), FAR);
     // To a pixel no source is narrower than what its normals make of it.
     float least_width = 2.0 * sqrt(surface.normal_variance);
-    float least_clearance = FAR;
     uint s = 0;
     do {
         s = descend(s, lobe, surface, material, least_width);
         Source source = sources[s];
         float clear = clearance_of(source, lobe, surface, material, least_width);
-        least_clearance = min(least_clearance, clear);
+        sum.least_clearance = min(sum.least_clearance, clear);
         add_source(sum, source, clear, surface, material, lobe.w_o);
         s += uint(source.axis[0].w);
     } while (s < source_count);
-    if (HAS_MIRRORED_SOURCES != 0) {
-        sum.of_kernels = 1.0 - share_of_brdf(least_clearance);
-    }
     return sum;
 }
 
@@ -276,7 +275,7 @@ vec3 albedo_at(Rows rows) {
 
 // Three loops, not one with three branches: where a driver masks lanes out, each pays for what none of its lanes does. For the same reason
 // tests are at the ends of loops.
-vec3 estimate(Surface surface, Material material, uint first, uint stride, SourceSum of_sources) {
+vec3 estimate(Surface surface, Material material, uint first, uint stride) {
     ThreadTable table = material.threads;
     Rows rows = rows_at(surface, table);
     vec3 weights = vec3(0.0);
@@ -289,6 +288,14 @@ vec3 estimate(Surface surface, Material material, uint first, uint stride, Sourc
             sum += kernel.weight * blurred_radiance(looks_towards(kernel, surface), kernel.level);
         } while ((k += stride) < table.count);
     }
+    AtSources at = AtSources(vec3(0.0), vec3(0.0), FAR);
+    float of_kernels = 0.0;
+    if (HAS_SOURCES != 0) {
+        at = at_sources(surface, material, lobe_of(surface, material));
+        if (HAS_MIRRORED_SOURCES != 0) {
+            of_kernels = 1.0 - share_of_brdf(at.least_clearance);
+        }
+    }
     k = first;
     if (HAS_SHARP_KERNELS != 0 && k < table.sharp_count) {
         do {
@@ -296,7 +303,7 @@ vec3 estimate(Surface surface, Material material, uint first, uint stride, Sourc
             weights += kernel.weight;
             float sharp = sharp_part(kernel.level);
             if (sharp > 0.0) {
-                sum += kernel.weight * sharp * sharp_radiance(looks_towards(kernel, surface), of_sources.of_kernels);
+                sum += kernel.weight * sharp * sharp_radiance(looks_towards(kernel, surface), of_kernels);
             }
             if (sharp < 1.0) {
                 sum += kernel.weight * (1.0 - sharp) * blurred_radiance(looks_towards(kernel, surface), kernel.level);
@@ -304,21 +311,22 @@ vec3 estimate(Surface surface, Material material, uint first, uint stride, Sourc
         } while ((k += stride) < table.sharp_count);
     }
     k = first;
-    if (HAS_MIRRORED_SOURCES != 0 && of_sources.of_kernels > 0.0 && k < table.count) {
+    if (HAS_MIRRORED_SOURCES != 0 && of_kernels > 0.0 && k < table.count) {
         do {
             Kernel kernel = kernel_at(rows, k);
             float blurred = HAS_SHARP_KERNELS != 0 ? 1.0 - sharp_part(kernel.level) : 1.0;
             if (blurred > 0.0) {
-                sum += kernel.weight * blurred * of_sources.of_kernels * blurred_sources(looks_towards(kernel, surface), kernel.level);
+                sum += kernel.weight * blurred * of_kernels * blurred_sources(looks_towards(kernel, surface), kernel.level);
             }
         } while ((k += stride) < table.count);
     }
     vec3 cosine_part = albedo_at(rows) - float(stride) * weights;
     ++lookups;
     vec3 irradiance = textureLod(irradiance_map, surface.frame[2], 0.0).rgb;
-    if (HAS_MIRRORED_SOURCES != 0) {
+    sum = float(stride) * sum + cosine_part * irradiance;
+    if (HAS_SOURCES != 0) {
         // The irradiance map has no sources.
-        irradiance += of_sources.of_kernels / radians(180.0) * of_sources.irradiance;
+        sum += mix(at.f_cos, at.cosine * cosine_part / radians(180.0), of_kernels);
     }
-    return float(stride) * sum + cosine_part * irradiance;
+    return max(sum, vec3(0.0));
 }

@@ -18,15 +18,6 @@ bool needs_subpixels(Surface surface, Material material) {
     return false;
 }
 
-bool sources_vary(Surface surface) {
-    return false;
-}
-
-// The filtered environment has its sources in it.
-SourceSum at_sources(Surface surface, Material material) {
-    return SourceSum(vec3(0.0), vec3(0.0), 0.0);
-}
-
 float level_of_alpha(float roughness_alpha) {
     return clamp(log2(roughness_alpha / FINEST_ALPHA), 0.0, COARSEST_LEVEL);
 }
@@ -35,7 +26,7 @@ vec3 split_sum_albedo(uint first) {
     return vec3(split_sums[first], split_sums[first + 1], split_sums[first + 2]);
 }
 
-vec3 estimate(Surface surface, Material material, uint first, uint stride, SourceSum of_sources) {
+vec3 estimate(Surface surface, Material material, uint first, uint stride) {
     float row = min(surface.theta_o * (float(SPLIT_SUM_ROWS) / radians(90.0)), float(SPLIT_SUM_ROWS - 1));
     uint below = material.first_slice + 1 + 6 * uint(row);
     uint above = material.first_slice + 1 + 6 * min(uint(row) + 1, SPLIT_SUM_ROWS - 1);

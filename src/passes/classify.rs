@@ -1,5 +1,6 @@
 //! Sorts pixels into interior, edge and background, and lists those to shade: nothing else is looked at again.
 use super::View;
+use crate::environment::Environment;
 use crate::graph::{BufferDesc, BufferHandle, FrameGraph, ImageHandle};
 use crate::memo::Keyed;
 use crate::method::Method;
@@ -12,7 +13,7 @@ use bytemuck::{Pod, Zeroable};
 pub const SMOOTH_DEG: f32 = 10.0;
 
 /// Variance of the normal along each of two axes, in rad^2, from which sub-pixels do not share one sum at their mean normal: normals
-/// 0.6 degrees from their mean. `NEARLY_FLAT_RAD` in glsl/shared_sum.glsl is its root.
+/// 0.6 degrees from their mean. `NEARLY_FLAT_RAD` in glsl/methods/fitted.glsl is its root.
 pub const NEARLY_FLAT_VARIANCE: f32 = 1e-4;
 
 /// The same where some lobe is so wide that sub-pixels share more than that: 3.6 degrees.
@@ -84,10 +85,13 @@ pub struct SmoothVariance {
 impl SmoothVariance {
     /// What `method` asks for where sub-pixels of some material share a sum up to a deviation of normals, `most_shared` in radians. If they
     /// never do, nothing that [`SMOOTH_DEG`] allows. Two values for all materials, so that the lists of pixels seldom depend on these.
-    pub fn of(method: Method, most_shared: f64) -> Self {
+    ///
+    /// Small bright sources light a curved surface from a low angle here and not at all there. So sub-pixels are nearly flat where there are any.
+    pub fn of(method: Method, environment: &Environment, most_shared: f64) -> Self {
+        let is_wide = most_shared.powi(2) > f64::from(NEARLY_FLAT_VARIANCE) && !environment.has_small_sources();
         let (of_normals, of_tangents) = match method.shares_surface() {
             false => (1.0, 1.0),
-            true if most_shared.powi(2) > f64::from(NEARLY_FLAT_VARIANCE) => (WIDE_LOBE_VARIANCE, NEARLY_FLAT_VARIANCE),
+            true if is_wide => (WIDE_LOBE_VARIANCE, NEARLY_FLAT_VARIANCE),
             true => (NEARLY_FLAT_VARIANCE, NEARLY_FLAT_VARIANCE),
         };
         Self { of_normals, of_tangents }

@@ -134,24 +134,18 @@ fn share_of_brdf(least_clearance: f32) -> f32 {
     smoothstep(CLEAR, least_clearance)
 }
 
+/// Twin of `NEARLY_FLAT_RAD`.
+const NEARLY_FLAT_RAD: f32 = 0.01;
+
 /// Twin of `needs_subpixels`.
 pub(super) fn needs_subpixels(point: &Point) -> bool {
     if point.twin.light.blurred.is_none() {
         return false;
     }
-    let (sources, lobe_width) = (&point.twin.sources, point.record().lobe_width);
+    let (sources, record, lobe) = (&point.twin.sources, point.record(), Lobe::of(point));
     let deviation = point.surface.normal_variance.sqrt();
-    let lobe = Lobe::of(point);
-    deviation > lobe_width.min(NEARLY_FLAT_RAD).max(point.record().shared_deviation * lobe.w_o.z)
+    deviation > record.lobe_width.min(NEARLY_FLAT_RAD).max(record.shared_deviation * lobe.w_o.z)
         || share_of_brdf(lobe.least_clearance(sources, 3.0 * 2.0 * deviation)) < 1.0
-}
-
-/// Twin of `NEARLY_FLAT_RAD` in glsl/shared_sum.glsl.
-const NEARLY_FLAT_RAD: f32 = 0.01;
-
-/// Twin of `sources_vary`.
-pub(super) fn sources_vary(point: &Point) -> bool {
-    !point.twin.sources.is_empty() && point.surface.normal_variance > NEARLY_FLAT_RAD * NEARLY_FLAT_RAD
 }
 
 /// Twin of `risen`.
@@ -183,12 +177,11 @@ fn on_stairs(i: i32, up: Vec2) -> (Vec2, f32) {
     (12.0_f32.sqrt() / 4.0 * (i as f32 - 1.5) * up + to_side * up.perp(), 0.25)
 }
 
-/// What all sources are to a surface. Twin of `SourceSum` in glsl/shared_sum.glsl.
-#[derive(Default)]
-pub(super) struct SourceSum {
-    pub radiance: Vec3,
-    irradiance: Vec3,
-    of_kernels: f32,
+/// What all sources are to a surface. Twin of `AtSources`.
+struct AtSources {
+    f_cos: Vec3,
+    cosine: Vec3,
+    least_clearance: f32,
 }
 
 /// Twin of `within_pixel`.
@@ -196,7 +189,7 @@ fn within_pixel(axis: Vec3, surface: &Surface) -> Vec3 {
     axis * (1.0 + 4.0 * surface.normal_variance / axis.length_squared()).sqrt()
 }
 
-impl SourceSum {
+impl AtSources {
     /// Twin of `add_source`.
     fn add(&mut self, source: &SourceRecord, clear: f32, lobe: &Lobe) {
         let point = lobe.point;
@@ -230,29 +223,22 @@ impl SourceSum {
             if cos > 0.0 {
                 let power = weight * cos * source.power.truncate();
                 let w_i = w_i.with_z(middle).normalize();
-                self.radiance += power * point.brdf(w_i, lobe.w_o);
-                self.irradiance += power;
+                self.f_cos += power * point.brdf(w_i, lobe.w_o);
+                self.cosine += power;
             }
         }
     }
 }
 
 /// Twin of `at_sources`.
-pub(super) fn at_sources(point: &Point) -> SourceSum {
-    let mut sum = SourceSum::default();
-    let sources = &point.twin.sources;
-    if point.twin.light.blurred.is_none() || sources.is_empty() {
-        return sum;
-    }
-    let lobe = Lobe::of(point);
-    let least_width = 2.0 * point.surface.normal_variance.sqrt();
-    let mut least_clearance = FAR;
+fn at_sources(lobe: &Lobe, sources: &[SourceRecord]) -> AtSources {
+    let mut sum = AtSources { f_cos: Vec3::ZERO, cosine: Vec3::ZERO, least_clearance: FAR };
+    let least_width = 2.0 * lobe.point.surface.normal_variance.sqrt();
     for source in lobe.sources(sources, least_width) {
         let clear = lobe.clearance(source, least_width);
-        least_clearance = least_clearance.min(clear);
-        sum.add(source, clear, &lobe);
+        sum.least_clearance = sum.least_clearance.min(clear);
+        sum.add(source, clear, lobe);
     }
-    sum.of_kernels = 1.0 - share_of_brdf(least_clearance);
     sum
 }
 
@@ -312,7 +298,7 @@ fn between(a: UnpackedKernel, b: UnpackedKernel, t: f32) -> UnpackedKernel {
     }
 }
 
-/// Twin of `estimate`, and of a sub-pixel that shares no sum with what the BRDF makes of sources.
+/// Twin of `estimate`.
 ///
 /// # Panics
 /// A scene prepared for another method has other threads.
@@ -320,21 +306,23 @@ pub(super) fn estimate(point: &Point) -> Vec3 {
     let threads = point.fitted_threads().expect("fitted threads or Gaussians are there");
     let surface = &point.surface;
     let light = blurred_light(point.twin);
-    let sources = if point.is_pixel { SourceSum::default() } else { at_sources(point) };
+    let sources = &point.twin.sources;
     let rows = Rows::at(surface, threads);
+    let at = at_sources(&Lobe::of(point), sources);
+    let of_kernels = 1.0 - share_of_brdf(at.least_clearance);
     let (mut weights, mut sum) = (Vec3::ZERO, Vec3::ZERO);
     for k in (point.first as usize..threads.count).step_by(point.stride) {
         let kernel = rows.kernel(threads, k);
         let level = level_within_pixel(kernel.level, variance_of_pixel(surface.normal_variance));
         let direction = surface.frame * stereographic_decode(kernel.place);
         weights += kernel.weight;
-        sum += kernel.weight * blurred_radiance(point.twin, direction, level, sources.of_kernels);
+        sum += kernel.weight * blurred_radiance(point.twin, direction, level, of_kernels);
     }
     let share = point.stride as f32;
     let cosine_part = rows.albedo(threads) - share * weights;
-    let irradiance = light.irradiance.lookup_by(surface.frame.z_axis, 0.0, point.twin.fractions);
-    sum = share * sum + cosine_part * irradiance;
-    sum + sources.radiance.lerp(sources.irradiance * cosine_part / PI, sources.of_kernels)
+    sum = share * sum + cosine_part * light.irradiance.lookup_by(surface.frame.z_axis, 0.0, point.twin.fractions);
+    sum += at.f_cos.lerp(at.cosine * cosine_part / PI, of_kernels);
+    sum.max(Vec3::ZERO)
 }
 
 #[cfg(test)]

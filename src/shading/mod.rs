@@ -238,14 +238,7 @@ impl<'a> CpuShader<'a> {
             point.surface.normal_variance = normal_variance(texels);
             if !fitted::needs_subpixels(&point) {
                 point.is_pixel = true;
-                let subpixels = texels.iter().enumerate().filter_map(|(j, texel)| self.subpixel(pixel, j, *texel));
-                let of_sources = match fitted::sources_vary(&point) {
-                    true => {
-                        subpixels.map(|point| fitted::at_sources(&point).radiance).sum::<Vec3>() / texels.len() as f32
-                    }
-                    false => fitted::at_sources(&point).radiance,
-                };
-                return (point.estimate() + of_sources).max(Vec3::ZERO).extend(1.0);
+                return point.estimate().extend(1.0);
             }
         }
         let points = texels.iter().enumerate().filter_map(|(j, texel)| {
@@ -254,7 +247,7 @@ impl<'a> CpuShader<'a> {
             (point.first, point.stride) = ((j % sets) as u32, sets);
             Some(point)
         });
-        (points.map(|point| point.estimate().extend(1.0)).sum::<Vec4>() / texels.len() as f32).max(Vec4::ZERO)
+        points.map(|point| point.estimate().extend(1.0)).sum::<Vec4>() / texels.len() as f32
     }
 
     /// The surface that is seen at a place in the picture, from 0 to 1. Twin of `surface_at` in glsl/shade.comp.
