@@ -86,7 +86,7 @@ impl SmoothVariance {
     /// What `method` asks for where sub-pixels of some material share a sum up to a deviation of normals, `most_shared` in radians. If they
     /// never do, nothing that [`SMOOTH_DEG`] allows. Two values for all materials, so that the lists of pixels seldom depend on these.
     ///
-    /// Small bright sources light a curved surface from a low angle here and not at all there. So sub-pixels are nearly flat where there are any.
+    /// Small bright sources light a curved surface from a low angle here and not at all there: under these only nearly flat pixels are smooth.
     pub fn of(method: Method, environment: &Environment, most_shared: f64) -> Self {
         let is_wide = most_shared.powi(2) > f64::from(NEARLY_FLAT_VARIANCE) && !environment.has_small_sources();
         let (of_normals, of_tangents) = match method.shares_surface() {
