@@ -29,10 +29,15 @@ fn the_built_in_scene_renders_without_validation_messages_and_with_sane_statisti
     let covered = number("covered_subpixels");
     let circle = std::f64::consts::PI * radius_px * radius_px;
     assert!((covered / circle - 1.0).abs() < 0.02, "{covered} {circle}");
-    // Interior pixels share one sum over eight threads; each other covered sub-pixel has two of its own. Both have the cosine part.
+    // Interior pixels share one sum over eight threads; each other covered sub-pixel has two of its own. Both have the cosine part. Some
+    // interior pixels are too curved for the lobe: their four sub-pixels have two threads each, too.
     let (interior, edge, lookups) = (number("interior_pixels"), number("edge_pixels"), number("lookups"));
     let expected = (8.0 + 1.0) * interior + (2.0 + 1.0) * (covered - 4.0 * interior);
-    assert_eq!(lookups, expected, "{interior} interior, {covered} sub-pixels covered");
+    let curved = (lookups - expected) / (4.0 * (2.0 + 1.0) - (8.0 + 1.0));
+    assert!(
+        curved.fract() == 0.0 && (0.0..0.5 * interior).contains(&curved),
+        "{lookups} lookups, {interior} interior, {covered} sub-pixels covered"
+    );
     assert!(interior > 0.0 && edge > 0.0 && covered > 4.0 * interior && covered <= 4.0 * (interior + edge));
 
     let passes = stats["passes"].as_array().unwrap();
