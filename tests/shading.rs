@@ -275,9 +275,13 @@ fn a_diffuse_material_has_one_lookup_a_surface_whatever_the_number_of_threads() 
         let Counters { interior_pixels, covered_edge_subpixels, .. } = rendering.counters;
         assert!(interior_pixels > 0 && covered_edge_subpixels > 0);
         let surfaces = u64::from(interior_pixels + covered_edge_subpixels);
-        // Where the view grazes, some pixels in one smooth surface are four surfaces all the same.
+        // Where the view grazes, some pixels in one smooth surface are four surfaces all the same, if sets have few threads.
         let more = rendering.lookups - surfaces;
-        assert!(more < surfaces / 50, "{threads} threads: {more} lookups more than {surfaces} surfaces");
+        assert!(
+            more.is_multiple_of(3) && more < surfaces / 50,
+            "{threads} threads: {more} lookups more than {surfaces} surfaces"
+        );
+        assert!(threads < 64 || more == 0, "{threads} threads: {more} lookups more than {surfaces} surfaces");
     }
     gpu.finish();
 }

@@ -54,6 +54,7 @@ float clearance_of(Source source, Lobe lobe, Surface surface, Material material,
 
 // Whether a source is to be taken part by part, if it has any: where few points of it do not do beside the lobe, or it is so wide that
 // its shape matters.
+// Parts of one that is no wider than `least_width` tell nothing more.
 bool opens(Source source, Lobe lobe, Surface surface, Material material, float least_width) {
     float width = source.direction.w;
     float away = away_from(lobe, surface, material, source.direction.xyz);
@@ -96,8 +97,7 @@ Lobe lobe_of(Surface surface, Material material) {
     return Lobe(w_o, surface.frame * vec3(-w_o.x, -w_o.y, w_o.z), material.lobe_width * max(w_o.z, 0.05));
 }
 
-// Up to this deviation of their normals, in radians, sub-pixels are one surface to any lobe that is not narrower: the root of
-// NEARLY_FLAT_VARIANCE in src/passes/classify.rs.
+// Up to this deviation of their normals, in radians, sub-pixels are one surface to any lobe that is not narrower: src/threads/fitted/sets.rs.
 const float NEARLY_FLAT_RAD = 0.01;
 
 // A sum at one normal does not do where normals vary more than half vectors within a narrow lobe, or by a good part of a wide one: what

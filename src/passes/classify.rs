@@ -4,6 +4,7 @@ use crate::environment::Environment;
 use crate::graph::{BufferDesc, BufferHandle, FrameGraph, ImageHandle};
 use crate::memo::Keyed;
 use crate::method::Method;
+use crate::threads::fitted::NEARLY_FLAT_RAD;
 use crate::vulkan::ComputePipeline;
 use bytemuck::{Pod, Zeroable};
 
@@ -13,8 +14,8 @@ use bytemuck::{Pod, Zeroable};
 pub const SMOOTH_DEG: f32 = 10.0;
 
 /// Variance of the normal along each of two axes, in rad^2, from which sub-pixels do not share one sum at their mean normal: normals
-/// 0.6 degrees from their mean. `NEARLY_FLAT_RAD` in glsl/methods/fitted.glsl is its root.
-pub const NEARLY_FLAT_VARIANCE: f32 = 1e-4;
+/// 0.6 degrees from their mean.
+const NEARLY_FLAT_VARIANCE: f32 = (NEARLY_FLAT_RAD * NEARLY_FLAT_RAD) as f32;
 
 /// The same where some lobe is so wide that sub-pixels share more than that: 3.6 degrees.
 const WIDE_LOBE_VARIANCE: f32 = 4e-3;

@@ -11,7 +11,7 @@ use crate::light::{BlurredLight, finest_level};
 use crate::packing::stereographic_decode;
 use crate::threads::azimuths::Azimuths;
 use crate::threads::fitted::kernel::{FINEST_WIDTH_RAD, level_of_variance, sharp_part, variance_of_level};
-use crate::threads::fitted::{FittedTable, UnpackedKernel};
+use crate::threads::fitted::{FittedTable, NEARLY_FLAT_RAD, UnpackedKernel};
 
 /// Twin of `variance_of_pixel` in glsl/vmf_pyramid.glsl.
 fn variance_of_pixel(normal_variance: f32) -> f32 {
@@ -134,9 +134,6 @@ fn share_of_brdf(least_clearance: f32) -> f32 {
     smoothstep(CLEAR, least_clearance)
 }
 
-/// Twin of `NEARLY_FLAT_RAD`.
-const NEARLY_FLAT_RAD: f32 = 0.01;
-
 /// Twin of `needs_subpixels`.
 pub(super) fn needs_subpixels(point: &Point) -> bool {
     if point.twin.light.blurred.is_none() {
@@ -144,7 +141,7 @@ pub(super) fn needs_subpixels(point: &Point) -> bool {
     }
     let (sources, record, lobe) = (&point.twin.sources, point.record(), Lobe::of(point));
     let deviation = point.surface.normal_variance.sqrt();
-    deviation > record.lobe_width.min(NEARLY_FLAT_RAD).max(record.shared_deviation * lobe.w_o.z)
+    deviation > record.lobe_width.min(NEARLY_FLAT_RAD as f32).max(record.shared_deviation * lobe.w_o.z)
         || share_of_brdf(lobe.least_clearance(sources, 3.0 * 2.0 * deviation)) < 1.0
 }
 

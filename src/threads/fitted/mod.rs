@@ -31,6 +31,7 @@ mod validate;
 
 pub use draft::draft;
 pub use generate::generate;
+pub use sets::NEARLY_FLAT_RAD;
 pub(super) use sets::{set_count, shared_deviation};
 pub use table::{FittedTable, PackedKernel, UnpackedKernel, UsedThreads};
 pub use validate::validation_error;

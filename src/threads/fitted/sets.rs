@@ -27,14 +27,14 @@ pub fn shared_deviation(lobe: &LobeShape, table: &FittedTable) -> f64 {
     if count <= FEW_THREADS * sets { PART_OF_LOBE * lobe.width_rad } else { 0.0 }
 }
 
-/// Lobes narrower than this in half vectors, in radians, are narrower than normals are apart in the pixels of most meshes, so that these have a
-/// sum for each sub-pixel: the root of `NEARLY_FLAT_VARIANCE` in src/passes/classify.rs.
-const NARROW_RAD: f64 = 0.01;
+/// Up to this deviation of their normals, in radians, sub-pixels are one surface to any lobe that is not narrower in half vectors. Normals are
+/// farther apart in the pixels of most meshes, so that of narrower lobes these have a sum for each sub-pixel. The same in glsl/methods/fitted.glsl.
+pub const NEARLY_FLAT_RAD: f64 = 0.01;
 
 /// Whether pixels that share one sum have threads of their own, not in sets. Not of a narrow lobe, for which there are few such pixels, and whose
 /// free threads are so sharp that all pixels pay for looking that up: 26 ms become 35 with 16 threads of alumina-oxide on a dragon. Nor of
 /// an anisotropic BRDF, whose fits take ten times as long.
 pub fn pixels_have_own(brdf: &Brdf) -> bool {
     let lobe = LobeShape::of(brdf);
-    lobe.is_isotropic && lobe.width_rad >= NARROW_RAD
+    lobe.is_isotropic && lobe.width_rad >= NEARLY_FLAT_RAD
 }
