@@ -1,8 +1,8 @@
 // MERL: a measured table over half and difference angles. Twin of src/brdf/merl.rs.
-// a.x, a.y: y and z offset of this table in the atlas of all tables, in texels.
+// a.x, a.y: y and z offset of this table in the atlas of all tables, in texels; a.z: what a texel of 1 stands for.
 //
 // The including shader defines `vec4 brdf_table_texel(vec3 texel_coordinate)`: a trilinear fetch from the atlas at a position
-// in texels (centres at i + 0.5) whose x repeats every 180.
+// in texels (centres at i + 0.5) whose x repeats every 60.
 #include "parameters.glsl"
 
 vec3 merl(BrdfParameters parameters, vec3 w_i, vec3 w_o) {
@@ -23,9 +23,9 @@ vec3 merl(BrdfParameters parameters, vec3 w_i, vec3 w_o) {
     if (phi_d < 0.0) phi_d += 2.0 * HALF_PI; // reciprocity
 
     // Clamped by hand so that neighbours in the atlas never bleed in.
-    float x = 180.0 * phi_d / (2.0 * HALF_PI);
+    float x = 60.0 * phi_d / (2.0 * HALF_PI);
     float y = clamp(90.0 * theta_d / HALF_PI, 0.5, 89.5) + parameters.a.x;
     float z = clamp(90.0 * sqrt(theta_h / HALF_PI), 0.5, 89.5) + parameters.a.y;
     vec4 texel = brdf_table_texel(vec3(x, y, z));
-    return texel.a > 0.0 ? texel.rgb / texel.a : vec3(0.0);
+    return texel.a > 0.0 ? parameters.a.z / texel.a * texel.rgb : vec3(0.0);
 }

@@ -6,7 +6,7 @@ use half::f16;
 use rayon::prelude::*;
 
 /// What the greatest value is stored as. Half precision then keeps eleven bits of all that is above a billionth of it.
-const GREATEST_TEXEL: f64 = 6e4;
+pub(super) const GREATEST_TEXEL: f64 = 6e4;
 
 /// Tables of all shapes have so many texels along x and y, so that an image packs them without gaps.
 pub const MADE_TABLE_SIZE: [usize; 2] = [17, 75];

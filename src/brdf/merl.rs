@@ -6,7 +6,9 @@ use std::f64::consts::{FRAC_1_PI, FRAC_2_PI, FRAC_PI_2, PI};
 use std::sync::Arc;
 
 use glam::{DVec2, DVec3, Vec4, dvec2, dvec3};
+use half::f16;
 
+use super::made_table::GREATEST_TEXEL;
 use super::{Model, Parameters};
 use crate::error::{Error, Result};
 
@@ -24,11 +26,21 @@ const FILE_BYTES: usize = HEADER_BYTES + 3 * 8 * CELLS;
 /// Stored value to 1/sr, per channel (the database's own reader, BRDFRead.cpp).
 pub(super) const SCALE: [f64; 3] = [1.0 / 1500.0, 1.15 / 1500.0, 1.66 / 1500.0];
 
+/// Of so many bins over phi_d shaders have the mean: f varies least along it, and of smaller tables more stays in the cache.
+const BINS_A_TEXEL: usize = 3;
+
+/// Texels of a table on the device along x, y and z of a 3D texture: phi_d, theta_d and theta_h.
+pub const DEVICE_TABLE_SIZE: [usize; 3] = [PHI_D_BINS / BINS_A_TEXEL, THETA_D_BINS, THETA_H_BINS];
+
 /// A measured BRDF. Cheap to clone.
 #[derive(Clone)]
 pub struct MerlTable {
-    /// (rgb valid, valid) of each cell, index phi_d + 180 (theta_d + 90 theta_h).
+    /// (rgb valid, valid) of each cell, valid from 0 to 1, index phi_d + phi_d_bins (theta_d + 90 theta_h).
     texels: Arc<[Vec4]>,
+    /// [`PHI_D_BINS`], or fewer of a table as shaders have it.
+    phi_d_bins: usize,
+    /// What a texel of 1 stands for on the device, of a table as shaders have it.
+    device_scale: f32,
     fingerprint: blake3::Hash,
 }
 
@@ -76,24 +88,50 @@ impl MerlTable {
         if texels.iter().all(|texel| texel.truncate() == glam::Vec3::ZERO) {
             return Err("holds nothing but zero or invalid cells".into());
         }
-        Ok(Self::from_texels(texels))
+        Ok(Self::from_texels(texels, PHI_D_BINS, 1.0))
     }
 
-    fn from_texels(texels: Vec<Vec4>) -> Self {
+    fn from_texels(texels: Vec<Vec4>, phi_d_bins: usize, device_scale: f32) -> Self {
         let mut hasher = blake3::Hasher::new();
         for texel in &texels {
             for value in texel.to_array() {
                 hasher.update(&value.to_le_bytes());
             }
         }
-        Self { texels: texels.into(), fingerprint: hasher.finalize() }
+        Self { texels: texels.into(), phi_d_bins, device_scale, fingerprint: hasher.finalize() }
     }
 
-    /// The table for a 3D texture: RGBA = (rgb valid, valid) with f in 1/sr and valid 0 or 1; x = phi_d (180), y = theta_d
-    /// (90), z = theta_h (90), x fastest. Interpolate all four, then divide rgb by a.
-    pub fn texels(&self) -> &Arc<[Vec4]> {
-        &self.texels
+    /// The table as shaders have it: of the mean of each three cells along phi_d, in half precision.
+    pub(super) fn as_on_device(&self) -> Self {
+        let mean = |cells: &[Vec4]| cells.iter().sum::<Vec4>() / BINS_A_TEXEL as f32;
+        let cells: Vec<_> = self.texels.chunks_exact(BINS_A_TEXEL).map(mean).collect();
+        let greatest = cells.iter().fold(0.0, |greatest: f32, cell| greatest.max(cell.truncate().max_element()));
+        // By a power of 2 halves are multiplied without rounding.
+        let scale = (greatest / GREATEST_TEXEL as f32).max(f32::MIN_POSITIVE).log2().ceil().exp2();
+        let rounded = |cell: &Vec4| of_unit(scale) * Vec4::from_array(half_texel(*cell, scale).map(f16::to_f32));
+        Self::from_texels(cells.iter().map(rounded).collect(), DEVICE_TABLE_SIZE[0], scale)
     }
+
+    /// The texels of one that is as shaders have it, for a 3D texture: RGBA = (rgb valid, valid) with f in units of the table's scale and valid 0 to
+    /// 1, x fastest. Interpolate all four, then divide rgb by a.
+    pub fn device_texels(&self) -> Arc<[[f16; 4]]> {
+        self.texels.iter().map(|&texel| half_texel(texel, self.device_scale)).collect()
+    }
+
+    /// What glsl/brdf/merl.glsl reads of a table whose first texel lies at this y and z in the atlas.
+    pub(super) fn parameters_at(&self, [y, z]: [usize; 2]) -> [f32; 12] {
+        let numbers = [y as f32, z as f32, self.device_scale];
+        std::array::from_fn(|i| numbers.get(i).copied().unwrap_or(0.0))
+    }
+}
+
+/// What a texel on the device stands for, where 1 stands for `scale`: whether it is valid has no unit.
+fn of_unit(scale: f32) -> Vec4 {
+    Vec4::new(scale, scale, scale, 1.0)
+}
+
+fn half_texel(texel: Vec4, scale: f32) -> [f16; 4] {
+    (texel / of_unit(scale)).to_array().map(f16::from_f32)
 }
 
 /// Tells which cells of one (theta_h, theta_d) have both light and view above the horizon at their centre.
@@ -117,7 +155,7 @@ impl Horizon {
     }
 }
 
-/// Rusinkiewicz angles as positions in index space, where bin i covers [i, i + 1): (theta_h, theta_d, phi_d).
+/// Rusinkiewicz angles as positions in index space, where bin i covers [i, i + 1): (theta_h, theta_d, phi_d); of phi_d in half turns.
 #[inline]
 fn table_coordinate(w_i: DVec3, w_o: DVec3) -> DVec3 {
     // Angles as arc tangents, which take no unit vectors. (Cosines have no digits left near the pole, just where bins are smallest.)
@@ -135,7 +173,7 @@ fn table_coordinate(w_i: DVec3, w_o: DVec3) -> DVec3 {
     dvec3(
         THETA_H_BINS as f64 * (theta_h * FRAC_2_PI).sqrt(),
         THETA_D_BINS as f64 * FRAC_2_PI * theta_d,
-        PHI_D_BINS as f64 * FRAC_1_PI * if d_x * d_y < 0.0 { PI - phi_d } else { phi_d },
+        FRAC_1_PI * if d_x * d_y < 0.0 { PI - phi_d } else { phi_d },
     )
 }
 
@@ -174,7 +212,7 @@ fn clamped_pair(position: f64, bins: usize) -> (usize, f32) {
 /// Where in the table a position lies: its eight cells, and in single precision, as texels are, the weights of the second ones
 /// along theta_h, theta_d and phi_d.
 struct Place {
-    /// Index of the first cell of the first line along phi_d.
+    /// Which line along phi_d is the first.
     line: usize,
     /// The cells in each line.
     phi_d: [usize; 2],
@@ -183,25 +221,26 @@ struct Place {
 
 impl Place {
     #[inline]
-    fn of(w_i: DVec3, w_o: DVec3) -> Self {
+    fn of(w_i: DVec3, w_o: DVec3, phi_d_bins: usize) -> Self {
         let position = table_coordinate(w_i, w_o);
         let (theta_h, h_weight) = clamped_pair(position.x, THETA_H_BINS);
         let (theta_d, d_weight) = clamped_pair(position.y, THETA_D_BINS);
         // Half a bin before the first one is after the last.
-        let p = if position.z < 0.5 { position.z + PHI_D_BINS as f64 } else { position.z } - 0.5;
-        let p0 = (p as u32).min(PHI_D_BINS as u32 - 1);
-        let p1 = if p0 + 1 == PHI_D_BINS as u32 { 0 } else { p0 + 1 };
+        let p = phi_d_bins as f64 * position.z;
+        let p = if p < 0.5 { p + phi_d_bins as f64 } else { p } - 0.5;
+        let p0 = (p as u32).min(phi_d_bins as u32 - 1);
+        let p1 = if p0 + 1 == phi_d_bins as u32 { 0 } else { p0 + 1 };
         Self {
-            line: PHI_D_BINS * (theta_d + THETA_D_BINS * theta_h),
+            line: theta_d + THETA_D_BINS * theta_h,
             phi_d: [p0 as usize, p1 as usize],
             weights: [h_weight, d_weight, (p - f64::from(p0)) as f32],
         }
     }
 
     #[inline]
-    fn interpolate(&self, texels: &[Vec4]) -> DVec3 {
-        const NEXT_THETA_D: usize = PHI_D_BINS;
-        const NEXT_THETA_H: usize = THETA_D_BINS * PHI_D_BINS;
+    fn interpolate(&self, texels: &[Vec4], phi_d_bins: usize) -> DVec3 {
+        const NEXT_THETA_D: usize = 1;
+        const NEXT_THETA_H: usize = THETA_D_BINS;
         let [h, d, p] = self.weights;
         let mut sum = Vec4::ZERO;
         for (offset, weight) in [
@@ -210,7 +249,7 @@ impl Place {
             (NEXT_THETA_H, h * (1.0 - d)),
             (NEXT_THETA_H + NEXT_THETA_D, h * d),
         ] {
-            let [first, second] = self.phi_d.map(|phi_d| texels[self.line + offset + phi_d]);
+            let [first, second] = self.phi_d.map(|phi_d| texels[phi_d_bins * (self.line + offset) + phi_d]);
             sum += weight * first.lerp(second, p);
         }
         if sum.w > 0.0 { sum.truncate().as_dvec3() * (1.0 / f64::from(sum.w)) } else { DVec3::ZERO }
@@ -222,13 +261,13 @@ impl Model for MerlTable {
 
     /// Trilinear between bin centres, clamped in theta_h and theta_d, periodic in phi_d; invalid cells have no weight.
     fn evaluate(&self, w_i: DVec3, w_o: DVec3) -> DVec3 {
-        Place::of(w_i, w_o).interpolate(&self.texels)
+        Place::of(w_i, w_o, self.phi_d_bins).interpolate(&self.texels, self.phi_d_bins)
     }
 
     /// Waiting for memory takes half of the time, so it is asked for all at once.
     fn evaluate_all(&self, w_i: &[DVec3], w_o: DVec3) -> Vec<DVec3> {
-        let places: Vec<_> = w_i.iter().map(|&w_i| Place::of(w_i, w_o)).collect();
-        places.iter().map(|place| place.interpolate(&self.texels)).collect()
+        let places: Vec<_> = w_i.iter().map(|&w_i| Place::of(w_i, w_o, self.phi_d_bins)).collect();
+        places.iter().map(|place| place.interpolate(&self.texels, self.phi_d_bins)).collect()
     }
 
     fn from_parameters(_: &mut Parameters) -> Result<Self> {

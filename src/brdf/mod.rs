@@ -248,9 +248,14 @@ impl Brdf {
         Brdf::MODELS.iter().position(|name| *name == twin).expect("MODELS holds every model") as u32
     }
 
-    /// Whether shaders evaluate it by themselves; otherwise they look it up in a table that [`tabulate`] makes.
-    pub fn has_twin(&self) -> bool {
+    /// Whether shaders evaluate it by a model's form in GLSL.
+    fn has_twin(&self) -> bool {
         TWINS.contains(&self.model()) && !dispatch!(self, model => model.needs_table())
+    }
+
+    /// Whether shaders look it up in a table that [`tabulate`] makes; otherwise they evaluate it by themselves.
+    pub fn has_table(&self) -> bool {
+        matches!(self, Brdf::MerlTable(_)) || !self.has_twin()
     }
 
     /// The texels of one that [`tabulate`] made; none of any other.

@@ -67,20 +67,15 @@ impl MaterialRecord {
         }
     }
 
-    /// The same with its measured table at this y and z in the atlas of these, in texels: what glsl/brdf/merl.glsl reads from a.xy.
-    pub fn with_measured_table_at(mut self, [y, z]: [usize; 2]) -> Self {
-        self.parameters[..2].copy_from_slice(&[y as f32, z as f32]);
-        self
-    }
-
-    /// The same with `table`, which [`super::tabulate`] made, at this y and z in the atlas of such tables.
+    /// The same with `table`, which [`super::tabulate`] made, at this y and z in the atlas of its kind.
     ///
     /// # Panics
     /// It is none.
-    pub fn with_made_table_at(mut self, table: &Brdf, place: [usize; 2]) -> Self {
+    pub fn with_table_at(mut self, table: &Brdf, place: [usize; 2]) -> Self {
         self.parameters = match table {
             Brdf::Tabulated(table) => table.parameters_at(place),
             Brdf::TabulatedAnisotropic(table) => table.parameters_at(place),
+            Brdf::MerlTable(table) => table.parameters_at(place),
             _ => panic!("model `{}` is no table that was made", table.model()),
         };
         self

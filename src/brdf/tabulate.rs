@@ -1,11 +1,13 @@
-//! Makes the table by which shaders know a BRDF without a twin: as fine as its error asks for, within bounds.
+//! Makes the table by which shaders know a BRDF that they do not evaluate: as fine as its error asks for, within bounds, or of a MERL table a
+//! part of that.
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use glam::{DVec2, DVec3};
 
+use super::merl::DEVICE_TABLE_SIZE;
 use super::tabulated::{Grid, Tabulated};
 use super::tabulated_anisotropic::{AnisotropicGrid, TabulatedAnisotropic};
-use super::{Brdf, LobeShape, lobe_radius};
+use super::{Brdf, LobeShape, MadeTable, lobe_radius};
 
 /// Relative error of a table at which nodes are no longer added.
 const TARGET_ERROR: f64 = 2e-3;
@@ -20,7 +22,7 @@ const ANISOTROPIC_TANGENTS: &[usize] = &[27, 51];
 const VIEW_DEG: [f64; 4] = [5.0, 45.0, 70.0, 85.0];
 const AZIMUTH_DEG: [f64; 3] = [0.0, 50.0, 100.0];
 
-/// The table of `brdf`, of model `tabulated` or `tabulated_anisotropic`, and its relative error: the integral of |difference| cos over that of
+/// The table of `brdf`, of model `tabulated`, `tabulated_anisotropic` or `merl`, and its relative error: the integral of |difference| cos over that of
 /// f cos, of the worst channel at the worst of four view angles, 5 to 85 degrees.
 ///
 /// Starts coarse, then halves the steps along the half vector until the error is at most 0.2 % or the table has the most nodes.
@@ -32,8 +34,16 @@ pub fn tabulate(brdf: &Brdf) -> (Brdf, f64) {
     // tan(theta_h / 2) is half of theta_h, and half of the width is where f is within a tenth or so of its peak.
     let knee_of = |width: f64| (0.25 * width).clamp(1e-4, 1.0);
     let knee = knee_of(lobe.width_rad.min(lobe_radius(brdf)));
-    let is_reciprocal = brdf.is_reciprocal();
     let f = |w_i: DVec3, w_o: DVec3| brdf.evaluate(w_i, w_o);
+    let azimuths = if lobe.is_isotropic { &AZIMUTH_DEG[..1] } else { &AZIMUTH_DEG[..] };
+    let views =
+        VIEW_DEG.iter().flat_map(|theta_o_deg| azimuths.iter().map(move |azimuth_deg| [*theta_o_deg, *azimuth_deg]));
+    let samples: Vec<_> = views.map(|view| Sample::of_view(&f, view, knee)).collect();
+    let with_error = |table: Brdf| {
+        let error = error(&table, &samples);
+        (table, error)
+    };
+    let is_reciprocal = brdf.is_reciprocal();
     let made = |tangents: usize| match lobe.is_isotropic {
         true => Brdf::Tabulated(Tabulated::of(&f, Grid { tangents, knee, is_reciprocal })),
         false => {
@@ -43,23 +53,18 @@ pub fn tabulate(brdf: &Brdf) -> (Brdf, f64) {
             Brdf::TabulatedAnisotropic(TabulatedAnisotropic::of(&f, grid))
         }
     };
-    let (tangents, azimuths) = match lobe.is_isotropic {
-        true => (TANGENTS, &AZIMUTH_DEG[..1]),
-        false => (ANISOTROPIC_TANGENTS, &AZIMUTH_DEG[..]),
+    let as_fine_as_needed = || {
+        let (most, fewer) =
+            if lobe.is_isotropic { TANGENTS } else { ANISOTROPIC_TANGENTS }.split_last().expect("there are some");
+        let is_good = |(_, error): &(Brdf, f64)| *error <= TARGET_ERROR;
+        fewer.iter().map(|&few| with_error(made(few))).find(is_good).unwrap_or_else(|| with_error(made(*most)))
     };
-    let views =
-        VIEW_DEG.iter().flat_map(|theta_o_deg| azimuths.iter().map(move |azimuth_deg| [*theta_o_deg, *azimuth_deg]));
-    let samples: Vec<_> = views.map(|view| Sample::of_view(&f, view, knee)).collect();
-    let table_of = |tangents: usize| {
-        let table = made(tangents);
-        let error = error(&table, &samples);
-        (table, error)
+    let (table, error) = match brdf {
+        Brdf::MerlTable(table) => with_error(Brdf::MerlTable(table.as_on_device())),
+        _ => as_fine_as_needed(),
     };
-    let (most, fewer) = tangents.split_last().expect("there are some");
-    let is_good = |(_, error): &(Brdf, f64)| *error <= TARGET_ERROR;
-    let (table, error) = fewer.iter().map(|&few| table_of(few)).find(is_good).unwrap_or_else(|| table_of(*most));
-    let size = table.made_table().expect("it was made").size();
-    tracing::info!("{}: a table of {size:?} nodes, error {:.2} %", brdf.model(), 100.0 * error);
+    let size = table.made_table().map_or(DEVICE_TABLE_SIZE, MadeTable::size);
+    tracing::info!("{}: a table of {size:?} texels, error {:.2} %", brdf.model(), 100.0 * error);
     (table, error)
 }
 

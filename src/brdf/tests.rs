@@ -291,6 +291,26 @@ fn merl_table_of_a_model_gives_back_the_model() {
 }
 
 #[test]
+fn merl_tables_as_shaders_have_them_err_by_what_the_guide_says() {
+    for model in [plastic("ggx", 0.1, 0.4), conductor("ggx", 0.02), conductor("beckmann", 0.3), blinn_phong(200.0)] {
+        let table = MerlTable::from_bytes(&merl_export::merl_bytes(&model)).unwrap();
+        let error = tabulate(&Brdf::MerlTable(table)).1;
+        println!("{:.3} % {}", 100.0 * error, model.model());
+        assert!(error < 3e-3, "{}: {error}", model.model());
+    }
+    // What jumps from cell to cell is smoothed, and reflects as much.
+    for scale in [1e-12, 1.0, 1e9] {
+        let table = Brdf::MerlTable(merl(|h, d, p, c| scale * ((h * 7 + d * 3 + p * 5 + c) % 11) as f64 * 100.0));
+        let of_shaders = tabulate(&table).0;
+        for theta_o_deg in [5.0f64, 45.0, 70.0] {
+            let [found, expected] = [&of_shaders, &table].map(|brdf| brdf.albedo(theta_o_deg.to_radians()));
+            let error = ((found - expected) / expected).abs().max_element();
+            assert!(error < 0.01, "{scale} at {theta_o_deg}: {found}, {expected}");
+        }
+    }
+}
+
+#[test]
 fn merl_files_that_are_no_tables_are_refused_with_a_reason() {
     let good = merl_bytes(|_, _, _, _| 1.0);
     let reason = |bytes: &[u8]| MerlTable::from_bytes(bytes).unwrap_err();

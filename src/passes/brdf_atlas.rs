@@ -2,44 +2,23 @@
 use crate::vulkan::{self, Device, ImageKind, ImageShape};
 use crate::{Error, Result};
 use ash::vk;
-use glam::Vec4;
 use half::f16;
 use std::sync::Arc;
 
-/// What a table is of.
-pub trait Texel: bytemuck::Pod {
-    /// The format of an image of them on this device, and their bytes in it.
-    fn encode(device: &Device, texels: Vec<Self>) -> (vk::Format, Vec<u8>);
-}
-
-impl Texel for Vec4 {
-    fn encode(device: &Device, texels: Vec<Self>) -> (vk::Format, Vec<u8>) {
-        let single = vk::Format::R32G32B32A32_SFLOAT;
-        if device.filters_linearly(single) {
-            return (single, bytemuck::cast_slice(&texels).to_vec());
-        }
-        let half = texels.iter().map(|texel| texel.to_array().map(|value| f16::from_f32(value.min(65504.0))));
-        <[f16; 4]>::encode(device, half.collect())
-    }
-}
-
-impl Texel for [f16; 4] {
-    fn encode(_: &Device, texels: Vec<Self>) -> (vk::Format, Vec<u8>) {
-        (vk::Format::R16G16B16A16_SFLOAT, bytemuck::cast_slice(&texels).to_vec())
-    }
-}
+/// Four half floats: every device filters these.
+type Texel = [f16; 4];
 
 /// Tables that have the same size along x and y: stacked along z, and where the device's images end there, side by side along y.
-pub struct BrdfAtlas<T> {
+pub struct BrdfAtlas {
     /// Texels of each table along x and y.
     size: [usize; 2],
     /// The first y and z of each table, and its texels, x fastest.
-    tables: Vec<([usize; 2], Arc<[T]>)>,
+    tables: Vec<([usize; 2], Arc<[Texel]>)>,
     /// Where along y and z the next one lies.
     next: [usize; 2],
 }
 
-impl<T: Texel> BrdfAtlas<T> {
+impl BrdfAtlas {
     /// One without tables, for those that have this many texels along x and y.
     pub fn new(size: [usize; 2]) -> Self {
         Self { size, tables: Vec::new(), next: [0, 0] }
@@ -49,9 +28,9 @@ impl<T: Texel> BrdfAtlas<T> {
     ///
     /// # Errors
     /// A larger table, or more of them, than a 3D image of the device holds.
-    pub fn add(&mut self, device: &Device, texels: &Arc<[T]>) -> Result<[usize; 2]> {
+    pub fn add(&mut self, device: &Device, texels: Arc<[Texel]>) -> Result<[usize; 2]> {
         let limit = device.limits().max_image_dimension3_d as usize;
-        let depth = self.depth(texels);
+        let depth = self.depth(&texels);
         if self.next[1] + depth > limit {
             self.next = [self.next[0] + self.size[1], 0];
         }
@@ -68,13 +47,13 @@ impl<T: Texel> BrdfAtlas<T> {
             return Err(Error::input("the scene", problem, "use fewer materials"));
         }
         let place = self.next;
-        self.tables.push((place, texels.clone()));
+        self.tables.push((place, texels));
         self.next[1] += depth;
         Ok(place)
     }
 
     /// Texels of a table along z.
-    fn depth(&self, texels: &[T]) -> usize {
+    fn depth(&self, texels: &[Texel]) -> usize {
         texels.len() / (self.size[0] * self.size[1])
     }
 
@@ -87,15 +66,15 @@ impl<T: Texel> BrdfAtlas<T> {
         let extent = self.tables.iter().fold([1, 1, 1], |[_, y, z], (place, texels)| {
             [width, y.max(place[0] + side), z.max(place[1] + self.depth(texels))]
         });
-        let mut texels = vec![T::zeroed(); extent.iter().product()];
+        let mut texels = vec![Texel::default(); extent.iter().product()];
         for ([y_0, z_0], table) in &self.tables {
             for (line, source) in table.chunks_exact(width).enumerate() {
                 let start = width * (y_0 + line % side + extent[1] * (z_0 + line / side));
                 texels[start..start + width].copy_from_slice(source);
             }
         }
-        let (format, bytes) = T::encode(device, texels);
+        let format = vk::Format::R16G16B16A16_SFLOAT;
         let shape = ImageShape { format, extent: extent.map(|size| size as u32), levels: 1, kind: ImageKind::Volume };
-        Ok(vulkan::Image::with_texels(device, name, shape, &[bytes])?)
+        Ok(vulkan::Image::with_texels(device, name, shape, &[bytemuck::cast_slice(&texels).to_vec()])?)
     }
 }

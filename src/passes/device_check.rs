@@ -147,17 +147,10 @@ impl Questions {
     }
 }
 
-/// Single precision where it is filtered, as tables of BRDFs are.
+/// In half precision, as tables of BRDFs are.
 fn upload_volume(device: &Arc<Device>, volume: &Volume) -> Result<vulkan::Image> {
-    let single = vk::Format::R32G32B32A32_SFLOAT;
-    let use_single = device.filters_linearly(single);
-    let bytes = if use_single {
-        bytemuck::cast_slice(&volume.texels).to_vec()
-    } else {
-        let half = volume.texels.iter().flat_map(|texel| texel.to_array().map(f16::from_f32)).collect::<Vec<_>>();
-        bytemuck::cast_slice(&half).to_vec()
-    };
-    let format = if use_single { single } else { vk::Format::R16G16B16A16_SFLOAT };
+    let halves: Vec<_> = volume.texels.iter().map(|texel| texel.to_array().map(f16::from_f32)).collect();
+    let format = vk::Format::R16G16B16A16_SFLOAT;
     let shape = ImageShape { format, extent: volume.extent, levels: 1, kind: ImageKind::Volume };
-    Ok(vulkan::Image::with_texels(device, "asked table", shape, &[bytes])?)
+    Ok(vulkan::Image::with_texels(device, "asked table", shape, &[bytemuck::cast_slice(&halves).to_vec()])?)
 }

@@ -42,7 +42,7 @@ pub struct ShadedMaterial<'a> {
     pub lobe: &'a LobeShape,
     /// Its threads, for methods that have any.
     pub threads: Option<&'a Threads>,
-    /// What shaders look up of a BRDF without a twin, where they evaluate it: [`Brdf::made_table`].
+    /// Its table, if it [has one](Brdf::has_table) and shaders evaluate it.
     pub table: Option<&'a Brdf>,
 }
 
@@ -66,20 +66,20 @@ impl DeviceMaterials {
         let mut records = Vec::new();
         let mut threads = ThreadWords { words: Vec::new(), finest_level };
         let mut slices: Vec<f32> = Vec::new();
-        let mut measured = BrdfAtlas::new([merl::PHI_D_BINS, merl::THETA_D_BINS]);
+        let [phi_d, theta_d, _] = merl::DEVICE_TABLE_SIZE;
+        let mut measured = BrdfAtlas::new([phi_d, theta_d]);
         let mut made = BrdfAtlas::new(MADE_TABLE_SIZE);
         let materials: Vec<_> = materials.into_iter().collect();
         let models_used = models_used(materials.iter().map(|material| (material.brdf, material.lobe)), evaluates_brdf);
         for ShadedMaterial { brdf, lobe, threads: own_threads, table } in materials {
             let mut record = MaterialRecord::new(brdf, lobe);
-            if evaluates_brdf {
-                if let Brdf::MerlTable(table) = brdf {
-                    record = record.with_measured_table_at(measured.add(device, table.texels())?);
-                } else if !brdf.has_twin() {
-                    let table = table.expect("a table of a BRDF without a twin");
-                    let texels = table.made_table().expect("a table that was made").texels();
-                    record = record.with_made_table_at(table, made.add(device, texels)?);
-                }
+            if evaluates_brdf && brdf.has_table() {
+                let table = table.expect("a table of a BRDF that shaders look up");
+                let place = match table {
+                    Brdf::MerlTable(table) => measured.add(device, table.device_texels())?,
+                    _ => made.add(device, table.made_table().expect("a table that was made").texels().clone())?,
+                };
+                record = record.with_table_at(table, place);
             }
             if let Some(kind) = method.threads() {
                 assert_eq!(own_threads.map(Threads::kind), Some(kind), "threads of method {}", method.name());

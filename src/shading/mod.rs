@@ -168,7 +168,7 @@ impl<'a> CpuShader<'a> {
             _ => None,
         };
         let slices = lookups.slices.then(|| materials.iter().map(|material| SliceTable::new(&material.brdf)).collect());
-        let table = |material: &PreparedMaterial| match evaluates_brdf && !material.brdf.has_twin() {
+        let table = |material: &PreparedMaterial| match evaluates_brdf && material.brdf.has_table() {
             false => Ok(None),
             true => Ok(Some((*round.ask(&Tabulate(&material.brdf))?).clone())),
         };

@@ -77,7 +77,7 @@ impl Step for UploadMaterials<'_> {
     }
 
     fn make(&self, round: &Round) -> Result<DeviceMaterials> {
-        let has_table = |brdf: &Brdf| self.evaluates_brdf && !brdf.has_twin();
+        let has_table = |brdf: &Brdf| self.evaluates_brdf && brdf.has_table();
         let tables =
             self.materials.iter().map(|(brdf, _)| has_table(brdf).then(|| round.ask(&Tabulate(brdf))).transpose());
         let tables = tables.collect::<Result<Vec<_>>>()?;
