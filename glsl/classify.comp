@@ -1,5 +1,5 @@
 #version 450
-// Sorts pixels into interior, edge and background, and lists those that have to be shaded.
+// Sorts pixels into interior, edge and background, and by the shader of their material, and lists those that have to be shaded.
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_samplerless_texture_functions : require
 #include "geometry_texel.glsl"
@@ -10,18 +10,24 @@ layout(local_size_x = TILE_SIDE, local_size_y = TILE_SIDE) in;
 layout(constant_id = 0) const uint SUBPIXELS = 2; // per axis
 layout(constant_id = 1) const uint HAS_TANGENTS = 0; // 0: no material of the scene needs them
 
+layout(constant_id = 2) const uint CLASSES = 2; // two for each shader of a material; at most as many as a tile has pixels
+
 layout(set = 0, binding = 0) uniform utexture2D geometry;
 layout(set = 0, binding = 1, std430) buffer Counters {
-    TileClass classes[2];
     uint pixels[2];
     uint covered_subpixels;
     uint covered_edge_subpixels;
+    TileClass classes[];
 } counters;
-// The interior tiles, then, from the middle, the edge tiles.
+// For each class of pixels the tiles that hold any.
 layout(set = 0, binding = 2, std430) writeonly buffer TileList {
-    uint tiles[];
+    uvec2 tiles[];
 } tile_list;
-// For each tile of the image the places of its pixels in it: interior ones from the front, edge ones from the back.
+// The shader of each material.
+layout(set = 0, binding = 4, std430) readonly buffer Shaders {
+    uint shaders[];
+};
+// For each tile of the image the places of its pixels in it, class by class.
 layout(set = 0, binding = 3, std430) writeonly buffer PixelList {
     uint pixels[];
 } pixel_list;
@@ -33,16 +39,39 @@ layout(push_constant) uniform Push {
     vec2 smooth_variance;
     // if all normals lie within this angle of the first one's.
     float cos_smooth;
+    uint shader_of_mixed; // the shader of pixels of materials that have different ones
 } push;
 
-shared uint listed[2];
+shared uint listed[CLASSES];
 shared uint covered_total;
 shared uint covered_edge_total;
 
+// The first slot of a class among the pixels of this tile. Of one shader, interior pixels are listed from the front and edge pixels from the back:
+// their slots are known before all are counted, which takes half of the time.
+uint first_slot(uint pixel_class) {
+    if (CLASSES == 2) {
+        return pixel_class == INTERIOR ? 0 : TILE_PIXELS - listed[EDGE];
+    }
+    uint slot = 0;
+    for (uint before = 0; before < pixel_class; ++before) {
+        slot += listed[before];
+    }
+    return slot;
+}
+
+uint this_tile() {
+    return gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
+}
+
+void list_pixel(uint slot) {
+    pixel_list.pixels[this_tile() * TILE_PIXELS + slot] = gl_LocalInvocationIndex;
+}
+
 void main() {
+    if (gl_LocalInvocationIndex < CLASSES) {
+        listed[gl_LocalInvocationIndex] = 0;
+    }
     if (gl_LocalInvocationIndex == 0) {
-        listed[INTERIOR] = 0;
-        listed[EDGE] = 0;
         covered_total = 0;
         covered_edge_total = 0;
     }
@@ -51,6 +80,7 @@ void main() {
     uvec2 pixel = gl_GlobalInvocationID.xy;
     bool inside = all(lessThan(pixel, push.size_px));
     uint covered = 0;
+    uint shader = 0;
     bool smooth_surface = true;
     if (inside) {
         uvec2 reference = uvec2(0);
@@ -67,10 +97,13 @@ void main() {
             if (HAS_TANGENTS != 0 && has_tangent(texel)) {
                 tangents += geometry_tangent(texel, normal);
             }
+            uint own_shader = CLASSES != 2 ? shaders[geometry_material(texel)] : 0;
             if (covered++ == 0) {
                 reference = texel;
                 reference_normal = normal;
+                shader = own_shader;
             }
+            shader = own_shader == shader ? shader : push.shader_of_mixed;
             smooth_surface = smooth_surface && geometry_material(texel) == geometry_material(reference)
                 && dot(normal, reference_normal) >= push.cos_smooth;
         }
@@ -81,11 +114,13 @@ void main() {
         }
     }
     uint kind = smooth_surface && covered == SUBPIXELS * SUBPIXELS ? INTERIOR : EDGE;
-    uint tile = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
+    uint pixel_class = class_of(shader, kind);
+    uint place = 0;
     if (covered > 0) {
-        uint place = atomicAdd(listed[kind], 1);
-        uint slot = kind == INTERIOR ? place : TILE_PIXELS - 1 - place;
-        pixel_list.pixels[tile * TILE_PIXELS + slot] = gl_LocalInvocationIndex;
+        place = atomicAdd(listed[pixel_class], 1);
+        if (CLASSES == 2) {
+            list_pixel(kind == INTERIOR ? place : TILE_PIXELS - 1 - place);
+        }
         atomicAdd(covered_total, covered);
         if (kind == EDGE) {
             atomicAdd(covered_edge_total, covered);
@@ -93,14 +128,18 @@ void main() {
     }
     barrier();
 
-    if (gl_LocalInvocationIndex < 2 && listed[gl_LocalInvocationIndex] > 0) {
-        uint k = gl_LocalInvocationIndex;
+    if (CLASSES != 2 && covered > 0) {
+        list_pixel(first_slot(pixel_class) + place);
+    }
+    uint k = gl_LocalInvocationIndex;
+    if (k < CLASSES && listed[k] > 0) {
         uint place = atomicAdd(counters.classes[k].tile_count, 1);
-        tile_list.tiles[k * gl_NumWorkGroups.x * gl_NumWorkGroups.y + place] = pack_tile(tile, listed[k]);
+        uint tile_count = gl_NumWorkGroups.x * gl_NumWorkGroups.y;
+        tile_list.tiles[k * tile_count + place] = pack_tile(this_tile(), first_slot(k), listed[k]);
         atomicMax(counters.classes[k].groups_x, min(place + 1, MAX_GROUPS));
         atomicMax(counters.classes[k].groups_y, 1);
         atomicMax(counters.classes[k].groups_z, 1);
-        atomicAdd(counters.pixels[k], listed[k]);
+        atomicAdd(counters.pixels[kind_of(k)], listed[k]);
     }
     if (gl_LocalInvocationIndex == 0 && covered_total > 0) {
         atomicAdd(counters.covered_subpixels, covered_total);

@@ -20,10 +20,13 @@ const float TURNING_DEG = 15.0;
 
 layout(set = 0, binding = 0) uniform utexture2D geometry;
 layout(set = 0, binding = 1, std430) readonly buffer Counters {
-    TileClass classes[2];
+    uint pixels[2];
+    uint covered_subpixels;
+    uint covered_edge_subpixels;
+    TileClass classes[];
 } counters;
 layout(set = 0, binding = 2, std430) readonly buffer TileList {
-    uint tiles[];
+    uvec2 tiles[];
 } tile_list;
 layout(set = 0, binding = 9, std430) readonly buffer PixelList {
     uint pixels[];
@@ -39,7 +42,7 @@ layout(set = 0, binding = 8, std430) buffer Lookups {
 layout(push_constant) uniform Push {
     Camera camera;
     uvec2 size_px;
-    uint kind;              // which class of pixels
+    uint pixel_class;
     float face_size;        // of level 0 of the environment pyramid
     vec2 rotation;          // cosine and sine of the environment's rotation about +Y
     float radiance_scale;   // radiance of a texel of value 1
@@ -97,15 +100,15 @@ void main() {
         group_lookups = 0;
     }
     uvec2 tiles = (push.size_px + TILE_SIDE - 1) / TILE_SIDE;
-    bool interior = push.kind == INTERIOR;
+    bool interior = kind_of(push.pixel_class) == INTERIOR;
     // Only as many workgroups as tiles are dispatched. So the first needs no test, and with the test at the end of a loop no driver that
     // masks lanes out runs the body once more for none.
     uint t = gl_WorkGroupID.x;
     do {
-        uint packed = tile_list.tiles[push.kind * tiles.x * tiles.y + t];
+        uvec2 packed = tile_list.tiles[push.pixel_class * tiles.x * tiles.y + t];
         if (gl_LocalInvocationIndex < tile_pixel_count(packed)) {
             uint tile = tile_index(packed);
-            uint slot = interior ? gl_LocalInvocationIndex : TILE_PIXELS - 1 - gl_LocalInvocationIndex;
+            uint slot = tile_first_slot(packed) + gl_LocalInvocationIndex;
             uint place = pixel_list.pixels[tile * TILE_PIXELS + slot];
             uvec2 pixel = uvec2(tile % tiles.x, tile / tiles.x) * TILE_SIDE + uvec2(place % TILE_SIDE, place / TILE_SIDE);
             vec4 shaded = shade_pixel(pixel, interior);
@@ -113,7 +116,7 @@ void main() {
             imageStore(radiance, ivec2(pixel), vec4(scaled, shaded.a));
         }
         t += gl_NumWorkGroups.x;
-    } while (t < counters.classes[push.kind].tile_count);
+    } while (t < counters.classes[push.pixel_class].tile_count);
     barrier();
     atomicAdd(group_lookups, lookups);
     barrier();

@@ -13,6 +13,15 @@ const uint TILE_PIXELS = TILE_SIDE * TILE_SIDE;
 const uint INTERIOR = 0u;
 const uint EDGE = 1u;
 
+// Pixels are of one class if they are of one kind and have the same shader.
+uint class_of(uint shader, uint kind) {
+    return 2u * shader + kind;
+}
+
+uint kind_of(uint pixel_class) {
+    return pixel_class & 1u;
+}
+
 // The tiles that hold pixels of one class: the arguments of an indirect dispatch, and how many tiles are listed.
 struct TileClass {
     uint groups_x;
@@ -24,15 +33,19 @@ struct TileClass {
 // The limit on workgroups that every device has; beyond it a workgroup takes several tiles.
 const uint MAX_GROUPS = 65535u;
 
-// A listed tile: its index, row by row, and how many of its pixels are of the class (1 to 64).
-uint pack_tile(uint tile, uint pixel_count) {
-    return tile << 6 | (pixel_count - 1u);
+// A listed tile: its index, row by row, the first slot of the class among the tile's pixels, and how many of these are of the class (1 to 64).
+uvec2 pack_tile(uint tile, uint first_slot, uint pixel_count) {
+    return uvec2(tile, first_slot | pixel_count << 8);
 }
 
-uint tile_index(uint packed) {
-    return packed >> 6;
+uint tile_index(uvec2 packed) {
+    return packed.x;
 }
 
-uint tile_pixel_count(uint packed) {
-    return (packed & 63u) + 1u;
+uint tile_first_slot(uvec2 packed) {
+    return packed.y & 255u;
+}
+
+uint tile_pixel_count(uvec2 packed) {
+    return packed.y >> 8;
 }

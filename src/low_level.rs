@@ -37,6 +37,8 @@ pub mod progress;
 pub mod scene;
 #[path = "shading/mod.rs"]
 pub mod shading;
+#[path = "specialise.rs"]
+pub(crate) mod specialise;
 #[path = "steps/mod.rs"]
 pub mod steps;
 #[path = "tangent.rs"]

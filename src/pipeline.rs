@@ -1,14 +1,15 @@
 //! The method on one screen: the frame as a graph of passes, and the renderer that runs it.
 use crate::graph::{BufferHandle, Executable, FrameGraph, ImageHandle};
-use crate::light::{KernelNeeds, finest_level};
+use crate::light::finest_level;
 use crate::memo::{Held, Keyed, Round};
 use crate::output::ExrHeader;
 use crate::passes::*;
 use crate::prepare::Prepared;
-use crate::scene::{Mesh, Pattern};
+use crate::scene::Mesh;
+use crate::specialise::{ShadersOfMaterials, classify_constants};
 use crate::steps::{
     CheckDevice, CompileCompute, CompileGeometryCache, UploadBackground, UploadLight, UploadMaterials, UploadMesh,
-    light, pipelines,
+    UploadShaders, light, pipelines,
 };
 use crate::vulkan::{Device, Frames, PassTime, Shader, compiled};
 use crate::{Error, Result};
@@ -63,26 +64,6 @@ pub struct DeviceScene {
     _held: Held,
 }
 
-/// What `classify` is specialised by for `prepared`.
-pub(crate) fn classify_constants(prepared: &Prepared) -> [(&'static str, u32); 2] {
-    [("SUBPIXELS", prepared.view.subpixels), ("HAS_TANGENTS", prepared.has_tangents().into())]
-}
-
-/// What the shader of its method is, if kernels `need` that of its environment.
-pub(crate) fn shade_constants(
-    prepared: &Prepared,
-    models_used: u32,
-    needs: Option<KernelNeeds>,
-) -> Vec<(&'static str, u32)> {
-    let mut constants = classify_constants(prepared).to_vec();
-    constants.push(("MODELS_USED", models_used));
-    if prepared.method.has_pattern() {
-        constants.push(("FIXED_PATTERN", (prepared.sampling.pattern == Pattern::Fixed).into()));
-    }
-    constants.extend(needs.into_iter().flat_map(KernelNeeds::constants));
-    constants
-}
-
 /// Results of a rendering, as far as they were wanted.
 #[derive(Clone, Debug, Default)]
 pub struct Rendering {
@@ -131,10 +112,9 @@ impl DeviceScene {
         let finest_level = light.blurred.as_ref().map(|blurred| finest_level(&blurred.rest));
         let upload = UploadMaterials { device, method, materials: &materials, evaluates_brdf, finest_level };
         let materials = round.ask(&upload)?;
-        let needs = light.blurred.as_ref().map(|blurred| blurred.needs);
-        let constants = shade_constants(prepared, materials.models_used, needs);
+        let shaders = ShadersOfMaterials::new(prepared, light.blurred.as_ref());
         let light = round.ask(&UploadLight { device, method, environment, light: &light, way_around })?;
-        let pipeline = compile(shader, &constants)?;
+        let pipelines = shaders.constants.iter().map(|constants| compile(shader, constants)).collect::<Result<_>>()?;
         let background = match prepared.show_environment {
             true => Some(Background {
                 pipeline: compile(&compiled::BACKGROUND, &[])?,
@@ -146,10 +126,13 @@ impl DeviceScene {
             view: view.clone(),
             geometry_cache,
             classify: Classify {
-                pipeline: compile(&compiled::CLASSIFY, &classify_constants(prepared))?,
+                pipeline: compile(&compiled::CLASSIFY, &classify_constants(prepared, shaders.constants.len()))?,
                 smooth_variance: prepared.smooth_variance(),
+                shaders: round.ask(&UploadShaders { device, of_materials: &shaders.of_materials })?,
+                shader_count: shaders.constants.len() as u32,
+                shader_of_mixed: shaders.of_mixed,
             },
-            shade: Shade { pipeline, materials, light, sampling },
+            shade: Shade { pipelines, materials, light, sampling },
             background,
             tone_map: ToneMap { pipeline: compile(&compiled::TONE_MAP, &[])? },
             way_around,
@@ -158,9 +141,10 @@ impl DeviceScene {
         })
     }
 
-    /// Whether it shades by the same compiled shader as `other`.
+    /// Whether it shades by the same compiled shaders as `other`.
     pub fn shades_as(&self, other: &Self) -> bool {
-        self.shade.pipeline.key == other.shade.pipeline.key
+        let [keys, other_keys] = [self, other].map(|scene| scene.shade.pipelines.iter().map(|pipeline| pipeline.key));
+        keys.eq(other_keys)
     }
 
     /// Starts the random numbers of later frames from `seed`: other noise, for methods that have any.

@@ -8,11 +8,11 @@ use super::tables::{Section, Table, in_order};
 use crate::error::Result;
 use crate::memo::{Memo, Round};
 use crate::method::Method;
-use crate::passes::{GEOMETRY_STATE, models_used};
-use crate::pipeline::{classify_constants, shade_constants};
+use crate::passes::GEOMETRY_STATE;
 use crate::prepare::{Prepared, prepare};
 use crate::progress::Observer;
 use crate::scene::{Background, Scene};
+use crate::specialise::{classify_constants, shade_constants};
 use crate::steps::blurred_light;
 use crate::vulkan::{CompiledShader, CompilingDevice, Shader, compiled};
 
@@ -85,7 +85,7 @@ pub fn run(
         add(shader, "scene", constants)?;
         add(shader, "any", of_any)?;
         if index == 0 {
-            add(&compiled::CLASSIFY, "scene", classify_constants(&prepared).to_vec())?;
+            add(&compiled::CLASSIFY, "scene", classify_constants(&prepared, 1))?;
         }
     }
     if scene.image.background == Background::Environment {
@@ -97,12 +97,11 @@ pub fn run(
 /// What a rendering of `prepared` specialises the shader of its method by.
 fn constants_of(prepared: &Prepared, round: &Round) -> Result<Vec<(&'static str, u32)>> {
     let Prepared { method, environment, materials, .. } = prepared;
-    let models_used = models_used(materials.iter().map(|m| (&*m.brdf, &*m.lobe)), method.evaluates_brdf(environment));
-    let needs = match method.lookups().blurred {
-        true => Some(blurred_light(round, None, environment, Some(&prepared.shaded()))?.needs),
+    let light = match method.lookups().blurred {
+        true => Some(blurred_light(round, None, environment, Some(&prepared.shaded()))?),
         false => None,
     };
-    Ok(shade_constants(prepared, models_used, needs))
+    Ok(shade_constants(prepared, materials, light.as_ref()))
 }
 
 /// The columns of the table, by RADV's names: Mesa 22.3's, and what Mesa 25 calls the same.

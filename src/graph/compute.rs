@@ -34,6 +34,9 @@ enum Count {
     Indirect(BufferHandle, u64),
 }
 
+/// By what, how many workgroups, and with which push constants.
+type Dispatch<'a> = (&'a ComputePipeline, Count, Push<'a>);
+
 /// A compute pass that is being declared: [`ComputePass::cover`] and its like end it.
 #[must_use = "a pass without a dispatch records nothing"]
 pub struct ComputePass<'g, 'a> {
@@ -132,26 +135,32 @@ impl<'a> ComputePass<'_, 'a> {
     pub fn groups(mut self, counts: [u32; 3]) {
         let push = std::mem::replace(&mut self.push, Push::Known(Vec::new()));
         self.pass.depends_on(&counts);
-        self.record(vec![(Count::Direct(counts), push)]);
+        let pipeline = self.pipeline;
+        self.record(vec![(pipeline, Count::Direct(counts), push)]);
     }
 
-    /// One dispatch after another, each with the byte offset of its number of workgroups (three u32) in `arguments`, and with its
-    /// push constants. None waits for another.
-    pub fn indirect<P: Pod>(mut self, arguments: BufferHandle, dispatches: impl IntoIterator<Item = (u64, P)>) {
+    /// One dispatch after another, each by a pipeline of the same shader, with the byte offset of its number of workgroups (three u32) in
+    /// `arguments`, and with its push constants. None waits for another.
+    pub fn indirect<P: Pod>(
+        mut self,
+        arguments: BufferHandle,
+        dispatches: impl IntoIterator<Item = (&'a ComputePipeline, u64, P)>,
+    ) {
         self.pass.read(arguments, Access::Indirect);
-        let dispatch = |(offset, push): (u64, P)| {
+        let dispatch = |(pipeline, offset, push): (&'a ComputePipeline, u64, P)| {
             self.pass.depends_on(&offset);
-            (Count::Indirect(arguments, offset), Push::Known(bytemuck::bytes_of(&push).to_vec()))
+            (pipeline, Count::Indirect(arguments, offset), Push::Known(bytemuck::bytes_of(&push).to_vec()))
         };
         let dispatches = dispatches.into_iter().map(dispatch).collect();
         self.record(dispatches);
     }
 
-    fn record(mut self, dispatches: Vec<(Count, Push<'a>)>) {
+    fn record(mut self, dispatches: Vec<Dispatch<'a>>) {
         self.check_complete(&dispatches);
-        let Self { mut pass, pipeline, given, .. } = self;
-        pass.depends_on(&pipeline.identity()).depends_on(&given.iter().map(|(name, _)| *name).collect::<Vec<_>>());
-        for (_, push) in &dispatches {
+        let Self { mut pass, given, .. } = self;
+        pass.depends_on(&given.iter().map(|(name, _)| *name).collect::<Vec<_>>());
+        for (pipeline, _, push) in &dispatches {
+            pass.depends_on(&pipeline.identity());
             match push {
                 Push::Known(bytes) => drop(pass.depends_on(bytes)),
                 Push::Later(_) => pass.depends_on_unknown(),
@@ -160,7 +169,7 @@ impl<'a> ComputePass<'_, 'a> {
         pass.record(Box::new(move |commands, resources| {
             dispatches
                 .iter()
-                .try_for_each(|(count, push)| dispatch(commands, resources, pipeline, &given, *count, push))
+                .try_for_each(|(pipeline, count, push)| dispatch(commands, resources, pipeline, &given, *count, push))
         }));
     }
 
@@ -180,14 +189,14 @@ impl<'a> ComputePass<'_, 'a> {
     }
 
     /// An error of the graph where a binding or push constants are missing.
-    fn check_complete(&mut self, dispatches: &[(Count, Push)]) {
+    fn check_complete(&mut self, dispatches: &[Dispatch]) {
         let missing = |name: &&String| self.given.iter().all(|(given, _)| given != name);
         if let Some(name) = self.pipeline.bindings().keys().find(missing) {
             self.refuse(name, "nothing is given for it");
         }
         let declared = self.pipeline.push_constant_bytes() as usize;
         let fits = |push: &Push| !matches!(push, Push::Known(bytes) if bytes.len() != declared);
-        if !dispatches.iter().all(|(_, push)| fits(push)) {
+        if !dispatches.iter().all(|(_, _, push)| fits(push)) {
             self.refuse("push constants", "the shader declares another number of bytes");
         }
     }

@@ -1,12 +1,16 @@
-//! Sorts pixels into interior, edge and background, and lists those to shade: nothing else is looked at again.
+//! Sorts pixels into interior, edge and background, and by the shader of their material, and lists those to shade: nothing else is looked at
+//! again.
 use super::View;
+use crate::Result;
 use crate::environment::Environment;
 use crate::graph::{BufferDesc, BufferHandle, FrameGraph, ImageHandle};
 use crate::memo::Keyed;
 use crate::method::Method;
 use crate::threads::fitted::NEARLY_FLAT_RAD;
-use crate::vulkan::ComputePipeline;
+use crate::vulkan::{Buffer, ComputePipeline, Device};
+use ash::vk;
 use bytemuck::{Pod, Zeroable};
+use std::sync::Arc;
 
 /// Sub-pixels whose normals differ by less share one partitioned sum over the threads. Narrower than this, and curved
 /// parts of a mesh count as edges and cost as much as all sub-pixels shaded alone; wider, and the parts of the sum
@@ -20,20 +24,13 @@ const NEARLY_FLAT_VARIANCE: f32 = (NEARLY_FLAT_RAD * NEARLY_FLAT_RAD) as f32;
 /// The same where some lobe is so wide that sub-pixels share more than that: 3.6 degrees.
 const WIDE_LOBE_VARIANCE: f32 = 4e-3;
 
-/// The tiles of one class: arguments of an indirect dispatch and a count. `TileClass` in glsl/tiles.glsl.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
-pub struct TileClass {
-    groups: [u32; 3],
-    /// Tiles that hold pixels of the class.
-    pub tile_count: u32,
-}
+/// How many shaders there can be at most. Few are enough; glsl/classify.comp has room for 32.
+pub const MAX_SHADERS: usize = 16;
 
-/// What the pass counts. `Counters` in glsl/classify.comp.
+/// What the pass counts. `Counters` in glsl/classify.comp, which goes on with the tiles of each class: interior and edge pixels of each shader.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 pub struct Counters {
-    tiles: [TileClass; 2],
     /// Pixels that see one smooth surface in all sub-pixels.
     pub interior_pixels: u32,
     /// Pixels at an edge of something.
@@ -44,15 +41,18 @@ pub struct Counters {
     pub covered_edge_subpixels: u32,
 }
 
+/// Bytes of `TileClass` in glsl/tiles.glsl: the arguments of an indirect dispatch, and a count.
+const TILE_CLASS_BYTES: u64 = 16;
+
 impl Counters {
     /// Pixels that see a surface.
     pub fn covered_pixels(&self) -> u64 {
         u64::from(self.interior_pixels) + u64::from(self.edge_pixels)
     }
 
-    /// Byte offset of the dispatch arguments of class `kind`: 0 interior, 1 edge.
-    pub fn arguments_of(kind: u32) -> u64 {
-        u64::from(kind) * size_of::<TileClass>() as u64
+    /// Byte offset of the dispatch arguments of a class: 2 k are the interior pixels of shader k, 2 k + 1 its edge pixels.
+    pub fn arguments_of(pixel_class: usize) -> u64 {
+        size_of::<Self>() as u64 + pixel_class as u64 * TILE_CLASS_BYTES
     }
 }
 
@@ -63,6 +63,12 @@ pub struct Classify {
     pub pipeline: Keyed<ComputePipeline>,
     /// From which variances of their normals and tangents on sub-pixels are no smooth surface: see [`SmoothVariance::of`].
     pub smooth_variance: SmoothVariance,
+    /// The number of the shader of each material.
+    pub shaders: Keyed<Buffer>,
+    /// How many there are.
+    pub shader_count: u32,
+    /// That of pixels of materials that have different ones.
+    pub shader_of_mixed: u32,
 }
 
 #[repr(C)]
@@ -71,6 +77,7 @@ struct Push {
     size_px: [u32; 2],
     smooth_variance: SmoothVariance,
     cos_smooth: f32,
+    shader_of_mixed: u32,
 }
 
 /// From which variances on, in rad^2, sub-pixels are no smooth surface.
@@ -104,10 +111,21 @@ impl SmoothVariance {
 pub struct Tiles {
     /// [`Counters`].
     pub counters: BufferHandle,
-    /// The tiles that hold interior pixels, then, from the middle, those that hold edge pixels.
+    /// For each class of pixels the tiles that hold any.
     pub tiles: BufferHandle,
-    /// For each tile of the image the places of its pixels in it: interior ones from the front, edge ones from the back.
+    /// For each tile of the image the places of its pixels in it, class by class.
     pub pixels: BufferHandle,
+}
+
+/// Uploads the number of the shader of each material.
+///
+/// # Errors
+/// No device memory left.
+pub fn upload_shaders(device: &Arc<Device>, of_materials: &[u32]) -> Result<Buffer> {
+    // The binding needs something where there are no materials.
+    let numbers = if of_materials.is_empty() { &[0] } else { of_materials };
+    let usage = vk::BufferUsageFlags::STORAGE_BUFFER;
+    Ok(Buffer::with_contents(device, "shaders of materials", usage, bytemuck::cast_slice(numbers))?)
 }
 
 /// Lists the pixels of `geometry` that hold surface.
@@ -118,13 +136,15 @@ pub fn classify<'a>(graph: &mut FrameGraph<'a>, classify: &'a Classify, geometry
     let tile_count = u64::from(width.div_ceil(columns)) * u64::from(height.div_ceil(rows));
     let tile_pixels = u64::from(columns * rows);
     // Kept: as long as nothing moves, other light and other materials are shaded by the same lists.
-    let mut counters = graph.kept_buffer("counters", BufferDesc { size_bytes: size_of::<Counters>() as u64 });
+    let class_count = 2 * classify.shader_count as usize;
+    let mut counters = graph.kept_buffer("counters", BufferDesc { size_bytes: Counters::arguments_of(class_count) });
     graph.clear_buffer("clear_counters", &mut counters);
-    let mut tiles = graph.kept_buffer("tile_list", BufferDesc { size_bytes: 2 * 4 * tile_count });
+    let mut tiles = graph.kept_buffer("tile_list", BufferDesc { size_bytes: 8 * class_count as u64 * tile_count });
     let mut pixels = graph.kept_buffer("pixel_list", BufferDesc { size_bytes: 4 * tile_pixels * tile_count });
     graph
         .compute("classify", &classify.pipeline)
         .read("geometry", geometry)
+        .bind("Shaders", &*classify.shaders)
         .modify("counters", &mut counters)
         .write("tile_list", &mut tiles)
         .write("pixel_list", &mut pixels)
@@ -132,6 +152,7 @@ pub fn classify<'a>(graph: &mut FrameGraph<'a>, classify: &'a Classify, geometry
             size_px: [width, height],
             smooth_variance: classify.smooth_variance,
             cos_smooth: SMOOTH_DEG.to_radians().cos(),
+            shader_of_mixed: classify.shader_of_mixed,
         })
         .cover([width, height, 1]);
     Tiles { counters, tiles, pixels }

@@ -23,8 +23,6 @@ pub struct DeviceMaterials {
     measured_tables: vulkan::Image,
     made_tables: vulkan::Image,
     table_sampler: Sampler,
-    /// [`models_used`] of them.
-    pub models_used: u32,
 }
 
 /// Bit i: a material has the BRDF of model i, and it is evaluated.
@@ -69,8 +67,6 @@ impl DeviceMaterials {
         let [phi_d, theta_d, _] = merl::DEVICE_TABLE_SIZE;
         let mut measured = BrdfAtlas::new([phi_d, theta_d]);
         let mut made = BrdfAtlas::new(MADE_TABLE_SIZE);
-        let materials: Vec<_> = materials.into_iter().collect();
-        let models_used = models_used(materials.iter().map(|material| (material.brdf, material.lobe)), evaluates_brdf);
         for ShadedMaterial { brdf, lobe, threads: own_threads, table } in materials {
             let mut record = MaterialRecord::new(brdf, lobe);
             if evaluates_brdf && brdf.has_table() {
@@ -109,7 +105,6 @@ impl DeviceMaterials {
             measured_tables: measured.upload(device, "measured BRDFs")?,
             made_tables: made.upload(device, "tabulated BRDFs")?,
             table_sampler: Sampler::new(device, "brdf tables", SamplerKind::WrappedLinear)?,
-            models_used,
         })
     }
 }
@@ -179,8 +174,8 @@ pub struct Sampling {
 /// What the pass is made of.
 #[derive(Clone)]
 pub struct Shade {
-    /// The variant of the shader for the method, the number of sub-pixels and the models that are evaluated.
-    pub pipeline: Keyed<ComputePipeline>,
+    /// The method's shader, for each way that materials are specialised in.
+    pub pipelines: Vec<Keyed<ComputePipeline>>,
     /// What objects are made of.
     pub materials: Keyed<DeviceMaterials>,
     /// What lights them.
@@ -194,7 +189,7 @@ pub struct Shade {
 struct Push {
     camera: CameraRays,
     size_px: [u32; 2],
-    kind: u32,
+    pixel_class: u32,
     face_size: f32,
     rotation: [f32; 2],
     radiance_scale: f32,
@@ -205,11 +200,11 @@ struct Push {
 }
 
 impl Push {
-    fn new(view: &View, sampling: &Sampling, light: &DeviceLight, kind: u32) -> Self {
+    fn new(view: &View, sampling: &Sampling, light: &DeviceLight, pixel_class: u32) -> Self {
         Self {
             camera: view.camera_rays(),
             size_px: [view.width, view.height],
-            kind,
+            pixel_class,
             face_size: light.face_size(),
             rotation: view.rotation(),
             radiance_scale: light.radiance_scale(),
@@ -230,7 +225,7 @@ pub struct Shaded {
     pub lookups: BufferHandle,
 }
 
-/// Shades the pixels that `tiles` lists: interior ones with one sum shared by all sub-pixels, then those at edges.
+/// Shades the pixels that `tiles` lists, by the shader of each: interior ones with one sum shared by all sub-pixels, then those at edges.
 pub fn shade<'a>(
     graph: &mut FrameGraph<'a>,
     shade: &'a Shade,
@@ -239,15 +234,18 @@ pub fn shade<'a>(
     view: &View,
 ) -> Shaded {
     let Tiles { counters, tiles, pixels } = *tiles;
-    let Shade { pipeline, materials, light, sampling } = shade;
+    let Shade { pipelines, materials, light, sampling } = shade;
     let format = vk::Format::R32G32B32A32_SFLOAT;
     let mut radiance = graph.kept_image("radiance", ImageDesc { format, width: view.width, height: view.height });
     graph.clear_image("clear_radiance", &mut radiance, [0.0; 4]);
     let mut lookups = graph.buffer("lookups", BufferDesc { size_bytes: size_of::<u64>() as u64 });
     graph.clear_buffer("clear_lookups", &mut lookups);
-    let dispatch = |kind| (Counters::arguments_of(kind), Push::new(view, sampling, light, kind));
+    let dispatch = |pixel_class: usize| {
+        let push = Push::new(view, sampling, light, pixel_class as u32);
+        (&*pipelines[pixel_class / 2], Counters::arguments_of(pixel_class), push)
+    };
     graph
-        .compute("shade", pipeline)
+        .compute("shade", &pipelines[0])
         .read("geometry", geometry)
         .read("counters", counters)
         .read("tile_list", tiles)
@@ -256,6 +254,6 @@ pub fn shade<'a>(
         .modify("all_lookups", &mut lookups)
         .bind_all(materials.bindings())
         .bind_all(light.bindings())
-        .indirect(counters, [0, 1].map(dispatch));
+        .indirect(counters, (0..2 * pipelines.len()).map(dispatch));
     Shaded { radiance, lookups }
 }

@@ -11,4 +11,4 @@ pub use compile::{CompileCompute, CompileGeometryCache, pipelines};
 pub use filter::{Blur, BoxFilter, blurred_light, light};
 pub use fit::{DraftThreads, FitThreads};
 pub use load::{FindLobe, LoadBrushedMesh, LoadEnvironment, LoadMaterial, LoadMesh, Tabulate};
-pub use upload::{UploadBackground, UploadLight, UploadMaterials, UploadMesh};
+pub use upload::{UploadBackground, UploadLight, UploadMaterials, UploadMesh, UploadShaders};

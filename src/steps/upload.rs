@@ -7,10 +7,12 @@ use crate::environment::Environment;
 use crate::light::Light;
 use crate::memo::{Key, Keyed, Memo, Round, Step};
 use crate::method::Method;
-use crate::passes::{BackgroundMap, DeviceLight, DeviceMaterials, DeviceMesh, ShadedMaterial, WayAround};
+use crate::passes::{
+    BackgroundMap, DeviceLight, DeviceMaterials, DeviceMesh, ShadedMaterial, WayAround, upload_shaders,
+};
 use crate::scene::Mesh;
 use crate::threads::{FittedTable, Threads};
-use crate::vulkan::Device;
+use crate::vulkan::{Buffer, Device};
 use std::sync::Arc;
 
 /// Uploads the triangles of a mesh.
@@ -146,5 +148,26 @@ impl Step for UploadBackground<'_> {
 
     fn make(&self, _: &Round) -> Result<BackgroundMap> {
         BackgroundMap::new(self.device, self.environment)
+    }
+}
+
+/// Uploads which shader each material is shaded by.
+pub struct UploadShaders<'a> {
+    /// To where.
+    pub device: &'a Arc<Device>,
+    /// The shaders' numbers.
+    pub of_materials: &'a [u32],
+}
+
+impl Step for UploadShaders<'_> {
+    type Output = Buffer;
+    const NAME: &'static str = "upload of the shaders of materials";
+
+    fn key(&self, _: &Memo) -> Result<Key> {
+        Ok(on(self.device, "shaders of materials").bytes(bytemuck::cast_slice(self.of_materials)).build())
+    }
+
+    fn make(&self, _: &Round) -> Result<Buffer> {
+        upload_shaders(self.device, self.of_materials)
     }
 }

@@ -1,0 +1,115 @@
+//! By which constants shaders are specialised for what a scene has: what it does not need is compiled out.
+use crate::light::{BlurredLight, KernelNeeds};
+use crate::passes::{MAX_SHADERS, models_used};
+use crate::prepare::{Prepared, PreparedMaterial};
+use crate::scene::Pattern;
+
+/// Specialisation constants by name.
+pub(crate) type Constants = Vec<(&'static str, u32)>;
+
+/// The shaders of a scene's method: materials that need the same share one, so that no pixel pays for what other materials are made of.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct ShadersOfMaterials {
+    /// What each is specialised by; no two are alike.
+    pub constants: Vec<Constants>,
+    /// Which of them shades each material.
+    pub of_materials: Vec<u32>,
+    /// Which of them shades pixels of several materials that have different ones.
+    pub of_mixed: u32,
+}
+
+impl ShadersOfMaterials {
+    /// For `prepared`, under this light of fitted threads if its method looks that up.
+    pub fn new(prepared: &Prepared, light: Option<&BlurredLight>) -> Self {
+        let alone = |material| shade_constants(prepared, std::slice::from_ref(material), light);
+        let of_each: Vec<_> = prepared.materials.iter().map(alone).collect();
+        Self::of(&of_each, shade_constants(prepared, &prepared.materials, light))
+    }
+
+    /// Where each material needs these constants, and all together need `of_all`; that is also the shader of materials beyond [`MAX_SHADERS`].
+    fn of(of_each: &[Constants], of_all: Constants) -> Self {
+        let mut constants: Vec<Constants> = Vec::new();
+        for needed in of_each {
+            if constants.len() + 1 < MAX_SHADERS && !constants.contains(needed) {
+                constants.push(needed.clone());
+            }
+        }
+        if constants.len() != 1 && !constants.contains(&of_all) {
+            constants.push(of_all.clone());
+        }
+        let shader = |needed| constants.iter().position(|constants| constants == needed);
+        let of_mixed = shader(&of_all).unwrap_or(0);
+        let of_materials = of_each.iter().map(|needed| shader(needed).unwrap_or(of_mixed) as u32).collect();
+        Self { of_materials, of_mixed: of_mixed as u32, constants }
+    }
+}
+
+/// What `classify` is specialised by, if shading has so many shaders.
+pub(crate) fn classify_constants(prepared: &Prepared, shader_count: usize) -> Constants {
+    vec![
+        ("SUBPIXELS", prepared.view.subpixels),
+        ("HAS_TANGENTS", prepared.has_tangents().into()),
+        ("CLASSES", 2 * shader_count as u32),
+    ]
+}
+
+/// What the shader of the method of `prepared` is specialised by for these materials of it.
+pub(crate) fn shade_constants(
+    prepared: &Prepared,
+    materials: &[PreparedMaterial],
+    light: Option<&BlurredLight>,
+) -> Constants {
+    let Prepared { method, environment, view, sampling, .. } = prepared;
+    let lobes = materials.iter().map(|material| (&*material.brdf, &*material.lobe));
+    let has_tangents = materials.iter().any(|material| !material.lobe.is_isotropic);
+    let mut constants = vec![
+        ("SUBPIXELS", view.subpixels),
+        ("HAS_TANGENTS", has_tangents.into()),
+        ("MODELS_USED", models_used(lobes, method.evaluates_brdf(environment))),
+    ];
+    if method.has_pattern() {
+        constants.push(("FIXED_PATTERN", (sampling.pattern == Pattern::Fixed).into()));
+    }
+    if let Some(light) = light {
+        // Drafts follow each other faster than shaders could be compiled for what each of them needs.
+        let needs = match prepared.is_draft {
+            true => light.needs,
+            false => {
+                let shaded: Vec<_> = materials.iter().map(PreparedMaterial::shaded).collect();
+                KernelNeeds::of(environment, &shaded, &light.rest)
+            }
+        };
+        constants.extend(needs.constants());
+    }
+    constants
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn needing(models: u32) -> Constants {
+        vec![("SUBPIXELS", 2), ("MODELS_USED", models)]
+    }
+
+    #[test]
+    fn materials_that_need_the_same_share_a_shader_and_pixels_of_others_have_one_with_all() {
+        let of = |models: &[u32]| {
+            let all = models.iter().fold(0, |all, models| all | models);
+            let shaders =
+                ShadersOfMaterials::of(&models.iter().map(|models| needing(*models)).collect::<Vec<_>>(), needing(all));
+            let constants: Vec<_> = shaders.constants.iter().map(|constants| constants[1].1).collect();
+            (constants, shaders.of_materials, shaders.of_mixed)
+        };
+        assert_eq!(of(&[]), (vec![0], vec![], 0));
+        assert_eq!(of(&[1, 1]), (vec![1], vec![0, 0], 0));
+        assert_eq!(of(&[1, 2, 1]), (vec![1, 2, 3], vec![0, 1, 0], 2));
+        // One that needs all is the shader of mixed pixels, too.
+        assert_eq!(of(&[1, 3]), (vec![1, 3], vec![0, 1], 1));
+        let many: Vec<u32> = (0..20).map(|model| 1 << model).collect();
+        let (constants, of_materials, of_mixed) = of(&many);
+        assert_eq!((constants.len(), of_mixed), (MAX_SHADERS, MAX_SHADERS as u32 - 1));
+        assert_eq!(constants[of_mixed as usize], (1 << 20) - 1);
+        assert_eq!(of_materials, (0..20).map(|material| of_mixed.min(material)).collect::<Vec<_>>());
+    }
+}
