@@ -20,9 +20,7 @@ const float TURNING_DEG = 15.0;
 
 layout(set = 0, binding = 0) uniform utexture2D geometry;
 layout(set = 0, binding = 1, std430) readonly buffer Counters {
-    uint pixels[2];
-    uint covered_subpixels;
-    uint covered_edge_subpixels;
+    Counted counted;
     TileClass classes[];
 } counters;
 layout(set = 0, binding = 2, std430) readonly buffer TileList {

@@ -30,6 +30,13 @@ struct TileClass {
     uint tile_count;
 };
 
+// What is counted of all classes, by kind of pixels where there are two.
+struct Counted {
+    uint pixels[2];
+    uint covered_subpixels;
+    uint covered_edge_subpixels;
+};
+
 // The limit on workgroups that every device has; beyond it a workgroup takes several tiles.
 const uint MAX_GROUPS = 65535u;
 

@@ -21,9 +21,16 @@ pub(crate) struct ShadersOfMaterials {
 impl ShadersOfMaterials {
     /// For `prepared`, under this light of fitted threads if its method looks that up.
     pub fn new(prepared: &Prepared, light: Option<&BlurredLight>) -> Self {
-        let alone = |material| shade_constants(prepared, std::slice::from_ref(material), light);
-        let of_each: Vec<_> = prepared.materials.iter().map(alone).collect();
-        Self::of(&of_each, shade_constants(prepared, &prepared.materials, light))
+        let of_each = prepared.materials.iter().map(|material| {
+            let needs = light.map(|light| match prepared.is_draft {
+                // Drafts follow each other faster than shaders could be compiled for what each of them needs.
+                true => light.needs,
+                false => KernelNeeds::of(&prepared.environment, &[material.shaded()], &light.rest),
+            });
+            shade_constants(prepared, std::slice::from_ref(material), needs)
+        });
+        let of_all = shade_constants(prepared, &prepared.materials, light.map(|light| light.needs));
+        Self::of(&of_each.collect::<Vec<_>>(), of_all)
     }
 
     /// Where each material needs these constants, and all together need `of_all`; that is also the shader of materials beyond [`MAX_SHADERS`].
@@ -53,12 +60,8 @@ pub(crate) fn classify_constants(prepared: &Prepared, shader_count: usize) -> Co
     ]
 }
 
-/// What the shader of the method of `prepared` is specialised by for these materials of it.
-pub(crate) fn shade_constants(
-    prepared: &Prepared,
-    materials: &[PreparedMaterial],
-    light: Option<&BlurredLight>,
-) -> Constants {
+/// What the shader of the method of `prepared` is specialised by for these materials of it, whose kernels have these needs.
+fn shade_constants(prepared: &Prepared, materials: &[PreparedMaterial], needs: Option<KernelNeeds>) -> Constants {
     let Prepared { method, environment, view, sampling, .. } = prepared;
     let lobes = materials.iter().map(|material| (&*material.brdf, &*material.lobe));
     let has_tangents = materials.iter().any(|material| !material.lobe.is_isotropic);
@@ -70,17 +73,7 @@ pub(crate) fn shade_constants(
     if method.has_pattern() {
         constants.push(("FIXED_PATTERN", (sampling.pattern == Pattern::Fixed).into()));
     }
-    if let Some(light) = light {
-        // Drafts follow each other faster than shaders could be compiled for what each of them needs.
-        let needs = match prepared.is_draft {
-            true => light.needs,
-            false => {
-                let shaded: Vec<_> = materials.iter().map(PreparedMaterial::shaded).collect();
-                KernelNeeds::of(environment, &shaded, &light.rest)
-            }
-        };
-        constants.extend(needs.constants());
-    }
+    constants.extend(needs.into_iter().flat_map(KernelNeeds::constants));
     constants
 }
 

@@ -93,10 +93,10 @@ impl MerlTable {
 
     fn from_texels(texels: Vec<Vec4>, phi_d_bins: usize, device_scale: f32) -> Self {
         let mut hasher = blake3::Hasher::new();
-        for texel in &texels {
-            for value in texel.to_array() {
-                hasher.update(&value.to_le_bytes());
-            }
+        // Line by line: a call for each number adds a seventh to the time of loading.
+        for line in texels.chunks(phi_d_bins) {
+            let bytes: Vec<u8> = line.iter().flat_map(|texel| texel.to_array()).flat_map(f32::to_le_bytes).collect();
+            hasher.update(&bytes);
         }
         Self { texels: texels.into(), phi_d_bins, device_scale, fingerprint: hasher.finalize() }
     }

@@ -1,5 +1,5 @@
-//! Makes the table by which shaders know a BRDF that they do not evaluate: as fine as its error asks for, within bounds, or of a MERL table a
-//! part of that.
+//! Makes the table in which shaders look a BRDF up that they do not evaluate. It is as fine as its error asks for, within bounds. A MERL table is
+//! made smaller.
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use glam::{DVec2, DVec3};
@@ -22,13 +22,13 @@ const ANISOTROPIC_TANGENTS: &[usize] = &[27, 51];
 const VIEW_DEG: [f64; 4] = [5.0, 45.0, 70.0, 85.0];
 const AZIMUTH_DEG: [f64; 3] = [0.0, 50.0, 100.0];
 
-/// The table of `brdf`, of model `tabulated`, `tabulated_anisotropic` or `merl`, and its relative error: the integral of |difference| cos over that of
-/// f cos, of the worst channel at the worst of four view angles, 5 to 85 degrees.
+/// The table of `brdf`, of model `tabulated`, `tabulated_anisotropic` or `merl`, and its relative error: the integral of |difference| cos over
+/// that of f cos, of the worst channel at the worst of four view angles, 5 to 85 degrees.
 ///
-/// Starts coarse, then halves the steps along the half vector until the error is at most 0.2 % or the table has the most nodes.
-/// Over the range of all isotropic models, errors end between 0.02 and 0.5 %, of which grazing views are the most. They are greater, 3 %
-/// at most there, for lobes that are narrow but not about the mirror direction, and where shadows have an edge. Of anisotropic models they
-/// are 0.3 to 1.7 % up to 70 degrees, and 1 to 6 % at 85; the guide has two that err by more.
+/// That of a MERL table has one size. Any other starts coarse, then halves the steps along the half vector until the error is at most
+/// 0.2 % or the table has the most nodes. Over the range of all isotropic models, errors end between 0.02 and 0.5 %, of which grazing views
+/// are the most. They are greater, 3 % at most there, for lobes that are narrow but not about the mirror direction, and where shadows have
+/// an edge. Of anisotropic models they are 0.3 to 1.7 % up to 70 degrees, and 1 to 6 % at 85; the guide has two that err by more.
 pub fn tabulate(brdf: &Brdf) -> (Brdf, f64) {
     let lobe = LobeShape::of(brdf);
     // tan(theta_h / 2) is half of theta_h, and half of the width is where f is within a tenth or so of its peak.

@@ -56,7 +56,11 @@ fn pair_at(theta_h: f64, theta_d: f64, phi_d: f64) -> (DVec3, DVec3) {
 
 /// A table whose values jump from cell to cell.
 pub(super) fn noisy_table() -> MerlTable {
-    merl(|h, d, p, c| ((h * 7 + d * 3 + p * 5 + c) % 11) as f64 * 100.0)
+    scaled_noisy_table(1.0)
+}
+
+fn scaled_noisy_table(scale: f64) -> MerlTable {
+    merl(|h, d, p, c| scale * ((h * 7 + d * 3 + p * 5 + c) % 11) as f64 * 100.0)
 }
 
 fn all_models() -> Vec<Brdf> {
@@ -300,7 +304,7 @@ fn merl_tables_as_shaders_have_them_err_by_what_the_guide_says() {
     }
     // What jumps from cell to cell is smoothed, and reflects as much.
     for scale in [1e-12, 1.0, 1e9] {
-        let table = Brdf::MerlTable(merl(|h, d, p, c| scale * ((h * 7 + d * 3 + p * 5 + c) % 11) as f64 * 100.0));
+        let table = Brdf::MerlTable(scaled_noisy_table(scale));
         let of_shaders = tabulate(&table).0;
         for theta_o_deg in [5.0f64, 45.0, 70.0] {
             let [found, expected] = [&of_shaders, &table].map(|brdf| brdf.albedo(theta_o_deg.to_radians()));

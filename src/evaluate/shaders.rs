@@ -12,7 +12,7 @@ use crate::passes::GEOMETRY_STATE;
 use crate::prepare::{Prepared, prepare};
 use crate::progress::Observer;
 use crate::scene::{Background, Scene};
-use crate::specialise::{classify_constants, shade_constants};
+use crate::specialise::{ShadersOfMaterials, classify_constants};
 use crate::steps::blurred_light;
 use crate::vulkan::{CompiledShader, CompilingDevice, Shader, compiled};
 
@@ -78,15 +78,18 @@ pub fn run(
         let round = memo.round(observer);
         let prepared = prepare(&scene, &round)?;
         let shader = method.shader()?;
-        let constants = constants_of(&prepared, &round)?;
+        let shaders = shaders_of(&prepared, &round)?;
         // Those that say how much is in a scene; the rest stay as in GLSL, where nothing is left out.
-        let of_any = constants.iter().copied().filter(|(name, _)| ["SUBPIXELS", "FIXED_PATTERN"].contains(name));
+        let of_any =
+            shaders.constants[0].iter().copied().filter(|(name, _)| ["SUBPIXELS", "FIXED_PATTERN"].contains(name));
         let of_any = of_any.chain([("HAS_TANGENTS", 1)]).collect();
-        add(shader, "scene", constants)?;
-        add(shader, "any", of_any)?;
         if index == 0 {
-            add(&compiled::CLASSIFY, "scene", classify_constants(&prepared, 1))?;
+            add(&compiled::CLASSIFY, "scene", classify_constants(&prepared, shaders.constants.len()))?;
         }
+        for constants in shaders.constants {
+            add(shader, "scene", constants)?;
+        }
+        add(shader, "any", of_any)?;
     }
     if scene.image.background == Background::Environment {
         add(&compiled::BACKGROUND, "any", Vec::new())?;
@@ -94,14 +97,14 @@ pub fn run(
     add(&compiled::TONE_MAP, "any", Vec::new())
 }
 
-/// What a rendering of `prepared` specialises the shader of its method by.
-fn constants_of(prepared: &Prepared, round: &Round) -> Result<Vec<(&'static str, u32)>> {
-    let Prepared { method, environment, materials, .. } = prepared;
+/// The shaders that a rendering of `prepared` compiles.
+fn shaders_of(prepared: &Prepared, round: &Round) -> Result<ShadersOfMaterials> {
+    let Prepared { method, environment, .. } = prepared;
     let light = match method.lookups().blurred {
         true => Some(blurred_light(round, None, environment, Some(&prepared.shaded()))?),
         false => None,
     };
-    Ok(shade_constants(prepared, materials, light.as_ref()))
+    Ok(ShadersOfMaterials::new(prepared, light.as_ref()))
 }
 
 /// The columns of the table, by RADV's names: Mesa 22.3's, and what Mesa 25 calls the same.

@@ -191,12 +191,14 @@ impl<'a> ComputePass<'_, 'a> {
     /// An error of the graph where a binding or push constants are missing.
     fn check_complete(&mut self, dispatches: &[Dispatch]) {
         let missing = |name: &&String| self.given.iter().all(|(given, _)| given != name);
-        if let Some(name) = self.pipeline.bindings().keys().find(missing) {
+        if let Some(name) = dispatches.iter().find_map(|(pipeline, ..)| pipeline.bindings().keys().find(missing)) {
             self.refuse(name, "nothing is given for it");
         }
-        let declared = self.pipeline.push_constant_bytes() as usize;
-        let fits = |push: &Push| !matches!(push, Push::Known(bytes) if bytes.len() != declared);
-        if !dispatches.iter().all(|(_, _, push)| fits(push)) {
+        let fits = |(pipeline, _, push): &Dispatch| match push {
+            Push::Known(bytes) => bytes.len() == pipeline.push_constant_bytes() as usize,
+            Push::Later(_) => true,
+        };
+        if !dispatches.iter().all(fits) {
             self.refuse("push constants", "the shader declares another number of bytes");
         }
     }

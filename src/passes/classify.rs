@@ -1,5 +1,4 @@
-//! Sorts pixels into interior, edge and background, and by the shader of their material, and lists those to shade: nothing else is looked at
-//! again.
+//! Sorts pixels into interior, edge and background, and by the shader of their material. It lists those to shade: nothing else is looked at again.
 use super::View;
 use crate::Result;
 use crate::environment::Environment;
@@ -24,10 +23,10 @@ const NEARLY_FLAT_VARIANCE: f32 = (NEARLY_FLAT_RAD * NEARLY_FLAT_RAD) as f32;
 /// The same where some lobe is so wide that sub-pixels share more than that: 3.6 degrees.
 const WIDE_LOBE_VARIANCE: f32 = 4e-3;
 
-/// How many shaders there can be at most. Few are enough; glsl/classify.comp has room for 32.
+/// How many shaders there can be at most: each has two lists of tiles and is compiled. glsl/classify.comp has room for 32.
 pub const MAX_SHADERS: usize = 16;
 
-/// What the pass counts. `Counters` in glsl/classify.comp, which goes on with the tiles of each class: interior and edge pixels of each shader.
+/// What the pass counts: `Counted` in glsl/tiles.glsl. Its buffer goes on with the tiles of each class: interior and edge pixels of each shader.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 pub struct Counters {
