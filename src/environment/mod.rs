@@ -115,19 +115,23 @@ impl Environment {
     }
 
     /// The mean of [`Self::radiance`] over a box of `theta_rad` x `phi_rad` around `direction`, each angle counting the same:
-    /// exact, as each pixel's weight is a tent in each of the two.
-    fn mean_over_box(&self, direction: DVec3, theta_rad: f64, phi_rad: f64) -> DVec3 {
+    /// exact, as each pixel's weight is a tent in each of the two. `columns` is room to work in.
+    fn mean_over_box(&self, direction: DVec3, theta_rad: f64, phi_rad: f64, columns: &mut Vec<(usize, f64)>) -> DVec3 {
         let (x, y) = self.pixel(direction);
-        let columns = tents_over(x, phi_rad / TAU * self.width as f64);
-        let (mut sum, mut weight_sum) = (DVec3::ZERO, 0.0);
-        for (row, row_weight) in tents_over(y, theta_rad / PI * self.height as f64) {
-            for (column, column_weight) in columns.clone() {
-                let weight = row_weight * column_weight;
-                sum += weight * self.texel(column, row);
-                weight_sum += weight;
-            }
+        let across = tents_over(x, phi_rad / TAU * self.width as f64);
+        columns.clear();
+        columns.extend(across.map(|(column, weight)| (column.rem_euclid(self.width as isize) as usize, weight)));
+        let across: f64 = columns.iter().map(|(_, weight)| weight).sum();
+        let (mut sum, mut down) = (DVec3::ZERO, 0.0);
+        for (row, weight) in tents_over(y, theta_rad / PI * self.height as f64) {
+            let row = row.clamp(0, self.height as isize - 1) as usize;
+            let texels = &self.texels[row * self.width..][..self.width];
+            let mut of_row = DVec3::ZERO;
+            columns.iter().for_each(|&(column, weight)| of_row += weight * to_dvec3(&texels[column]));
+            sum += weight * of_row;
+            down += weight;
         }
-        sum / weight_sum
+        sum / (across * down)
     }
 
     /// The direction of a pixel's centre, unit; fractions name points between the centres.
@@ -191,11 +195,12 @@ impl Environment {
 
 /// phi, -pi to pi, and theta of `direction`.
 fn angles(direction: DVec3) -> [f64; 2] {
-    [direction.x.atan2(-direction.z), direction.x.hypot(direction.z).atan2(direction.y)]
+    let DVec3 { x, y, z } = direction;
+    [x.atan2(-z), (x * x + z * z).sqrt().atan2(y)]
 }
 
 /// The integrals over `centre` +- `extent` / 2 of the tents max(0, 1 - |x - k|) around those whole k that reach into it.
-fn tents_over(centre: f64, extent: f64) -> impl Iterator<Item = (isize, f64)> + Clone {
+fn tents_over(centre: f64, extent: f64) -> impl Iterator<Item = (isize, f64)> {
     // The integral of the tent around 0 from minus infinity to x.
     let integral = |x: f64| {
         let x = x.clamp(-1.0, 1.0);

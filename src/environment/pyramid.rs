@@ -197,34 +197,91 @@ fn finest_level(environment: &Environment, face_size: usize, observer: &dyn Obse
         // On a face of one texel an odd number would put a sample on the pole, where phi is undefined.
         if face_size == 1 { count.next_multiple_of(2) } else { count.clamp(1, 512) }
     };
-    (0..6 * face_size * face_size)
-        .into_par_iter()
-        .map(|texel| {
-            if observer.cancelled() {
-                return Err(Error::Cancelled);
-            }
-            let (face, row, column) = (texel / face_size / face_size, texel / face_size % face_size, texel % face_size);
-            let middle = |index: usize| (index as f64 + 0.5) / face_size as f64;
-            let axes = [
-                point_of(face, 1.0, 0.0) - point_of(face, 0.0, 0.0),
-                point_of(face, 0.0, 1.0) - point_of(face, 0.0, 0.0),
-            ];
-            let count = samples_per_edge(direction_of(face, middle(column), middle(row)));
-            let samples_size = face_size * count;
-            let (mut sum, mut weight_sum) = (DVec3::ZERO, 0.0);
-            for sample in 0..count * count {
-                let s = ((column * count + sample % count) as f64 + 0.5) / samples_size as f64;
-                let t = ((row * count + sample / count) as f64 + 0.5) / samples_size as f64;
-                let point = point_of(face, s, t);
-                let solid_angle = cube::texel_solid_angle(samples_size, point.normalize());
-                let sides = axes.map(|axis| axis / samples_size as f64);
-                let (theta_rad, phi_rad) = box_around(point, sides);
-                sum += solid_angle * environment.mean_over_box(point, theta_rad, phi_rad);
-                weight_sum += solid_angle;
-            }
-            Ok((sum / weight_sum).as_vec3().to_array())
-        })
-        .collect()
+    let lit = LitCells::new(environment, face_size);
+    let texel = |columns: &mut Vec<_>, texel: usize| {
+        if observer.cancelled() {
+            return Err(Error::Cancelled);
+        }
+        let (face, row, column) = (texel / face_size / face_size, texel / face_size % face_size, texel % face_size);
+        if !lit.reach(face, row, column) {
+            return Ok([0.0; 3]);
+        }
+        let middle = |index: usize| (index as f64 + 0.5) / face_size as f64;
+        let axes =
+            [point_of(face, 1.0, 0.0) - point_of(face, 0.0, 0.0), point_of(face, 0.0, 1.0) - point_of(face, 0.0, 0.0)];
+        let count = samples_per_edge(direction_of(face, middle(column), middle(row)));
+        let samples_size = face_size * count;
+        let sides = axes.map(|axis| axis / samples_size as f64);
+        let (mut sum, mut weight_sum) = (DVec3::ZERO, 0.0);
+        for sample in 0..count * count {
+            let s = ((column * count + sample % count) as f64 + 0.5) / samples_size as f64;
+            let t = ((row * count + sample / count) as f64 + 0.5) / samples_size as f64;
+            let point = point_of(face, s, t);
+            let (theta_rad, phi_rad) = box_around(point, sides);
+            // In proportion to the solid angle.
+            let weight = point.length_recip().powi(3);
+            sum += weight * environment.mean_over_box(point, theta_rad, phi_rad, columns);
+            weight_sum += weight;
+        }
+        Ok((sum / weight_sum).as_vec3().to_array())
+    };
+    (0..6 * face_size * face_size).into_par_iter().map_init(Vec::new, texel).collect()
+}
+
+/// Which cells of a cube map light reaches: of a few lamps alone, hardly any.
+struct LitCells {
+    /// Along the edge of a face.
+    count: usize,
+    /// Face by face, row by row; none if these are all.
+    are_lit: Option<Vec<bool>>,
+}
+
+impl LitCells {
+    /// Texels along the edge of a cell.
+    const TEXELS: usize = 16;
+    /// Pixels along the edge of a tile of the picture.
+    const PIXELS: usize = 8;
+
+    fn new(environment: &Environment, face_size: usize) -> Self {
+        let count = face_size.div_ceil(Self::TEXELS);
+        let &Environment { width, height, .. } = environment;
+        let across = width.div_ceil(Self::PIXELS);
+        let mut are_lit = vec![false; across * height.div_ceil(Self::PIXELS)];
+        for (pixel, radiance) in environment.texels.iter().enumerate() {
+            are_lit[pixel / width / Self::PIXELS * across + pixel % width / Self::PIXELS] |= *radiance != [0.0; 3];
+        }
+        if are_lit.iter().all(|&is_lit| is_lit) {
+            return Self { count, are_lit: None };
+        }
+        let centre = |index: usize| (index as f64 + 0.5) * Self::PIXELS as f64 - 0.5;
+        let tiles = (0..are_lit.len()).filter(|&tile| are_lit[tile]);
+        let tiles: Vec<_> =
+            tiles.map(|tile| environment.direction(centre(tile % across), centre(tile / across))).collect();
+        // A tile's half, the pixel beside it, and as boxes reach about as far as their texels, two of these.
+        let pixel_rad = (PI / height as f64).hypot(TAU / width as f64);
+        let reach = (0.5 * Self::PIXELS as f64 + 1.0) * pixel_rad + 2.0 * 2.0 / face_size as f64;
+        let is_lit = |cell: usize| {
+            let (face, row, column) = (cell / count / count, cell / count % count, cell % count);
+            let at = |along: f64, down: f64| {
+                let part = |index: usize, offset: f64| (index as f64 + offset) * Self::TEXELS as f64 / face_size as f64;
+                direction_of(face, part(column, along), part(row, down))
+            };
+            let middle = at(0.5, 0.5);
+            let corners = [at(0.0, 0.0), at(0.0, 1.0), at(1.0, 0.0), at(1.0, 1.0)];
+            let radius = corners.map(|corner| corner.angle_between(middle)).into_iter().fold(0.0, f64::max);
+            let least_cos = (radius + reach).min(PI).cos();
+            tiles.iter().any(|tile| tile.dot(middle) >= least_cos)
+        };
+        Self { count, are_lit: Some((0..6 * count * count).into_par_iter().map(is_lit).collect()) }
+    }
+
+    /// Whether light reaches this texel.
+    fn reach(&self, face: usize, row: usize, column: usize) -> bool {
+        let cell = |are_lit: &Vec<bool>| {
+            are_lit[(face * self.count + row / Self::TEXELS) * self.count + column / Self::TEXELS]
+        };
+        self.are_lit.as_ref().is_none_or(cell)
+    }
 }
 
 /// The extent in theta and phi of the box that has the second moments of the texel around the point `at` on the plane of
@@ -235,8 +292,8 @@ fn box_around(at: DVec3, sides: [DVec3; 2]) -> (f64, f64) {
     // Derivatives of theta = atan2(rho, y) and phi = atan2(x, -z) along the sides.
     let along_theta = |side: DVec3| (at.y * (at.x * side.x + at.z * side.z) / rho - rho * side.y) / at.length_squared();
     let along_phi = |side: DVec3| (at.x * side.z - at.z * side.x) / rho_squared;
-    let both = |along: &dyn Fn(DVec3) -> f64| along(sides[0]).hypot(along(sides[1]));
-    (both(&along_theta), both(&along_phi).min(TAU))
+    let both = |[a, b]: [f64; 2]| (a * a + b * b).sqrt();
+    (both(sides.map(along_theta)), both(sides.map(along_phi)).min(TAU))
 }
 
 /// The level of faces of `size` from the `finer` one of twice the size: means of four, weighed by solid angle.
@@ -348,6 +405,24 @@ mod tests {
             let pyramid = Pyramid::box_filtered(&map);
             let error = mean(&pyramid, 0).x / map.mean_radiance().x - 1.0;
             assert!(error.abs() < 3e-3, "pixel ({column}, {row}): {error:e}");
+        }
+    }
+
+    #[test]
+    fn lamps_alone_are_what_they_add_to_other_light() {
+        for (width, height) in [(256, 128), (100, 33), (16, 8)] {
+            let spots = [(width / 4, height / 3), (width - 1, 0), (0, height - 1), (width / 2, height / 2)];
+            let filtered = |background: f32| {
+                let lit = |x, y| [background + if spots.contains(&(x, y)) { 100.0 } else { 0.0 }; 3];
+                Pyramid::box_filtered(&environment(width, height, lit))
+            };
+            let [alone, beside] = [0.0, 1.0].map(filtered);
+            for (alone, beside) in alone.levels.iter().flatten().zip(beside.levels.iter().flatten()) {
+                assert!(
+                    (alone[0] + 1.0 - beside[0]).abs() < 1e-6 * beside[0],
+                    "{width}x{height}: {alone:?} {beside:?}"
+                );
+            }
         }
     }
 

@@ -100,7 +100,7 @@ impl VmfPyramid {
         let mut maps: Vec<Vec<[f32; 3]>> = Vec::new();
         let steps = Self::steps(source.face_size);
         let blurs = || steps.iter().filter(|step| step.kernel == BlurKernel::Vmf);
-        let rows = Rows { done: AtomicUsize::new(0), total: blurs().map(|step| 6 * step.size).sum(), observer };
+        let rows = Rows { done: AtomicUsize::new(0), total: blurs().map(|step| step.size).sum(), observer };
         for step in &steps {
             let from = step.from.map_or(&source.levels[0], |from| &maps[from]);
             maps.push(match step.kernel {
@@ -156,7 +156,7 @@ fn means_of_four(source: &[[f32; 3]], size: usize) -> Vec<[f32; 3]> {
     (0..6 * size * size).into_par_iter().map(mean).collect()
 }
 
-/// How many rows of how many have been made, and who hears of it.
+/// How many rows of how many have been made, each on all six faces, and who hears of it.
 struct Rows<'a> {
     done: AtomicUsize,
     total: usize,
@@ -174,24 +174,102 @@ struct Block {
     radiance: [[f32; LANES]; 3],
 }
 
-/// The blocks of a map: face by face, row by row.
-fn blocks(source: &[[f32; 3]], size: usize) -> Vec<Block> {
-    let a_row = size.div_ceil(LANES);
-    let block = |index: usize| {
-        let (row, first) = (index / a_row, index % a_row * LANES);
-        let mut block = Block::default();
-        for lane in 0..LANES.min(size - first) {
-            let direction = texel_direction(size, row * size + first + lane);
-            block.solid_angle[lane] = texel_solid_angle(size, direction) as f32;
-            let radiance = source[row * size + first + lane];
-            for axis in 0..3 {
-                block.direction[axis][lane] = direction[axis] as f32;
-                block.radiance[axis][lane] = radiance[axis];
+/// A map in blocks: face by face, row by row.
+struct Blocks {
+    size: usize,
+    /// In a row.
+    a_row: usize,
+    all: Vec<Block>,
+    /// How many of the blocks before each, and before the end, have light.
+    lit_before: Vec<u32>,
+}
+
+impl Blocks {
+    fn new(source: &[[f32; 3]], size: usize) -> Self {
+        let a_row = size.div_ceil(LANES);
+        let block = |index: usize| {
+            let (row, first) = (index / a_row, index % a_row * LANES);
+            let mut block = Block::default();
+            for lane in 0..LANES.min(size - first) {
+                let direction = texel_direction(size, row * size + first + lane);
+                block.solid_angle[lane] = texel_solid_angle(size, direction) as f32;
+                let radiance = source[row * size + first + lane];
+                for axis in 0..3 {
+                    block.direction[axis][lane] = direction[axis] as f32;
+                    block.radiance[axis][lane] = radiance[axis];
+                }
             }
-        }
-        block
-    };
-    (0..6 * size * a_row).into_par_iter().map(block).collect()
+            block
+        };
+        let all: Vec<_> = (0..6 * size * a_row).into_par_iter().map(block).collect();
+        let mut lit_before = vec![0];
+        lit_before.extend(all.iter().scan(0, |lit, block| {
+            *lit += u32::from(block.radiance.as_flattened().iter().any(|&radiance| radiance != 0.0));
+            Some(*lit)
+        }));
+        Self { size, a_row, all, lit_before }
+    }
+
+    /// Where in [`Self::all`] a row of a window on `face` is.
+    #[inline(always)]
+    fn place(&self, face: usize, row: usize, window: &Window) -> Range<usize> {
+        let first = (face * self.size + row) * self.a_row;
+        first + window.columns.start / LANES..first + window.columns.end.div_ceil(LANES)
+    }
+
+    #[inline(always)]
+    fn of_row(&self, face: usize, row: usize, window: &Window) -> &[Block] {
+        &self.all[self.place(face, row, window)]
+    }
+
+    fn is_dark(&self, face: usize, window: &Window) -> bool {
+        let of_row = |row| self.place(face, row, window);
+        window.rows.clone().map(of_row).all(|blocks| self.lit_before[blocks.start] == self.lit_before[blocks.end])
+    }
+}
+
+/// A rectangle of texels on a face.
+struct Window {
+    rows: Range<usize>,
+    columns: Range<usize>,
+}
+
+impl Window {
+    /// Of those that `cone` reaches on `face`.
+    fn of(cone: &Cone, face: usize, size: usize) -> Self {
+        let axes = coordinates(face, cone.centre);
+        let rows = cone_range(axes.y, axes.z, cone.sin, size);
+        let columns = if rows.is_empty() { 0..0 } else { cone_range(axes.x, axes.z, cone.sin, size) };
+        Self { rows, columns }
+    }
+
+    fn is_empty(&self) -> bool {
+        self.rows.is_empty() || self.columns.is_empty()
+    }
+
+    /// Whether nothing of its cone is on other faces.
+    fn is_inside(&self, size: usize) -> bool {
+        let inside = |range: &Range<usize>| range.start > 0 && range.end < size;
+        !self.is_empty() && inside(&self.rows) && inside(&self.columns)
+    }
+}
+
+/// What a kernel fills.
+struct Cone {
+    centre: DVec3,
+    kappa: f64,
+    /// 1 - cos of its angle.
+    extent: f64,
+    /// Sine of its angle, and 1 beyond a right angle.
+    sin: f64,
+}
+
+impl Cone {
+    fn new(centre: DVec3, kappa: f64) -> Self {
+        let extent = f64::min(KERNEL_EXTENT / kappa, 2.0);
+        let sin = if extent < 1.0 { (extent * (2.0 - extent)).sqrt() } else { 1.0 };
+        Self { centre, kappa, extent, sin }
+    }
 }
 
 /// The direction of the middle of a texel, by its place in a map of faces of `size`.
@@ -202,76 +280,129 @@ fn texel_direction(size: usize, texel: usize) -> DVec3 {
 
 /// A map, convolved from the one that `step` names.
 fn blurred(source: &[[f32; 3]], step: &BlurStep, rows: &Rows) -> Result<Vec<[f32; 3]>> {
-    let blocks = blocks(source, step.from_size);
-    let mut map = vec![[0.0; 3]; 6 * step.size * step.size];
-    map.par_chunks_mut(step.size).enumerate().try_for_each(|(row, texels)| -> Result<()> {
+    let blocks = Blocks::new(source, step.from_size);
+    let of_row = |row: usize| -> Result<_> {
         rows.observer.check()?;
-        pulp::Arch::new().dispatch(BlurRow { blocks: &blocks, step, row, texels });
+        let texels = pulp::Arch::new().dispatch(BlurRow { blocks: &blocks, step, row });
         rows.observer.progress(rows.done.fetch_add(1, Ordering::Relaxed) + 1, rows.total);
-        Ok(())
-    })?;
-    Ok(map)
+        Ok(texels)
+    };
+    let of_rows: Vec<_> = (0..step.size).into_par_iter().map(of_row).collect::<Result<_>>()?;
+    let faces = (0..6).flat_map(|face| of_rows.iter().flatten().map(move |texels: &[[f32; 3]; 6]| texels[face]));
+    Ok(faces.collect())
 }
 
-/// A call of what makes a row of a map, compiled for the vector instructions that are there.
+/// A call of what makes a row of a map on all six faces, compiled for the vector instructions that are there.
 struct BlurRow<'a> {
-    blocks: &'a [Block],
+    blocks: &'a Blocks,
     step: &'a BlurStep,
-    /// Counted from the first of the first face.
     row: usize,
-    texels: &'a mut [[f32; 3]],
 }
 
 impl pulp::NullaryFnOnce for BlurRow<'_> {
-    type Output = ();
+    /// Texel after texel, that of each face.
+    type Output = Vec<[[f32; 3]; 6]>;
 
     #[inline(always)]
-    fn call(self) {
+    fn call(self) -> Self::Output {
         let &BlurStep { from_kernel, from_size, size, kernel, .. } = self.step;
-        for (column, texel) in self.texels.iter_mut().enumerate() {
-            let centre = texel_direction(size, self.row * size + column);
-            let from = texel_deficit(from_kernel, from_size, centre);
-            let kappa = kappa_of_deficit((texel_deficit(kernel, size, centre) - from) / (1.0 - from));
-            *texel = convolved(self.blocks, from_size, centre, kappa);
-        }
-    }
-}
-
-/// The map of these blocks around `centre`, weighed by the kernel of this kappa.
-#[inline(always)]
-fn convolved(blocks: &[Block], size: usize, centre: DVec3, kappa: f64) -> [f32; 3] {
-    // 1 - cos of the cone that the kernel fills.
-    let extent = f64::min(KERNEL_EXTENT / kappa, 2.0);
-    let sin_cone = if extent < 1.0 { (extent * (2.0 - extent)).sqrt() } else { 1.0 };
-    let a_row = size.div_ceil(LANES);
-    let (c, kappa, extent) = (centre.as_vec3(), kappa as f32, extent as f32);
-    let mut sums = [[0.0; LANES]; 4];
-    for face in 0..6 {
-        let axes = coordinates(face, centre);
-        let rows = cone_range(axes.y, axes.z, sin_cone, size);
-        if rows.is_empty() {
-            continue;
-        }
-        let columns = cone_range(axes.x, axes.z, sin_cone, size);
-        for row in rows {
-            let start = (face * size + row) * a_row;
-            // Whole blocks: what they have beyond the range is outside the cone.
-            for block in &blocks[start + columns.start / LANES..start + columns.end.div_ceil(LANES)] {
-                let [xs, ys, zs] = &block.direction;
-                for j in 0..LANES {
-                    let [x, y, z] = [xs[j] - c.x, ys[j] - c.y, zs[j] - c.z];
-                    // 1 - cos as half the squared distance: exact for neighbours too.
-                    let away = 0.5 * (x * x + y * y + z * z);
-                    let within = if away < extent { block.solid_angle[j] } else { 0.0 };
-                    let weight = exp(-kappa * away) * within;
-                    (0..3).for_each(|channel| sums[channel][j] += weight * block.radiance[channel][j]);
-                    sums[3][j] += weight;
+        let mut weights = Vec::new();
+        let mut texels = vec![[[0.0; 3]; 6]; size];
+        // Loops, not closures, which would not be compiled for those instructions.
+        for (column, texels) in texels.iter_mut().enumerate() {
+            let centre: [DVec3; 6] =
+                std::array::from_fn(|face| texel_direction(size, (face * size + self.row) * size + column));
+            // All faces are alike.
+            let from = texel_deficit(from_kernel, from_size, centre[0]);
+            let kappa = kappa_of_deficit((texel_deficit(kernel, size, centre[0]) - from) / (1.0 - from));
+            let cone = Cone::new(centre[0], kappa);
+            let window = Window::of(&cone, 0, from_size);
+            if !window.is_inside(from_size) {
+                for face in 0..6 {
+                    texels[face] = convolved(self.blocks, &Cone { centre: centre[face], ..cone }, &mut weights);
+                }
+            } else if (0..6).any(|face| !self.blocks.is_dark(face, &window)) {
+                let sum = weigh(self.blocks, 0, &window, &cone, &mut weights);
+                for (face, texel) in texels.iter_mut().enumerate() {
+                    let [red, green, blue] = weighted_sum(self.blocks, face, &window, &weights);
+                    *texel = [red / sum, green / sum, blue / sum];
                 }
             }
         }
+        texels
     }
-    let [red, green, blue, weight] = sums.map(|lanes| lanes.iter().sum::<f32>());
-    [red, green, blue].map(|sum| sum / weight)
+}
+
+/// The map of these blocks, weighed by the kernel of this cone, wherever that is. `weights` is room to work in.
+#[inline(always)]
+fn convolved(blocks: &Blocks, cone: &Cone, weights: &mut Vec<[f32; LANES]>) -> [f32; 3] {
+    let windows: [Window; 6] = std::array::from_fn(|face| Window::of(cone, face, blocks.size));
+    let mut sum = 0.0;
+    let mut radiance = [0.0; 3];
+    if (0..6).all(|face| blocks.is_dark(face, &windows[face])) {
+        return radiance;
+    }
+    for (face, window) in windows.iter().enumerate() {
+        if window.is_empty() {
+            continue;
+        }
+        sum += weigh(blocks, face, window, cone, weights);
+        let of_face = weighted_sum(blocks, face, window, weights);
+        (0..3).for_each(|channel| radiance[channel] += of_face[channel]);
+    }
+    radiance.map(|sum_of_radiance| sum_of_radiance / sum)
+}
+
+/// The weights that the kernel of `cone` gives the texels of a window, row by row in whole blocks: what these have beyond the window is
+/// outside the cone. Returns their sum.
+#[inline(always)]
+fn weigh(blocks: &Blocks, face: usize, window: &Window, cone: &Cone, weights: &mut Vec<[f32; LANES]>) -> f32 {
+    let (c, kappa, extent) = (cone.centre.as_vec3(), cone.kappa as f32, cone.extent as f32);
+    weights.resize(window.rows.len() * blocks.place(face, 0, window).len(), [0.0; LANES]);
+    let mut rest = &mut weights[..];
+    let mut sums = [0.0; LANES];
+    for row in window.rows.clone() {
+        let blocks = blocks.of_row(face, row, window);
+        let (weights, after) = rest.split_at_mut(blocks.len());
+        rest = after;
+        for (block, weights) in blocks.iter().zip(weights) {
+            let [xs, ys, zs] = &block.direction;
+            let mut of_block = [0.0; LANES];
+            for j in 0..LANES {
+                let [x, y, z] = [xs[j] - c.x, ys[j] - c.y, zs[j] - c.z];
+                // 1 - cos as half the squared distance: exact for neighbours too.
+                let away = 0.5 * (x * x + y * y + z * z);
+                let within = if away < extent { block.solid_angle[j] } else { 0.0 };
+                of_block[j] = exp(-kappa * away) * within;
+            }
+            for j in 0..LANES {
+                sums[j] += of_block[j];
+            }
+            *weights = of_block;
+        }
+    }
+    sums.iter().sum()
+}
+
+/// The sum over a window of radiance times weights, as [`weigh`] has them.
+#[inline(always)]
+fn weighted_sum(blocks: &Blocks, face: usize, window: &Window, weights: &[[f32; LANES]]) -> [f32; 3] {
+    let mut rest = weights;
+    let [mut red, mut green, mut blue] = [[0.0; LANES]; 3];
+    for row in window.rows.clone() {
+        let blocks = blocks.of_row(face, row, window);
+        let (weights, after) = rest.split_at(blocks.len());
+        rest = after;
+        for (block, weights) in blocks.iter().zip(weights) {
+            let [reds, greens, blues] = &block.radiance;
+            for j in 0..LANES {
+                red[j] += weights[j] * reds[j];
+                green[j] += weights[j] * greens[j];
+                blue[j] += weights[j] * blues[j];
+            }
+        }
+    }
+    [red, green, blue].map(|lanes| lanes.iter().sum())
 }
 
 /// The texels along one axis of a face that a cone reaches: of directions whose shadow in the plane of that axis and the face's own
@@ -302,6 +433,23 @@ fn cone_range(x: f64, z: f64, sin_cone: f64, size: usize) -> Range<usize> {
 mod tests {
     use super::super::tests::environment;
     use super::*;
+
+    /// Beside other light, where all texels are summed over, and alone, where most are dark and are not.
+    #[test]
+    fn lamps_alone_are_what_they_add_to_other_light() {
+        let spots = [(70, 40), (71, 40), (200, 1), (5, 127), (255, 64), (128, 20)];
+        let blurred = |background: f32| {
+            let lit = |x, y| [background + if spots.contains(&(x, y)) { 100.0 } else { 0.0 }; 3];
+            VmfPyramid::new(&Pyramid::box_filtered(&environment(256, 128, lit)), &()).unwrap().levels
+        };
+        let [alone, beside] = [0.0, 1.0].map(blurred);
+        let mut dark = 0;
+        for (alone, beside) in alone.levels.iter().flatten().zip(beside.levels.iter().flatten()) {
+            assert!((alone[0] + 1.0 - beside[0]).abs() < 1e-5 * beside[0], "{alone:?} {beside:?}");
+            dark += usize::from(*alone == [0.0; 3]);
+        }
+        assert!(dark > alone.levels[0].len() / 2, "{dark}");
+    }
 
     /// Against a sum over the pixels of the environment itself.
     #[test]
