@@ -211,14 +211,12 @@ AtSources at_sources(Surface surface, Material material, Lobe lobe) {
     return sum;
 }
 
-// Between which rows a view is: where these start, and how far it is from the first to the second.
+// Between which rows a view is, of the table's words where these start: two of an isotropic BRDF, three of an anisotropic one, which are
+// the corners of a triangle of view angles and azimuths. Blends are the first, and these parts of the ways from it to the others.
 struct Rows {
-    uint below;
-    uint above;
-    float t;
-    // Of an anisotropic BRDF, how far it is from those rows to the ones of the next azimuth, this many words on; 0 of an isotropic one.
-    uint next_azimuth;
-    float towards_next;
+    uvec3 start;
+    float to_second;
+    float to_third;   // 0 of an isotropic BRDF
     float side; // 1, or -1 where the view is the mirror image of one that there are rows for
     float added_variance; // of the kernels, by the pixel's normals
 };
@@ -228,30 +226,38 @@ Rows rows_at(Surface surface, ThreadTable table) {
     float row = min(surface.theta_o * (float(table.row_count) / radians(90.0)), float(table.row_count - 1));
     uint below = table.first + uint(row) * words_a_row(table);
     uint above = below + (uint(row) + 1 < table.row_count ? words_a_row(table) : 0);
-    Rows rows = Rows(below, above, fract(row), 0, 0.0, 1.0, variance_of_pixel(surface.normal_variance));
+    Rows rows = Rows(uvec3(below, above, below), fract(row), 0.0, 1.0, variance_of_pixel(surface.normal_variance));
     if (HAS_TANGENTS != 0 && table.azimuth_count > 1) {
         vec2 folded = fold_azimuth(surface.phi_o, table.azimuth_count);
         uint before = min(uint(folded.x), table.azimuth_count - 2);
-        rows.next_azimuth = table.row_count * words_a_row(table);
-        rows.below += before * rows.next_azimuth;
-        rows.above += before * rows.next_azimuth;
-        rows.towards_next = folded.x - float(before);
+        uint an_azimuth = table.row_count * words_a_row(table);
+        rows.start += before * an_azimuth;
+        rows.start.z = rows.start.y + an_azimuth;
+        float t = rows.to_second;
+        float towards_next = folded.x - float(before);
+        if (towards_next > t) {
+            rows.start.y = rows.start.x + an_azimuth;
+        }
+        rows.to_second = abs(t - towards_next);
+        rows.to_third = min(t, towards_next);
         rows.side = folded.y;
     }
     return rows;
 }
 
-Kernel between(Kernel a, Kernel b, float t) {
-    return Kernel(mix(a.place, b.place, t), mix(a.level, b.level, t), mix(a.weight, b.weight, t));
-}
-
 // Thread k, in the shading frame, blurred by the normals of the pixel.
 Kernel kernel_at(Rows rows, uint k) {
-    Kernel kernel = between(unpack_kernel(rows.below, k), unpack_kernel(rows.above, k), rows.t);
-    if (HAS_TANGENTS != 0 && rows.next_azimuth != 0) {
-        uint next = rows.next_azimuth;
-        Kernel of_next = between(unpack_kernel(rows.below + next, k), unpack_kernel(rows.above + next, k), rows.t);
-        kernel = between(kernel, of_next, rows.towards_next);
+    Kernel a = unpack_kernel(rows.start.x, k);
+    Kernel b = unpack_kernel(rows.start.y, k);
+    float t = rows.to_second;
+    Kernel kernel = Kernel(mix(a.place, b.place, t), mix(a.level, b.level, t), mix(a.weight, b.weight, t));
+    if (HAS_TANGENTS != 0 && rows.to_third > 0.0) {
+        Kernel c = unpack_kernel(rows.start.z, k);
+        kernel.place += rows.to_third * (c.place - a.place);
+        kernel.level += rows.to_third * (c.level - a.level);
+        kernel.weight += rows.to_third * (c.weight - a.weight);
+    }
+    if (HAS_TANGENTS != 0) {
         kernel.place.y *= rows.side;
     }
     kernel.level = level_within_pixel(kernel.level, rows.added_variance);
@@ -264,11 +270,10 @@ vec3 looks_towards(Kernel kernel, Surface surface) {
 }
 
 vec3 albedo_at(Rows rows) {
-    vec3 albedo = mix(unpack_albedo(rows.below), unpack_albedo(rows.above), rows.t);
-    if (HAS_TANGENTS != 0 && rows.next_azimuth != 0) {
-        uint next = rows.next_azimuth;
-        vec3 of_next = mix(unpack_albedo(rows.below + next), unpack_albedo(rows.above + next), rows.t);
-        albedo = mix(albedo, of_next, rows.towards_next);
+    vec3 first = unpack_albedo(rows.start.x);
+    vec3 albedo = mix(first, unpack_albedo(rows.start.y), rows.to_second);
+    if (HAS_TANGENTS != 0) {
+        albedo += rows.to_third * (unpack_albedo(rows.start.z) - first);
     }
     return albedo;
 }

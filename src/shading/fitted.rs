@@ -241,12 +241,9 @@ fn at_sources(lobe: &Lobe, sources: &[SourceRecord]) -> AtSources {
 
 /// Between which rows a view is. Twin of `Rows`.
 struct Rows {
-    below: usize,
-    above: usize,
-    t: f32,
-    /// Rows from one azimuth to the next; 0 of an isotropic BRDF.
-    next_azimuth: usize,
-    towards_next: f32,
+    index: [usize; 3],
+    to_second: f32,
+    to_third: f32,
     side: f32,
 }
 
@@ -257,41 +254,28 @@ impl Rows {
         let (below, t) = (row as usize, row.fract());
         let above = (below + 1).min(threads.rows - 1);
         if threads.azimuths == 1 {
-            return Self { below, above, t, next_azimuth: 0, towards_next: 0.0, side: 1.0 };
+            return Self { index: [below, above, below], to_second: t, to_third: 0.0, side: 1.0 };
         }
         let azimuths = Azimuths::around(surface.phi_o.to_angle().into(), threads.azimuths);
-        let first = azimuths.before * threads.rows;
-        let (towards_next, side) = (azimuths.towards_next as f32, azimuths.side() as f32);
-        Self { below: first + below, above: first + above, t, next_azimuth: threads.rows, towards_next, side }
+        let (index, [to_second, to_third]) = azimuths.triangle([below, above], t.into(), threads.rows);
+        Self { index, to_second: to_second as f32, to_third: to_third as f32, side: azimuths.side() as f32 }
     }
 
     /// Twin of `kernel_at`, in the shading frame.
     fn kernel(&self, threads: &FittedTable, k: usize) -> UnpackedKernel {
-        let at = |row: usize| threads.row(row)[k].unpack();
-        let kernel = between(at(self.below), at(self.above), self.t);
-        if self.next_azimuth == 0 {
-            return kernel;
+        let [a, b, c] = self.index.map(|row| threads.row(row)[k].unpack());
+        let (t, u) = (self.to_second, self.to_third);
+        UnpackedKernel {
+            place: Vec2::new(1.0, self.side) * (a.place.lerp(b.place, t) + u * (c.place - a.place)),
+            level: a.level + t * (b.level - a.level) + u * (c.level - a.level),
+            weight: a.weight.lerp(b.weight, t) + u * (c.weight - a.weight),
         }
-        let [below, above] = [self.below, self.above].map(|row| at(row + self.next_azimuth));
-        let kernel = between(kernel, between(below, above, self.t), self.towards_next);
-        UnpackedKernel { place: Vec2::new(1.0, self.side) * kernel.place, ..kernel }
     }
 
     /// Twin of `albedo_at`.
     fn albedo(&self, threads: &FittedTable) -> Vec3 {
-        let at = |row: usize| Vec3::from(threads.albedo[row]);
-        let here = at(self.below).lerp(at(self.above), self.t);
-        let [below, above] = [self.below, self.above].map(|row| at(row + self.next_azimuth));
-        here.lerp(below.lerp(above, self.t), self.towards_next)
-    }
-}
-
-/// Twin of `between`.
-fn between(a: UnpackedKernel, b: UnpackedKernel, t: f32) -> UnpackedKernel {
-    UnpackedKernel {
-        place: a.place.lerp(b.place, t),
-        level: a.level + t * (b.level - a.level),
-        weight: a.weight.lerp(b.weight, t),
+        let [a, b, c] = self.index.map(|row| Vec3::from(threads.albedo[row]));
+        a.lerp(b, self.to_second) + self.to_third * (c - a)
     }
 }
 

@@ -67,6 +67,16 @@ impl Azimuths {
         Self { before, towards_next: at - before as f64, is_mirrored }
     }
 
+    /// The three of the table's rows that a view is between, the part `t` of the way from row `below` to row `above` of an azimuth that has
+    /// `rows`: the corners of a triangle of view angles and azimuths. What is linear between them is that of the first, and these parts of
+    /// the ways from it to the second and to the third. Twin: `rows_at` in glsl/methods/fitted.glsl.
+    pub fn triangle(&self, [below, above]: [usize; 2], t: f64, rows: usize) -> ([usize; 3], [f64; 2]) {
+        let first = self.before * rows + below;
+        let opposite = (self.before + 1) * rows + above;
+        let second = if self.towards_next > t { first + rows } else { self.before * rows + above };
+        ([first, second, opposite], [(t - self.towards_next).abs(), t.min(self.towards_next)])
+    }
+
     /// The azimuth, in radians, of the view or of its mirror image.
     pub fn folded_rad(&self) -> f64 {
         (self.before as f64 + self.towards_next) * STEP_RAD
@@ -101,5 +111,24 @@ mod tests {
         near(degrees(110.0, 19), 11.0, false);
         near(degrees(-15.0, 19), 16.5, false);
         near(degrees(-15.0, 37), 34.5, false);
+    }
+
+    /// So rows next to each other are blended without a step, and what is linear in both angles is what it is.
+    #[test]
+    fn what_is_linear_over_rows_and_azimuths_is_so_between_the_corners_of_triangles() {
+        let rows = 90;
+        let linear = |row: f64, azimuth: f64| 3.0 + 0.7 * row - 2.1 * azimuth;
+        for row in [0.0_f64, 0.25, 17.0, 17.5, 60.999, 88.3] {
+            for azimuth in [0.0, 0.2, 0.5, 3.0, 7.25, 7.75, 9.0] {
+                let azimuths = Azimuths::around(azimuth * STEP_RAD, 10);
+                let (index, [to_second, to_third]) =
+                    azimuths.triangle([row as usize, row as usize + 1], row.fract(), rows);
+                let [a, b, c] = index.map(|index| linear((index % rows) as f64, (index / rows) as f64));
+                let between = a + to_second * (b - a) + to_third * (c - a);
+                assert!((between - linear(row, azimuth)).abs() < 1e-12, "{row} {azimuth}");
+                let shares = [1.0 - to_second - to_third, to_second, to_third];
+                assert!(shares.iter().all(|share| (-1e-12..=1.0 + 1e-12).contains(share)), "{shares:?}");
+            }
+        }
     }
 }

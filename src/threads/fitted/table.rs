@@ -126,16 +126,15 @@ impl FittedTable {
         let position = (theta_o / FRAC_PI_2 * self.rows as f64).clamp(0.0, (self.rows - 1) as f64);
         let (low, t) = (position as usize, position.fract());
         let high = (low + 1).min(self.rows - 1);
-        let at_azimuth = |azimuth: usize| -> Vec<Kernel> {
-            let [low, high] = [low, high].map(|row| self.unpacked_row(azimuth * self.rows + row));
-            all_between(&low, &high, t)
-        };
         if self.azimuths == 1 {
-            return at_azimuth(0);
+            return all_between(&self.unpacked_row(low), &self.unpacked_row(high), t);
         }
         let azimuths = Azimuths::around(phi_o, self.azimuths);
-        let [before, next] = [azimuths.before, azimuths.before + 1].map(at_azimuth);
-        let mut kernels = all_between(&before, &next, azimuths.towards_next);
+        let (rows, [to_second, to_third]) = azimuths.triangle([low, high], t, self.rows);
+        let [first, second, third] = rows.map(|row| self.unpacked_row(row));
+        // On the way from the first to the second, and from there to the third.
+        let kernels = all_between(&first, &second, to_second / (1.0 - to_third).max(f64::MIN_POSITIVE));
+        let mut kernels = all_between(&kernels, &third, to_third);
         kernels.iter_mut().for_each(|kernel| kernel.direction.y *= azimuths.side());
         kernels
     }
