@@ -202,6 +202,35 @@ fn the_parts_of_a_sweep_together_are_the_whole() {
 }
 
 #[test]
+fn together_compares_a_picture_of_all_materials_with_each_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let arguments =
+        "together --materials clay,gold,red-plastic --environments white,sky --threads 4 --size 48x36 --repeat 2";
+    let said = bench(&folder, &format!("{arguments} --json together.json"));
+    for text in
+        ["3 materials, white, 48 x 36 pixels, 4 threads", "3 materials, sky", "mean of each alone", "red-plastic"]
+    {
+        assert!(said.contains(text), "{said}");
+    }
+    let rows = json(&folder, "together.json");
+    let rows = rows.as_array().unwrap();
+    assert_eq!(rows.len(), 2);
+    for row in rows {
+        let number = |of: &Value, key: &str| of[key].as_f64().unwrap();
+        let alone = row["alone"].as_array().unwrap();
+        let names: Vec<_> = alone.iter().map(|alone| alone["material"].as_str().unwrap()).collect();
+        assert_eq!(names, ["clay", "gold", "red-plastic"]);
+        let mean = alone.iter().map(|alone| number(alone, "shade_ms")).sum::<f64>() / 3.0;
+        assert!((number(row, "ratio") * mean / number(row, "shade_ms") - 1.0).abs() < 1e-9, "{row}");
+        assert!(number(row, "device_memory_bytes") > 0.0 && number(row, "classify_ms") > 0.0);
+        // Clay is one lookup, and the others are more: a third of the spheres is of each.
+        let lookups = |of: &Value| number(of, "lookups");
+        assert!(lookups(&alone[0]) < lookups(row) && lookups(row) < lookups(&alone[1]), "{row}");
+        assert!(number(row, "covered_pixels") > 300.0, "{row}");
+    }
+}
+
+#[test]
 fn fit_prints_time_beside_error_and_writes_json() {
     let folder = tempfile::tempdir().unwrap();
     let mut command = Command::new(env!("CARGO_BIN_EXE_threadlight"));

@@ -9,6 +9,7 @@
 //! | what is measured: materials, environments, scenes, methods, counts | [`cases`] |
 //! | error and time of all of these: tables 2 to 4, figures 10 to 12 | [`sweep`] |
 //! | time of a frame beside its floor, and as things double: table 1 | [`speed`] |
+//! | what many materials in one picture cost, beside each alone | [`together`] |
 //! | what threads cost to make, beside what they are worth | [`fit`] |
 //! | what a driver's compiler makes of the shaders | [`shaders`] |
 //! | what drafts of threads are worth while a parameter is dragged | [`live`] |
@@ -43,6 +44,7 @@ pub mod ssim;
 pub mod stress;
 pub mod sweep;
 pub mod tables;
+pub mod together;
 
 pub use cases::{Cases, Estimator, Place, Shard};
 pub use difference::difference_picture;

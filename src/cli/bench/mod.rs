@@ -9,6 +9,7 @@ mod rounding;
 mod shaders;
 mod speed;
 mod stress;
+mod together;
 
 use clap::Subcommand;
 
@@ -23,6 +24,7 @@ pub struct Bench {
 enum What {
     Error(Box<error::BenchError>),
     Speed(Box<speed::BenchSpeed>),
+    Together(together::BenchTogether),
     Fit(fit::BenchFit),
     Shaders(Box<shaders::BenchShaders>),
     Rounding(rounding::BenchRounding),
@@ -37,6 +39,7 @@ impl Bench {
         match self.what {
             What::Error(bench) => bench.run(),
             What::Speed(bench) => bench.run(),
+            What::Together(bench) => bench.run(),
             What::Fit(bench) => bench.run(),
             What::Shaders(bench) => bench.run(),
             What::Rounding(bench) => bench.run(),

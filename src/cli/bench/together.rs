@@ -1,0 +1,98 @@
+//! `threadlight bench together`: what many materials in one picture cost, beside each alone.
+use super::arguments::{named, write_json};
+use crate::cli::progress::TerminalProgress;
+use crate::cli::scene_flags::parse_size;
+use crate::cli::{cache_folder, nameable};
+use clap::value_parser;
+use std::io::Write;
+use std::path::PathBuf;
+use threadlight::Error;
+use threadlight::low_level::brdf::Brdf;
+use threadlight::low_level::environment;
+use threadlight::low_level::evaluate::tables;
+use threadlight::low_level::evaluate::together::{self, Together};
+use threadlight::low_level::memo::Memo;
+use threadlight::low_level::output;
+use threadlight::low_level::scene::{MaterialSource, Source};
+use threadlight::low_level::threads::fitted::MAX_COUNT;
+use threadlight::low_level::vulkan::{Device, Instance};
+
+const EXAMPLES: &str = "\
+Without --materials, all that are built in are measured.
+
+Examples:
+  threadlight bench together
+  threadlight bench together --materials alumina-oxide.binary,nickel.binary,gold --environments lebombo.hdr --json together.json
+
+The picture has a sphere of each material. It is compared with the same picture of each material alone, all spheres of that: with the
+mean of these. All pictures take turns; times are medians.
+
+The JSON is a list of rows with these fields, in this order:
+  environment, threads, width, height   what was measured
+  covered_pixels, lookups               pixels that see a surface, and lookups that shading made
+  device_memory_bytes                   all that is on the device while the picture with all materials is rendered
+  classify_ms, shade_ms                 time on the GPU of these passes
+  ratio                                 shade_ms over the mean of those of `alone`
+  alone                                 a list of material, lookups, classify_ms and shade_ms of each alone";
+
+/// Measures what a picture of many materials costs, beside that of each alone. Lists are separated by commas.
+#[derive(clap::Args)]
+#[command(after_help = EXAMPLES, allow_negative_numbers = true)]
+pub struct BenchTogether {
+    #[arg(long, help = nameable::material("Materials, each"), value_name = "LIST", value_delimiter = ',')]
+    materials: Vec<String>,
+    #[arg(long, help = nameable::environment("Environments, each"), value_name = "LIST", value_delimiter = ',', default_value = "studio")]
+    environments: Vec<String>,
+    /// Fitted threads of each material, 1 to 128.
+    #[arg(long, value_name = "N", default_value_t = 16, value_parser = value_parser!(u32).range(1..=MAX_COUNT as i64))]
+    threads: u32,
+    /// Size of the picture in pixels, each side 1 to 16384.
+    #[arg(long, value_name = "WxH", value_parser = parse_size, default_value = "640x480")]
+    size: (u32, u32),
+    /// Render each picture this often; times are medians.
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = value_parser!(u32).range(1..))]
+    repeat: u32,
+    /// Vulkan device: its index or part of its name, as `threadlight devices` lists them.
+    #[arg(long, value_name = "NAME|INDEX")]
+    device: Option<String>,
+    /// Neither read nor write cached threads, blurred environments and pipelines.
+    #[arg(long)]
+    no_cache: bool,
+    /// Write all measurements as JSON.
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
+
+impl BenchTogether {
+    pub fn run(self) -> anyhow::Result<()> {
+        self.json.as_deref().map_or(Ok(()), output::check_writable)?;
+        let materials = match self.materials.as_slice() {
+            [] => Brdf::builtin_names().map(str::to_owned).collect(),
+            named => named.to_vec(),
+        };
+        let materials = named("--materials", &materials)?;
+        let environments = named("--environments", &self.environments)?;
+        let together = Together {
+            materials: materials.into_iter().map(|(name, text)| (name, MaterialSource::named(text))).collect(),
+            environments: environments
+                .into_iter()
+                .map(|(name, text)| (name, Source::named(text, environment::builtin_names())))
+                .collect(),
+            threads: self.threads,
+            size: self.size,
+            repeat: self.repeat,
+        };
+        let instance = Instance::new(false).map_err(Error::from)?;
+        let device = Device::new(&instance, self.device.as_deref()).map_err(Error::from)?;
+        let progress = TerminalProgress::of("bench together", "pictures")?;
+        let memo = Memo::new(cache_folder(self.no_cache).as_deref());
+        let mut found = Vec::new();
+        let result = together::run(&together, &device, &memo, &progress, &mut found);
+        progress.finish();
+        if !found.is_empty() {
+            write!(std::io::stdout().lock(), "{}", tables::text(&together::tables(&found)))?;
+            write_json(self.json.as_deref(), &found)?;
+        }
+        Ok(result?)
+    }
+}
