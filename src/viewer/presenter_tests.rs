@@ -92,6 +92,20 @@ fn another_exposure_runs_neither_geometry_nor_shading() {
 }
 
 #[test]
+fn light_that_is_turned_or_dimmed_keeps_the_geometry() {
+    let stage = Stage::new();
+    let view = &stage.renderer.view;
+    let first = stage.plan(&stage.renderer, view, Some(&Kept::default()));
+    for changed in [View { rotation_deg: 10.0, ..view.clone() }, View { intensity: 2.0, ..view.clone() }] {
+        let plan = stage.plan(&stage.renderer, &changed, Some(&first.kept));
+        let of_light = ["clear_radiance", "clear_lookups", "shade", "background", "tone_map"];
+        let names = names(&plan);
+        assert!(names.contains(&"shade") && names.contains(&"background"), "{plan}");
+        assert!(names.iter().all(|name| of_light.contains(name) || WINDOW.contains(name)), "{plan}");
+    }
+}
+
+#[test]
 fn other_random_numbers_keep_the_geometry_and_another_camera_size_or_scene_keeps_nothing() {
     let stage = Stage::new();
     let view = &stage.renderer.view;
