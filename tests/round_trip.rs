@@ -14,6 +14,7 @@ fn a_model_that_is_exported_and_rendered_looks_as_before() {
     let exported = folder.path().join("exported.binary");
     for text in [
         "model = 'conductor'\ndistribution = 'ggx'\nalpha = 0.1\nmetal = 'Au'",
+        "model = 'conductor'\ndistribution = 'ggx'\nalpha = 0.005\nmetal = 'Au'",
         "model = 'plastic'\ndistribution = 'beckmann'\nalpha = 0.15\nior = 1.5\ndiffuse = [0.4, 0.2, 0.1]",
         "model = 'oren_nayar'\nreflectance = 0.7\nsigma_deg = 25",
         "model = 'layered'\nbase = 'linen'\ncoat = { alpha = 0.15, ior = 1.5 }",
