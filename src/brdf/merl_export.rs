@@ -87,7 +87,8 @@ fn values_along_theta_h(brdf: &Brdf, theta_d: usize, phi_d: usize) -> [Option<DV
         if squares[i - 1] > 0.0 {
             let factor = with_next[i - 1] / squares[i - 1];
             squares[i] -= factor * with_next[i - 1];
-            sums[i] = sums[i] - factor * sums[i - 1];
+            let before = sums[i - 1];
+            sums[i] -= factor * before;
         }
     }
     let mut values = [None; THETA_H_BINS];
