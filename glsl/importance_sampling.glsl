@@ -2,6 +2,7 @@
 // Measurement, for tables; here for every BRDF): for each view angle of a row a CDF over rings of the half vector, and within
 // each ring one over azimuths. Of an anisotropic BRDF there are such rows for several azimuths of the view.
 // Twin: src/shading/importance_sampling.rs; the table: src/threads/slice_table.rs.
+#include "arc_tangent.glsl"
 #include "azimuths.glsl"
 
 const uint SLICE_ROWS = 90;     // theta_o = row 90 deg / SLICE_ROWS
@@ -37,7 +38,7 @@ SliceRows slice_rows(Surface surface, Material material, vec3 w_o) {
     uint azimuths = material.threads.azimuth_count;
     bool is_anisotropic = HAS_TANGENTS != 0 && azimuths > 1;
     uint row_count = is_anisotropic ? AZIMUTH_ROWS : SLICE_ROWS;
-    float row = min(atan(w_o.x, w_o.z) * (float(row_count) / radians(90.0)), float(row_count - 1));
+    float row = min(acute_angle(w_o.x, w_o.z, 1.0) * (float(row_count) / radians(90.0)), float(row_count - 1));
     uint below = uint(row);
     uint above = min(below + 1, row_count - 1);
     SliceRows rows = SliceRows(material.first_slice + below * SLICE_SIZE, material.first_slice + above * SLICE_SIZE,
@@ -115,7 +116,7 @@ SliceCell slice_cell(vec3 h) {
     float sin_theta_h = length(h.xy);
     // atan(0, 0) is undefined; at the pole all azimuths meet.
     float phi = sin_theta_h > 0.0 ? atan(h.y, h.x) : 0.0;
-    float x = sqrt(atan(sin_theta_h, h.z) / radians(90.0));
+    float x = sqrt(acute_angle(sin_theta_h, h.z, 1.0) / radians(90.0));
     uint ring = min(uint(x * float(SLICE_RINGS)), SLICE_RINGS - 1);
     uint azimuth = min(uint(max(phi / radians(360.0) + 0.5, 0.0) * float(SLICE_AZIMUTHS)), SLICE_AZIMUTHS - 1);
     float solid_angle_sr = 12.5663706 * (ring_edge(ring + 1) - ring_edge(ring)) / float(SLICE_AZIMUTHS);

@@ -1,0 +1,30 @@
+// Angles in triangles. GLSL's arc tangent may err by 4096 units in the last place (Vulkan 1.3, "Precision and Operation of SPIR-V
+// Instructions"), and handles cases that do not occur.
+#ifndef ARC_TANGENT_GLSL
+#define ARC_TANGENT_GLSL
+
+const float HALF_PI = 1.57079633;
+
+// The angle in [0, 90 degrees] of tangent y / x, neither negative, in a triangle of this hypotenuse; 0 if all are 0. Twin of that name in
+// src/brdf/merl.rs. An arc tangent, since cosines have no digits left near 0.
+float acute_angle(float y, float x, float hypotenuse) {
+    // tan(a / 2) = sin a / (1 + cos a): at most tan(22.5 degrees). The smallest normal number stands in for 0, to divide by.
+    float tangent = min(y, x) / max(max(y, x) + hypotenuse, 1.2e-38);
+    float square = tangent * tangent;
+    // atan(t) / t to 2e-8 of it.
+    float series = 0.0799375;
+    series = series * square - 0.13854501;
+    series = series * square + 0.1997473;
+    series = series * square - 0.33332808;
+    series = series * square + 0.99999998;
+    float angle = 2.0 * tangent * series;
+    return y > x ? HALF_PI - angle : angle;
+}
+
+// The angle in [0, 180 degrees] of this sine, not negative, and cosine.
+float angle_of(float sine, float cosine) {
+    float angle = acute_angle(sine, abs(cosine), 1.0);
+    return cosine < 0.0 ? 2.0 * HALF_PI - angle : angle;
+}
+
+#endif
