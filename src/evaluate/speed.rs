@@ -290,7 +290,8 @@ impl TimedFrame {
     }
 }
 
-fn render(renderer: &DeviceScene) -> Result<Rendering> {
+/// A frame with what a window shows of it.
+pub(super) fn render(renderer: &DeviceScene) -> Result<Rendering> {
     renderer.render(Wanted { display: true, ..Wanted::default() }, 1)
 }
 

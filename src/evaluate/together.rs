@@ -4,10 +4,11 @@ use std::sync::Arc;
 use glam::Vec3;
 use serde::Serialize;
 
+use super::speed::render;
 use super::tables::{Section, Table};
 use crate::error::{Error, Result};
 use crate::memo::{Memo, Round};
-use crate::pipeline::{DeviceScene, Rendering, Wanted, median};
+use crate::pipeline::{DeviceScene, Rendering, median};
 use crate::prepare::prepare;
 use crate::progress::{Observer, OnlyCancels};
 use crate::scene::{MaterialSettings, MaterialSource, ObjectSettings, Scene, Source};
@@ -180,10 +181,6 @@ impl Entrant {
         };
         median(self.renderings.iter().map(of_pass).collect())
     }
-}
-
-fn render(renderer: &DeviceScene) -> Result<Rendering> {
-    renderer.render(Wanted { display: true, ..Wanted::default() }, 1)
 }
 
 fn mean(alone: &[TimedAlone], value: impl Fn(&TimedAlone) -> f64) -> f64 {
