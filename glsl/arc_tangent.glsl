@@ -21,7 +21,7 @@ float acute_angle(float y, float x, float hypotenuse) {
     return y > x ? HALF_PI - angle : angle;
 }
 
-// The angle in [0, 180 degrees] of this sine, not negative, and cosine.
+// The angle in [0, 180 degrees] of this sine, not negative, and cosine: atan2 in Rust, which errs by a unit in the last place.
 float angle_of(float sine, float cosine) {
     float angle = acute_angle(sine, abs(cosine), 1.0);
     return cosine < 0.0 ? 2.0 * HALF_PI - angle : angle;

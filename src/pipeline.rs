@@ -218,7 +218,12 @@ impl Rendering {
 
     /// Time on the GPU of pass 2 alone, in milliseconds.
     pub fn shade_ms(&self) -> f64 {
-        self.passes.iter().filter(|pass| pass.name == "shade").map(|pass| pass.gpu_ms).sum()
+        self.pass_ms("shade")
+    }
+
+    /// Time on the GPU of the pass of this name, in milliseconds; 0 if there is none.
+    pub fn pass_ms(&self, name: &str) -> f64 {
+        self.passes.iter().filter(|pass| pass.name == name).map(|pass| pass.gpu_ms).sum()
     }
 }
 

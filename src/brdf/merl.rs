@@ -177,9 +177,8 @@ fn table_coordinate(w_i: DVec3, w_o: DVec3) -> DVec3 {
     )
 }
 
-/// The angle in [0, pi/2] of tangent y / x, neither negative, in a triangle of this hypotenuse; 0 if all are 0. Twin of `acute_angle` in
-/// glsl/arc_tangent.glsl, which has single precision. To the last
-/// digits, in a third of the time of `atan2`.
+/// The angle in [0, pi/2] of tangent y / x, neither negative, in a triangle of this hypotenuse; 0 if all are 0. To the last
+/// digits, in a third of the time of `atan2`. Twin, in single precision: `acute_angle` in glsl/arc_tangent.glsl.
 #[inline]
 fn acute_angle(y: f64, x: f64, hypotenuse: f64) -> f64 {
     let low = if y < x { y } else { x };

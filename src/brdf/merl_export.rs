@@ -37,21 +37,18 @@ pub fn merl_bytes(brdf: &Brdf) -> Vec<u8> {
 /// The values of the cells of one theta_d and phi_d; none below the horizon. By the normal equations of least squares, which couple
 /// neighbours alone.
 fn values_along_theta_h(brdf: &Brdf, theta_d: usize, phi_d: usize) -> [Option<DVec3>; THETA_H_BINS] {
-    let is_above = |theta_h: usize| Horizon::of_bins(theta_h, theta_d).is_above(phi_d);
-    let f = |at: f64| {
-        let (w_i, w_o) = directions(at, theta_d, phi_d);
-        match brdf.is_reciprocal() {
-            true => brdf.evaluate(w_i, w_o),
-            false => 0.5 * (brdf.evaluate(w_i, w_o) + brdf.evaluate(w_o, w_i)),
-        }
+    let is_above: [bool; THETA_H_BINS] =
+        std::array::from_fn(|theta_h| Horizon::of_bins(theta_h, theta_d).is_above(phi_d));
+    let f = |(w_i, w_o): (DVec3, DVec3)| match brdf.is_reciprocal() {
+        true => brdf.evaluate(w_i, w_o),
+        false => 0.5 * (brdf.evaluate(w_i, w_o) + brdf.evaluate(w_o, w_i)),
     };
     let [mut squares, mut with_next] = [[0.0; THETA_H_BINS]; 2];
     let mut sums = [DVec3::ZERO; THETA_H_BINS];
     // From the middle of one cell to that of the next; before the first one and beyond the last their own values hold.
     for interval in 0..=THETA_H_BINS {
         let (before, next) = (interval.saturating_sub(1), interval.min(THETA_H_BINS - 1));
-        let (from, to) = (interval as f64 - 0.5, interval as f64 + 0.5);
-        let (from, to) = (from.max(0.0), to.min(THETA_H_BINS as f64));
+        let (from, to) = ((interval as f64 - 0.5).max(0.0), (interval as f64 + 0.5).min(THETA_H_BINS as f64));
         for (part, weight) in POINTS {
             let at = from + part * (to - from);
             let (w_i, w_o) = directions(at, theta_d, phi_d);
@@ -59,17 +56,16 @@ fn values_along_theta_h(brdf: &Brdf, theta_d: usize, phi_d: usize) -> [Option<DV
                 continue;
             }
             // As a reader has it: cells below the horizon have no weight.
-            let share = match [before, next].map(is_above) {
-                [true, true] => at - (before as f64 + 0.5),
-                [true, false] => 0.0,
+            let share = match [is_above[before], is_above[next]] {
+                [true, true] if before != next => at - (before as f64 + 0.5),
+                [true, _] => 0.0,
                 [false, true] => 1.0,
                 [false, false] => continue,
             };
-            let share = if before == next { 0.0 } else { share };
             let x = at / THETA_H_BINS as f64;
             // Solid angle of half vectors, but for a factor: sin theta_h d theta_h, where theta_h goes with the square of x.
             let weight = weight * (to - from) * x * (FRAC_PI_2 * x * x).sin();
-            let value = f(at);
+            let value = f((w_i, w_o));
             squares[before] += weight * (1.0 - share) * (1.0 - share);
             with_next[before] += weight * share * (1.0 - share);
             sums[before] += weight * (1.0 - share) * value;
@@ -77,10 +73,10 @@ fn values_along_theta_h(brdf: &Brdf, theta_d: usize, phi_d: usize) -> [Option<DV
             sums[next] += weight * share * value;
         }
     }
-    for theta_h in (0..THETA_H_BINS).filter(|&theta_h| is_above(theta_h)) {
+    for theta_h in (0..THETA_H_BINS).filter(|&theta_h| is_above[theta_h]) {
         let weight = if squares[theta_h] > 0.0 { SHARE_OF_MIDDLE * squares[theta_h] } else { 1.0 };
         squares[theta_h] += weight;
-        sums[theta_h] += weight * f(theta_h as f64 + 0.5);
+        sums[theta_h] += weight * f(directions(theta_h as f64 + 0.5, theta_d, phi_d));
     }
     // Gauss's elimination, downwards and back.
     for i in 1..THETA_H_BINS {
@@ -94,7 +90,7 @@ fn values_along_theta_h(brdf: &Brdf, theta_d: usize, phi_d: usize) -> [Option<DV
     let mut values = [None; THETA_H_BINS];
     let mut next = DVec3::ZERO;
     for i in (0..THETA_H_BINS).rev() {
-        if is_above(i) {
+        if is_above[i] {
             next = (sums[i] - with_next[i] * next) / squares[i];
             // Beside a lobe that is narrower than a cell straight lines would undershoot.
             values[i] = Some(next.max(DVec3::ZERO));

@@ -214,7 +214,8 @@ impl Blocks {
     #[inline(always)]
     fn place(&self, face: usize, row: usize, window: &Window) -> Range<usize> {
         let first = (face * self.size + row) * self.a_row;
-        first + window.columns.start / LANES..first + window.columns.end.div_ceil(LANES)
+        let Range { start, end } = window.blocks();
+        first + start..first + end
     }
 
     #[inline(always)]
@@ -241,6 +242,12 @@ impl Window {
         let rows = cone_range(axes.y, axes.z, cone.sin, size);
         let columns = if rows.is_empty() { 0..0 } else { cone_range(axes.x, axes.z, cone.sin, size) };
         Self { rows, columns }
+    }
+
+    /// Which blocks of a row have its columns.
+    #[inline(always)]
+    fn blocks(&self) -> Range<usize> {
+        self.columns.start / LANES..self.columns.end.div_ceil(LANES)
     }
 
     fn is_empty(&self) -> bool {
@@ -353,19 +360,16 @@ fn convolved(blocks: &Blocks, cone: &Cone, weights: &mut Vec<[f32; LANES]>) -> [
     radiance.map(|sum_of_radiance| sum_of_radiance / sum)
 }
 
-/// The weights that the kernel of `cone` gives the texels of a window, row by row in whole blocks: what these have beyond the window is
-/// outside the cone. Returns their sum.
+/// The weights that the kernel of `cone` gives the texels of a window that is not empty, row by row in whole blocks: what these have beyond
+/// the window is outside the cone. Returns their sum.
 #[inline(always)]
 fn weigh(blocks: &Blocks, face: usize, window: &Window, cone: &Cone, weights: &mut Vec<[f32; LANES]>) -> f32 {
     let (c, kappa, extent) = (cone.centre.as_vec3(), cone.kappa as f32, cone.extent as f32);
-    weights.resize(window.rows.len() * blocks.place(face, 0, window).len(), [0.0; LANES]);
-    let mut rest = &mut weights[..];
+    let a_row = window.blocks().len();
+    weights.resize(window.rows.len() * a_row, [0.0; LANES]);
     let mut sums = [0.0; LANES];
-    for row in window.rows.clone() {
-        let blocks = blocks.of_row(face, row, window);
-        let (weights, after) = rest.split_at_mut(blocks.len());
-        rest = after;
-        for (block, weights) in blocks.iter().zip(weights) {
+    for (row, weights) in window.rows.clone().zip(weights.chunks_exact_mut(a_row)) {
+        for (block, weights) in blocks.of_row(face, row, window).iter().zip(weights) {
             let [xs, ys, zs] = &block.direction;
             let mut of_block = [0.0; LANES];
             for j in 0..LANES {
@@ -387,13 +391,9 @@ fn weigh(blocks: &Blocks, face: usize, window: &Window, cone: &Cone, weights: &m
 /// The sum over a window of radiance times weights, as [`weigh`] has them.
 #[inline(always)]
 fn weighted_sum(blocks: &Blocks, face: usize, window: &Window, weights: &[[f32; LANES]]) -> [f32; 3] {
-    let mut rest = weights;
     let [mut red, mut green, mut blue] = [[0.0; LANES]; 3];
-    for row in window.rows.clone() {
-        let blocks = blocks.of_row(face, row, window);
-        let (weights, after) = rest.split_at(blocks.len());
-        rest = after;
-        for (block, weights) in blocks.iter().zip(weights) {
+    for (row, weights) in window.rows.clone().zip(weights.chunks_exact(window.blocks().len())) {
+        for (block, weights) in blocks.of_row(face, row, window).iter().zip(weights) {
             let [reds, greens, blues] = &block.radiance;
             for j in 0..LANES {
                 red[j] += weights[j] * reds[j];

@@ -176,10 +176,7 @@ impl Entrant {
     }
 
     fn median_ms(&self, pass: &str) -> f64 {
-        let of_pass = |rendering: &Rendering| {
-            rendering.passes.iter().filter(|time| time.name == pass).map(|time| time.gpu_ms).sum()
-        };
-        median(self.renderings.iter().map(of_pass).collect())
+        median(self.renderings.iter().map(|rendering| rendering.pass_ms(pass)).collect())
     }
 }
 

@@ -128,8 +128,7 @@ impl GeometryCache {
     fn draws(&self, view: &View) -> Vec<(&Triangles, Push)> {
         let (right, up, forward) = view.camera.basis();
         let eye = view.camera.eye;
-        let half_height = (view.camera.fov_y_deg.to_radians() / 2.0).tan();
-        let half_width = half_height * f64::from(view.width) / f64::from(view.height);
+        let half_size = view.half_size();
         let pack = |v: DVec3, w: f64| v.extend(w).as_vec4().to_array();
         let unit = self.extent(view);
         let draw = |object: &PlacedMesh| {
@@ -145,8 +144,8 @@ impl GeometryCache {
             };
             let push = Push {
                 to_eye: [0, 1, 2].map(row),
-                right_over_extent: pack(right / half_width, 0.0),
-                up_over_extent: pack(up / half_height, 0.0),
+                right_over_extent: pack(right / half_size.x, 0.0),
+                up_over_extent: pack(up / half_size.y, 0.0),
                 forward: pack(forward, NEAR_PLANE),
                 tangent_axis,
                 tangent_turn: object.tangent.map_or(DVec2::X, PlacedTangent::turn).as_vec2().to_array(),
@@ -154,9 +153,10 @@ impl GeometryCache {
             };
             (&self.meshes[object.mesh].triangles, push)
         };
+        let inwards = inward_normals(view);
         let is_seen = |object: &&PlacedMesh| {
             let (center, radius) = self.bounds(object);
-            may_be_seen(center, radius, view)
+            may_be_within(center - eye, radius, &inwards)
         };
         self.objects.iter().filter(is_seen).map(draw).collect()
     }
@@ -182,19 +182,20 @@ impl GeometryCache {
     }
 }
 
-/// Whether a picture may show something of what is within this sphere: not where that is behind the eye, or beyond a side of the picture.
-fn may_be_seen(center: DVec3, radius: f64, view: &View) -> bool {
+/// Normals of the planes through the eye that bound what a picture shows, inwards: its four sides, and what is behind the eye.
+fn inward_normals(view: &View) -> [DVec3; 5] {
     let (right, up, forward) = view.camera.basis();
-    let half_height = (view.camera.fov_y_deg.to_radians() / 2.0).tan();
-    let half_width = half_height * f64::from(view.width) / f64::from(view.height);
-    let from_eye = center - view.camera.eye;
+    let DVec2 { x, y } = view.half_size();
+    let sides = [x * forward + right, x * forward - right, y * forward + up, y * forward - up];
+    let [left, right, below, above] = sides.map(DVec3::normalize);
+    [left, right, below, above, forward]
+}
+
+/// Whether something of what is within this sphere, of which `center` is seen from the eye, may be on the inner side of all these planes.
+fn may_be_within(center: DVec3, radius: f64, inwards: &[DVec3; 5]) -> bool {
     // Bounds and vertices are in single precision.
-    let margin = 1e-5 * (from_eye.length() + radius);
-    // Normals of the sides, inwards.
-    let beside = [half_width * forward + right, half_width * forward - right];
-    let above = [half_height * forward + up, half_height * forward - up];
-    let mut inwards = beside.into_iter().chain(above).map(DVec3::normalize).chain([forward]);
-    inwards.all(|normal| from_eye.dot(normal) > -radius - margin)
+    let margin = 1e-5 * (center.length() + radius);
+    inwards.iter().all(|normal| center.dot(*normal) > -radius - margin)
 }
 
 /// Draws the objects that may be seen into the geometry cache.
@@ -234,13 +235,14 @@ mod tests {
             let [x, y] = [right, up].map(|axis| from_eye.dot(axis).abs());
             depth > 0.0 && x < 2.0 * half_height * depth && y < half_height * depth
         };
+        let inwards = inward_normals(&view);
         let [mut seen, mut left_out, mut needless] = [0; 3];
         for i in 0..2000 {
             let center = eye + (0.1 + 0.01 * i as f64) * direction(i, 2000);
             let radius = 0.002 * (i * 7 % 700) as f64;
             let on_sphere = |j| center + radius * direction(j, 500);
             let is_seen = is_on_picture(center) || (0..500).map(on_sphere).any(is_on_picture);
-            let is_drawn = may_be_seen(center, radius, &view);
+            let is_drawn = may_be_within(center - eye, radius, &inwards);
             assert!(is_drawn || !is_seen, "{center} {radius}");
             seen += usize::from(is_seen);
             left_out += usize::from(!is_drawn);

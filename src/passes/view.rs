@@ -1,7 +1,7 @@
 //! What all passes know of the view: camera, resolution, rotation of the environment.
 use crate::scene::Camera;
 use bytemuck::{Pod, Zeroable};
-use glam::{Vec2, Vec3};
+use glam::{DVec2, Vec2, Vec3};
 
 /// The camera as shaders see it (`Camera` in glsl/camera.glsl): right and up scaled to the edges of the image.
 #[repr(C)]
@@ -16,9 +16,9 @@ impl CameraRays {
     /// The rays of `camera` for images of this width over height.
     pub fn new(camera: &Camera, aspect: f64) -> Self {
         let (right, up, forward) = camera.basis();
-        let half_height = (camera.fov_y_deg.to_radians() / 2.0).tan();
+        let half_size = half_size(camera, aspect);
         let pack = |v: glam::DVec3| v.as_vec3().extend(0.0).to_array();
-        Self { right: pack(right * (half_height * aspect)), up: pack(up * half_height), forward: pack(forward) }
+        Self { right: pack(right * half_size.x), up: pack(up * half_size.y), forward: pack(forward) }
     }
 
     /// The direction to the right, not normalised.
@@ -33,6 +33,12 @@ impl CameraRays {
         let [right, up, forward] = [self.right, self.up, self.forward].map(|v| Vec3::new(v[0], v[1], v[2]));
         forward + offset.x * right + offset.y * up
     }
+}
+
+/// Half the width and half the height of what `camera` sees at distance 1, in images of this width over height.
+fn half_size(camera: &Camera, aspect: f64) -> DVec2 {
+    let half_height = (camera.fov_y_deg.to_radians() / 2.0).tan();
+    DVec2::new(half_height * aspect, half_height)
 }
 
 /// Camera, resolution and display settings of one frame.
@@ -57,9 +63,18 @@ pub struct View {
 }
 
 impl View {
+    fn aspect(&self) -> f64 {
+        f64::from(self.width) / f64::from(self.height)
+    }
+
+    /// Half the width and half the height of what is seen at distance 1.
+    pub fn half_size(&self) -> DVec2 {
+        half_size(&self.camera, self.aspect())
+    }
+
     /// Rays through the image.
     pub fn camera_rays(&self) -> CameraRays {
-        CameraRays::new(&self.camera, f64::from(self.width) / f64::from(self.height))
+        CameraRays::new(&self.camera, self.aspect())
     }
 
     /// Cosine and sine of the environment's rotation.

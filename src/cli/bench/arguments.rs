@@ -77,14 +77,8 @@ impl CasesArguments {
         Ok(Cases {
             methods: once("--methods", methods)?,
             counts: once("--counts", counts)?,
-            materials: named("--materials", materials)?
-                .into_iter()
-                .map(|(name, text)| (name, MaterialSource::named(text)))
-                .collect(),
-            environments: named("--environments", &self.environments)?
-                .into_iter()
-                .map(|(name, text)| (name, Source::named(text, environment::builtin_names())))
-                .collect(),
+            materials: named_materials("--materials", materials)?,
+            environments: named_environments("--environments", &self.environments)?,
             scenes: scenes
                 .into_iter()
                 .map(|(name, text)| Ok((name, self.scene_of(text, size)?)))
@@ -118,15 +112,31 @@ impl CasesArguments {
     }
 
     pub fn open_device(&self) -> Result<Arc<Device>> {
-        let instance = Instance::new(false).map_err(Error::from)?;
-        Device::new(&instance, self.device.as_deref()).map_err(Error::from)
+        open_device(self.device.as_deref())
     }
+}
+
+/// The device of this name or index, or the one that the program prefers; not validated, which would take time that is measured.
+pub fn open_device(device: Option<&str>) -> Result<Arc<Device>> {
+    let instance = Instance::new(false).map_err(Error::from)?;
+    Device::new(&instance, device).map_err(Error::from)
 }
 
 /// Each of `texts` with the name that it has in tables: without folder and extension.
 pub fn named<'a>(flag: &str, texts: &'a [String]) -> Result<Vec<(String, &'a str)>> {
     let names = once(flag, texts.iter().map(|text| stem(Path::new(text))).collect())?;
     Ok(names.into_iter().zip(texts.iter().map(String::as_str)).collect())
+}
+
+/// The materials that `texts` name, with their names.
+pub fn named_materials(flag: &str, texts: &[String]) -> Result<Vec<(String, MaterialSource)>> {
+    Ok(named(flag, texts)?.into_iter().map(|(name, text)| (name, MaterialSource::named(text))).collect())
+}
+
+/// The environments that `texts` name, with their names.
+pub fn named_environments(flag: &str, texts: &[String]) -> Result<Vec<(String, Source)>> {
+    let source = |text| Source::named(text, environment::builtin_names());
+    Ok(named(flag, texts)?.into_iter().map(|(name, text)| (name, source(text))).collect())
 }
 
 /// `values`, if none is there twice: rows could not be told apart.

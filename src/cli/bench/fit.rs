@@ -1,5 +1,5 @@
 //! `threadlight bench fit`: what fitted threads cost to make, and what error is left.
-use super::arguments::{named, once, write_json};
+use super::arguments::{named_materials, once, write_json};
 use crate::cli::nameable;
 use crate::cli::progress::TerminalProgress;
 use clap::value_parser;
@@ -9,7 +9,6 @@ use threadlight::low_level::evaluate::fit::{self, Fits};
 use threadlight::low_level::evaluate::tables;
 use threadlight::low_level::memo::Memo;
 use threadlight::low_level::output;
-use threadlight::low_level::scene::MaterialSource;
 use threadlight::low_level::threads::fitted::MAX_COUNT;
 
 const EXAMPLES: &str = "\
@@ -48,8 +47,7 @@ pub struct BenchFit {
 impl BenchFit {
     pub fn run(self) -> anyhow::Result<()> {
         self.json.as_deref().map_or(Ok(()), output::check_writable)?;
-        let materials = named("--materials", &self.materials)?;
-        let materials = materials.into_iter().map(|(name, text)| (name, MaterialSource::named(text))).collect();
+        let materials = named_materials("--materials", &self.materials)?;
         let fits = Fits { materials, counts: once("--counts", self.counts)?, repeat: self.repeat };
         let progress = TerminalProgress::of("bench fit", "fits")?;
         let mut found = Vec::new();

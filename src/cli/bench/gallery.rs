@@ -1,5 +1,5 @@
 //! `threadlight bench gallery`: pictures beside each other, of materials and of methods.
-use super::arguments::{CasesArguments, Defaults, OutputArguments, QUICK_TOLERANCE, TruthArguments, named};
+use super::arguments::{CasesArguments, Defaults, OutputArguments, QUICK_TOLERANCE, TruthArguments, named_materials};
 use crate::cli::progress::TerminalProgress;
 use clap::value_parser;
 use std::io::Write;
@@ -11,7 +11,6 @@ use threadlight::low_level::evaluate::{Cases, Estimator, Sweep, tables};
 use threadlight::low_level::method::Method;
 use threadlight::low_level::output;
 use threadlight::low_level::progress::Observer;
-use threadlight::low_level::scene::MaterialSource;
 use threadlight::low_level::threads::MAX_COUNT;
 use threadlight::{Error, Result};
 
@@ -72,8 +71,7 @@ impl BenchGallery {
             size: Some((160, 120)),
         })?;
         let estimator = Estimator { variant: materials.methods[0], count: self.threads };
-        let compared = named("--compare", &self.compare)?;
-        let compared = compared.into_iter().map(|(name, text)| (name, MaterialSource::named(text))).collect();
+        let compared = named_materials("--compare", &self.compare)?;
         let sweep = Sweep {
             cases: Cases { materials: compared, ..materials.clone() },
             repeat: 3,

@@ -1,21 +1,17 @@
 //! `threadlight bench together`: what many materials in one picture cost, beside each alone.
-use super::arguments::{named, write_json};
+use super::arguments::{named_environments, named_materials, open_device, write_json};
 use crate::cli::progress::TerminalProgress;
 use crate::cli::scene_flags::parse_size;
 use crate::cli::{cache_folder, nameable};
 use clap::value_parser;
 use std::io::Write;
 use std::path::PathBuf;
-use threadlight::Error;
 use threadlight::low_level::brdf::Brdf;
-use threadlight::low_level::environment;
 use threadlight::low_level::evaluate::tables;
 use threadlight::low_level::evaluate::together::{self, Together};
 use threadlight::low_level::memo::Memo;
 use threadlight::low_level::output;
-use threadlight::low_level::scene::{MaterialSource, Source};
 use threadlight::low_level::threads::fitted::MAX_COUNT;
-use threadlight::low_level::vulkan::{Device, Instance};
 
 const EXAMPLES: &str = "\
 Without --materials, all that are built in are measured.
@@ -70,20 +66,14 @@ impl BenchTogether {
             [] => Brdf::builtin_names().map(str::to_owned).collect(),
             named => named.to_vec(),
         };
-        let materials = named("--materials", &materials)?;
-        let environments = named("--environments", &self.environments)?;
         let together = Together {
-            materials: materials.into_iter().map(|(name, text)| (name, MaterialSource::named(text))).collect(),
-            environments: environments
-                .into_iter()
-                .map(|(name, text)| (name, Source::named(text, environment::builtin_names())))
-                .collect(),
+            materials: named_materials("--materials", &materials)?,
+            environments: named_environments("--environments", &self.environments)?,
             threads: self.threads,
             size: self.size,
             repeat: self.repeat,
         };
-        let instance = Instance::new(false).map_err(Error::from)?;
-        let device = Device::new(&instance, self.device.as_deref()).map_err(Error::from)?;
+        let device = open_device(self.device.as_deref())?;
         let progress = TerminalProgress::of("bench together", "pictures")?;
         let memo = Memo::new(cache_folder(self.no_cache).as_deref());
         let mut found = Vec::new();
