@@ -39,6 +39,7 @@ impl DeviceMesh {
     /// # Errors
     /// No device memory left.
     pub fn new(device: &Arc<Device>, name: &str, mesh: &Mesh) -> Result<Self> {
+        let mesh = mesh.in_drawing_order();
         let attribute = |name, bytes| VertexAttribute { name, stride: VERTEX_STRIDE, bytes };
         // What no tangent goes by takes no memory.
         let tangents = if mesh.tangents.is_empty() { &mesh.normals } else { &mesh.tangents };

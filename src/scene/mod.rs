@@ -9,6 +9,7 @@ use crate::brdf::{Brdf, Custom, base_files, base_files_of};
 use crate::file_format::file_formats;
 
 pub mod camera;
+mod drawing_order;
 mod file;
 pub mod mesh;
 mod parameter;
