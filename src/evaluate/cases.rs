@@ -53,7 +53,7 @@ impl Shard {
     }
 
     /// Which of `length` things are in this part. Neighbours stay together, as the threads of a material are made once for all environments.
-    fn of(self, length: usize) -> Range<usize> {
+    pub(super) fn of(self, length: usize) -> Range<usize> {
         let end = |number: usize| number * length / self.count;
         end(self.number - 1)..end(self.number)
     }
@@ -114,7 +114,12 @@ impl Cases {
 
     /// The combinations of materials and environments of the shard, by number: the environment changes fastest.
     fn pairs(&self) -> Range<usize> {
-        self.shard.of(self.materials.len() * self.environments.len())
+        self.shard.of(self.combination_count())
+    }
+
+    /// How many combinations of materials and environments all parts have together.
+    pub fn combination_count(&self) -> usize {
+        self.materials.len() * self.environments.len()
     }
 
     /// Whether the shard has material and environment of these numbers together.
@@ -141,7 +146,7 @@ impl Cases {
     /// # Errors
     /// More parts than combinations.
     pub fn check_shard(&self) -> Result<()> {
-        let most = self.materials.len() * self.environments.len();
+        let most = self.combination_count();
         if self.shard.count <= most {
             return Ok(());
         }

@@ -10,13 +10,14 @@ use crate::error::{Error, Result};
 /// All rows of `files`, in their order, as those of a whole sweep.
 ///
 /// # Errors
-/// A file that was measured with other settings than one before it, or that has a row of one before it; a part of a sweep that is missing.
+/// A file that was measured with other settings than one before it, or that has a row of one before it; a part of a sweep that is missing, or
+/// that was interrupted.
 pub fn merged<'a>(files: impl IntoIterator<Item = (&'a Path, Vec<Row>)>) -> Result<Vec<Row>> {
     // The first file of each scene with its settings, and the file of each row.
     let mut scenes: HashMap<String, (&Path, Option<Settings>)> = HashMap::new();
     let mut known: HashMap<([String; 4], u32), &Path> = HashMap::new();
-    // Which parts there are of each method and count on each scene, and of how many.
-    let mut parts: BTreeMap<(String, u32, String, usize), Vec<Shard>> = BTreeMap::new();
+    // Of each method and count on each scene, and of so many parts: the part of each row, and how many combinations all have.
+    let mut parts: BTreeMap<(String, u32, String, usize), Vec<(Shard, Option<usize>)>> = BTreeMap::new();
     let mut all = Vec::new();
     for (path, rows) in files {
         for row in rows {
@@ -36,16 +37,26 @@ pub fn merged<'a>(files: impl IntoIterator<Item = (&'a Path, Vec<Row>)>) -> Resu
                 return Err(Error::in_file(path, problem, "give each part of a sweep once"));
             }
             if let Some(shard) = row.shard {
-                parts.entry((method.clone(), *threads, scene.clone(), shard.count)).or_default().push(shard);
+                parts
+                    .entry((method.clone(), *threads, scene.clone(), shard.count))
+                    .or_default()
+                    .push((shard, row.combinations));
             }
-            all.push(Row { shard: None, ..row });
+            all.push(Row { shard: None, combinations: None, ..row });
         }
     }
     for ((method, threads, scene, count), there) in parts {
-        if let Some(missing) = Shard::all(count).find(|shard| !there.contains(shard)) {
-            let problem = format!("lack {missing} of {method} with {threads} on {scene}");
-            let remedy = format!("measure it with --shard {missing}, and give all parts");
-            return Err(Error::input("the parts of a sweep", problem, remedy));
+        let combinations = there.iter().filter_map(|(_, combinations)| *combinations).max();
+        for shard in Shard::all(count) {
+            let rows = there.iter().filter(|(part, _)| *part == shard).count();
+            // Each part has some combination.
+            let wanted = combinations.map_or(1, |combinations| shard.of(combinations).len());
+            if rows < wanted {
+                let extent = if rows == 0 { String::new() } else { format!("{} of the {wanted} of ", wanted - rows) };
+                let problem = format!("lack {extent}{shard} of {method} with {threads} on {scene}");
+                let remedy = format!("measure it with --shard {shard}, and give all parts");
+                return Err(Error::input("the parts of a sweep", problem, remedy));
+            }
         }
     }
     Ok(all)
@@ -78,6 +89,14 @@ mod tests {
             let error = merge(rows).unwrap_err().to_string();
             assert!(error.contains(&format!("lack {name} of paper with 4 on s")), "{error}");
         }
+        // Of five combinations the first of three parts has one, the others have two.
+        let of_five = |row: &Row| Row { combinations: Some(5), ..row.clone() };
+        let interrupted = all.each_ref().map(of_five);
+        let second = of_five(&part("rubber", "2/3"));
+        let error = merge([&interrupted[..], &[second]].concat()).unwrap_err().to_string();
+        assert!(error.contains("lack 1 of the 2 of 3/3 of paper with 4 on s"), "{error}");
+        let rest = ["2/3", "3/3"].map(|shard| of_five(&part(shard, shard)));
+        assert!(merge([&interrupted[..], &rest].concat()).unwrap().iter().all(|row| row.combinations.is_none()));
         // Another method may have been shared by others.
         let of_two = |shard: &str| Row { method: "fitted".into(), ..part("gold", shard) };
         assert!(merge([&all[..], &[of_two("1/2")]].concat()).is_err());

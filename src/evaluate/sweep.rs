@@ -80,6 +80,10 @@ pub struct Row {
     /// Which part of a sweep it is of; none of a whole one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shard: Option<Shard>,
+    /// How many combinations of materials and environments the whole sweep has; none where `shard` is none, or in measurements that were
+    /// written before this was kept.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub combinations: Option<usize>,
     /// What `rms` was expected to be, where that was asked for: see [`TrueSample::expected_rms`].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub expected_rms: Option<f64>,
@@ -172,7 +176,8 @@ pub fn run(
             let expected_rms = sample.as_ref().map(|sample| sample.expected_rms(&rendering.radiance));
             let settings = Some(sweep.settings(place.prepared));
             let shard = Some(sweep.cases.shard).filter(|shard| *shard != Shard::WHOLE);
-            measured.rows.push(Row { settings, shard, expected_rms, ..row(place, &metrics, &rendering) });
+            let combinations = shard.map(|_| sweep.cases.combination_count());
+            measured.rows.push(Row { settings, shard, combinations, expected_rms, ..row(place, &metrics, &rendering) });
             if sweep.keep_pictures {
                 measured.pictures.push(over_grey(&rendering.radiance, width, height, display));
             }
@@ -216,6 +221,7 @@ fn row(place: &Place, metrics: &Metrics, rendering: &Rendering) -> Row {
         shade_ms: rendering.shade_ms(),
         settings: None,
         shard: None,
+        combinations: None,
         expected_rms: None,
     }
 }

@@ -299,6 +299,7 @@ pub(super) mod tests {
                             shade_ms: 0.11 + cost * f64::from(threads),
                             settings: None,
                             shard: None,
+                            combinations: None,
                             expected_rms: None,
                         });
                     }

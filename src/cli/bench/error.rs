@@ -31,7 +31,8 @@ The JSON is a list of rows with these fields, in this order:
   lookups, covered_pixels                           lookups in the environment, and pixels that see a surface
   shade_ms                                          what of gpu_ms is shading
   settings                                          width, height, subpixels, seed, repeat and whole_picture of the run
-  shard                                             only with --shard: which part it is of
+  shard, combinations                               only with --shard: which part it is of; of how many combinations of
+                                                    materials and environments in all
   expected_rms                                      only with --expected: what rms was expected to be
 
 The plots are SVG, log-log, a line a method: rms_over_threads.svg (the paper's figure 12) and rms_over_shade_ms.svg, and

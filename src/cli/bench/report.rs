@@ -36,7 +36,7 @@ Times are of the first material, environment and scene.
 With --from, errors are those of earlier runs of `bench error --json`, such as all parts of one by --shard, and methods are shown side by side for the first material,
 environment and scene only. Without DIR nothing is measured: the tables of these errors are printed, and --plot and --json write
 what those of `bench error` write. Files that were not measured with the same settings, or that have the same row, are refused, and so
-are parts by --shard if one is missing.";
+are parts by --shard if one is missing or was interrupted.";
 
 /// Measures everything and writes it as one HTML page. Lists are separated by commas.
 #[derive(clap::Args)]
