@@ -9,10 +9,11 @@
 //!
 //! For each BRDF a few *sample threads* are made beforehand: incident directions that move continuously with the view angle
 //! theta_o, each with its pdf. Neighbouring pixels then have neighbouring samples, so there is no noise to be seen, and each
-//! sample looks up an environment that was filtered to the sample's share of the hemisphere.
+//! sample looks up an environment that was filtered to the sample's share of the hemisphere. By default threads are *fitted*: each
+//! has a direction, the width of a blur and a colour, found such that their sum answers any light as the BRDF does.
 //!
 //! ```text
-//! scene ──> prepare ──> threads, environment pyramid, meshes                               once, on the CPU
+//! scene ──> prepare ──> threads, environment pyramid, meshes                               once, beforehand
 //!                          │
 //!                          v
 //!            geometry_cache ─> classify ─> shade ─> background ─> tone_map ─> PNG          each frame, on the GPU
@@ -34,7 +35,7 @@
 //! Custom BRDFs are types that implement [`CustomBrdf`]. The [`guide`] has all of it at length: usage, every equation with the function that
 //! holds it, architecture, results, limits. [`low_level`] is the rest of the program, part by part.
 //!
-//! The method on one screen is `declare` in `src/pipeline.rs`.
+//! The frame on one screen is `declare` in `src/pipeline.rs`.
 
 mod error;
 mod facade;

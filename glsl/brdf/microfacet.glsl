@@ -62,7 +62,8 @@ vec3 fresnel_conductor(float cos_theta, vec3 eta, vec3 k) {
     vec3 p_sum = cos2 * a2_b2 + sin2 * sin2;
     vec3 p_cross = s_cross * sin2;
     vec3 r_p = r_s * (p_sum - p_cross) / (p_sum + p_cross);
-    return 0.5 * (r_s + r_p);
+    // Where nothing is reflected, eta = 1 without absorption, rounding gives either sign.
+    return max(0.5 * (r_s + r_p), vec3(0.0));
 }
 
 // Exact unpolarised Fresnel reflectance of a dielectric of index ior >= 1, seen from air.

@@ -2,6 +2,7 @@
 //!
 //! Low, Kronander, Ynnerman and Unger, "BRDF Models for Accurate and Efficient Rendering of Glossy Surfaces" (2012), the microfacet form:
 //! - A, of each channel, is the size of the lobe; D is not normalised;
+//! - the published fits are of this form: without 1 / pi all 40 of them err more;
 //! - G = min(1, 2 (n . h) cos theta_o / (w_o . h), 2 (n . h) cos theta_i / (w_o . h));
 //! - F is the exact unpolarised Fresnel reflectance of a dielectric of index `ior`.
 //!

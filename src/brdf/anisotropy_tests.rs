@@ -1,12 +1,8 @@
 //! Anisotropic models: limits, energy, hostile directions, and what turning the material does.
 use rayon::prelude::*;
 
+use super::samples::of_model;
 use super::*;
-
-fn of_model(model: &str, parameters: &str) -> Brdf {
-    let table = parameters.replace(';', "\n").parse().unwrap();
-    Brdf::from_parameters(model, table).unwrap_or_else(|error| panic!("{model}: {parameters}: {error}"))
-}
 
 fn direction(theta_deg: f64, phi_deg: f64) -> DVec3 {
     let (sin_theta, cos_theta) = theta_deg.to_radians().sin_cos();

@@ -9,7 +9,7 @@ use crate::error::Result;
 /// Blinn's half-vector form of the Phong model.
 ///
 /// c_n = (n + 2)(n + 4) / (8 pi (2^(-n/2) + n)) is the exact normalisation at normal incidence: there the lobe's albedo is
-/// `specular`, and it is smaller at all other angles. So diffuse + specular <= 1 conserves energy.
+/// `specular`, and it is no greater at any other angle. So diffuse + specular <= 1 conserves energy.
 #[derive(Clone, Copy, Debug)]
 pub struct BlinnPhong {
     /// Albedo of the diffuse part per channel, 0 to 1.

@@ -25,7 +25,7 @@ pub struct CookTorrance {
     pub specular: f64,
     /// Reflectance of the facets at normal incidence per channel, 0 to 0.99.
     pub f0: DVec3,
-    /// m: root mean square slope of the facets, times sqrt(2). 0.001 to 1.
+    /// m: root mean square slope of the facets along any one direction, times sqrt(2), which is that over both. 0.001 to 1.
     pub m: f64,
 }
 

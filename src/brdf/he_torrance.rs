@@ -14,11 +14,13 @@
 //! For unpolarised light the paper's G is (|w_i + w_o|^2 / (cos theta_i + cos theta_o))^2: of its brackets each is the squared sine of the
 //! angle between w_i and w_o, and they cancel. F is the exact Fresnel reflectance at half of that angle.
 //!
+//! Lambda is (e^(-x^2) / (x sqrt pi) - erfc(x)) / 2, Smith's. As printed, the paper's is without the exponential.
+//!
 //! Departures: Delta, a perfect mirror in the paper, is a Beckmann lobe of the width `specular_alpha`, as a mirror has no BRDF. For g above
-//! 100 the sum, a mean over Poisson's distribution, is taken by its moments, with an error of the order of 1 / g^2.
+//! 100 the sum, a mean over Poisson's distribution, is taken by its moments, with an error of the order of 1 / g^2 near its peak.
 //!
 //! Rough surfaces (sigma_0 well above lambda) are those of geometrical optics: Beckmann's facets of alpha = 2 sigma_0 / tau. Smooth ones
-//! are mirrors. Reciprocal. Energy is at most 1 within the theory's range, tau above lambda and 2 sigma_0 / tau below about 0.6, with
+//! are mirrors. Reciprocal. Energy is at most 1.05 within the theory's range, tau above lambda and 2 sigma_0 / tau below about 0.6, with
 //! diffuse + F <= 1; beyond it is not bounded by it.
 use std::f64::consts::{FRAC_1_PI, PI};
 

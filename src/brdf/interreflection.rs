@@ -30,7 +30,7 @@ const POINTS: usize = 10946;
 const GENERATOR: usize = 4181;
 /// Parts of a turn from point to point: 1 over the plastic number, which has nothing in common with the lattice.
 const AZIMUTH_STEP: f64 = 0.754_877_666_246_692_7;
-/// How much of the light that comes later is counted: with so many points, white bases err by up to 0.4 %, and energy is not to exceed 1.
+/// How much of the light that comes later is counted: with so many points, white bases err by up to 0.65 %, and energy is hardly to exceed 1.
 const COUNTED: f64 = 0.995;
 
 /// What light between base and coat adds to what the base reflects once: see `layered.rs`. By the cosine outside, as [`at_cosine`] reads it.

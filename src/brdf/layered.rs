@@ -9,19 +9,19 @@
 //! ```
 //!
 //! - The first line is what the upper side reflects: GGX facets, exact Fresnel (Walter et al. 2007). T(theta) = 1 - its albedo there, so
-//!   that with a base that loses nothing all light comes back. For a smooth coat T is Fresnel's.
+//!   that with a base that loses nothing all light comes back but for 0.7 %. For a smooth coat T is Fresnel's, up to 89.5 degrees.
 //! - f_base T_i T_o / n^2 is light that goes in, is reflected by the base once, and comes out (Weidlich and Wilkie, "Arbitrarily Layered
 //!   Micro-Facet Surfaces", 2007). Their formula is without 1/n^2, by which radiance falls where its cone widens; then energy does not
 //!   add up.
 //! - The rest is light that the inside of the coat sends back to the base, once or often: all that is beyond the critical angle, and 1 - T of the
-//!   rest. Its energy from each angle is exact for isotropic bases: `interreflection.rs` sums all orders in the mean over azimuth. For a
+//!   rest. Its energy from each angle is that of all orders for isotropic bases, less 0.5 %: `interreflection.rs` sums them in the mean over azimuth. For a
 //!   diffuse base that is Saunderson's correction (1942), f = T_i T_o reflectance / (n^2 pi (1 - reflectance r)), r the coat's reflectance
 //!   for diffuse light from within. What is lost is the direction. In the mirror direction the sum says by which factor later light raises the
 //!   lobe: that is 1 + k k. What then lacks leaves evenly: h_i h_o / N, with N such that the integral is what lacks, in the manner of Kulla and
 //!   Conty (2017). Both are exact for a diffuse base and for a mirror; between them a lobe of later light is taken for the base's
 //!   own lobe and a haze.
 //!
-//! Reciprocal as the base is. Energy is at most 1, or at most that of the base where the base reflects more than it receives.
+//! Reciprocal as the base is. Energy is at most 1.002, or at most that of the base where the base reflects more than it receives.
 //! ior = 1 without absorption is the base itself.
 //!
 //! Left out: the coat's roughness as to what goes through (it would widen the base's lobe; Guo et al., "Position-Free Monte Carlo

@@ -116,7 +116,8 @@ pub fn fresnel_conductor(cos_theta: f64, eta: DVec3, k: DVec3) -> DVec3 {
         let (p_sum, p_cross) = (cos2 * a2_b2 + sin2 * sin2, s_cross * sin2);
         // At grazing both are sin^4 > 0; at the normal cos^2 a2_b2 > 0: the sum never vanishes.
         let r_p = r_s * (p_sum - p_cross) / (p_sum + p_cross);
-        0.5 * (r_s + r_p)
+        // Where nothing is reflected, eta = 1 without absorption, rounding gives either sign.
+        (0.5 * (r_s + r_p)).max(0.0)
     };
     DVec3::new(channel(eta.x, k.x), channel(eta.y, k.y), channel(eta.z, k.z))
 }

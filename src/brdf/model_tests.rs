@@ -80,6 +80,31 @@ fn no_model_reflects_more_than_it_receives_but_by_the_known_excess() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
+/// What white, or next to it, reaches at most at any view, as the models' documentation says.
+#[test]
+fn the_ends_of_ranges_reflect_more_than_they_receive_by_what_is_said() {
+    let mut wrong = 0;
+    for (model, parameters, most) in [
+        ("principled", "base_colour = 1; metallic = 0; roughness = 0.05", 1.85),
+        ("principled", "base_colour = 1; metallic = 0; roughness = 0.3", 1.35),
+        ("principled", "base_colour = 1; metallic = 0; roughness = 0.7", 1.03),
+        ("principled", "base_colour = 0; metallic = 0; roughness = 0.5; sheen = 1; sheen_roughness = 0.1", 3.27),
+        ("principled", "base_colour = 0; metallic = 0; roughness = 0.5; sheen = 1; sheen_roughness = 0.5", 0.91),
+        ("oren_nayar", "reflectance = 1; sigma_deg = 18", 1.05),
+        ("he_torrance", "diffuse = 0; sigma_um = 0.1; tau_um = 2; specular_alpha = 0.01; eta = 0.01; k = 50", 1.05),
+        ("plastic", "distribution = 'beckmann'; alpha = 0.2; ior = 1.5; diffuse = 1", 1.003),
+    ] {
+        let brdf = samples::of_model(model, parameters);
+        let angles = [50.0f64, 60.0, 70.0, 75.0, 80.0, 85.0, 87.0, 89.0, 89.5];
+        let albedos = angles.map(|theta_o_deg| brdf.albedo(theta_o_deg.to_radians()).max_element());
+        let reached = albedos.into_iter().fold(0.0, f64::max);
+        println!("{reached:.4}, said {most}, {model}: {parameters}");
+        // Each is where its model reaches the most.
+        wrong += usize::from(reached > most + 3e-3 || reached < most - 0.08);
+    }
+    assert_eq!(wrong, 0);
+}
+
 #[test]
 fn tables_of_every_model_err_by_what_the_guide_says() {
     let builtin = Brdf::builtin_names().map(|name| (name.to_owned(), Brdf::builtin(name).unwrap()));

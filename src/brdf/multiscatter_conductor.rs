@@ -10,7 +10,7 @@
 //!
 //! mean F is the reflectance of the smooth metal under diffuse light. Reciprocal. A metal that absorbs nothing reflects all light at every
 //! angle (the integral of the second term is 1 - E(theta_o)); one that does reflects less. E is a table of 128 cosines, more of them
-//! towards grazing angles, good to about 1e-3.
+//! towards grazing angles, good to 2e-3.
 use std::f64::consts::{FRAC_1_PI, FRAC_PI_2, PI};
 use std::sync::{Arc, OnceLock};
 

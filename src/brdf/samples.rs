@@ -240,10 +240,12 @@ pub fn isotropic() -> impl Iterator<Item = (String, Brdf)> {
 }
 
 fn of<const N: usize>(samples: &'static [(&str, [&str; N])]) -> impl Iterator<Item = (String, Brdf)> {
-    samples.iter().flat_map(|(model, sets)| sets.iter().map(move |set| (*model, *set))).map(|(model, set)| {
-        let table = set.replace(';', "\n").parse().expect("TOML");
-        let name = format!("{model}: {set}");
-        let brdf = Brdf::from_parameters(model, table).unwrap_or_else(|error| panic!("{name}: {error}"));
-        (name, brdf)
-    })
+    let pairs = samples.iter().flat_map(|(model, sets)| sets.iter().map(move |set| (*model, *set)));
+    pairs.map(|(model, set)| (format!("{model}: {set}"), of_model(model, set)))
+}
+
+/// The model with these parameters, as TOML but for `;` between them.
+pub fn of_model(model: &str, parameters: &str) -> Brdf {
+    let table = parameters.replace(';', "\n").parse().expect("TOML");
+    Brdf::from_parameters(model, table).unwrap_or_else(|error| panic!("{model}: {parameters}: {error}"))
 }

@@ -185,6 +185,11 @@ fn conductor_without_extinction_is_a_dielectric() {
         let conductor = fresnel_conductor(cos_theta, DVec3::splat(1.5), DVec3::ZERO).x;
         assert!((conductor - fresnel_dielectric(cos_theta, 1.5)).abs() < 1e-12);
     }
+    // Without a surface nothing is reflected, and rounding does not make that negative.
+    for step in 1..=1000 {
+        let none = fresnel_conductor(f64::from(step) / 1000.0, DVec3::ONE, DVec3::ZERO).x;
+        assert!((0.0..1e-9).contains(&none), "{step}: {none}");
+    }
 }
 
 #[test]

@@ -14,11 +14,11 @@ Examples:
   threadlight compare paper.exr reference.exr --mask-background --difference where.png
   threadlight compare a.png b.png --json
 
-Display values are clamp(exposure L, 0, 1)^(1/gamma) of radiance L over black, compared in all three channels. A PNG
+Display values are clamp(exposure L, 0, 1)^(1/gamma) of radiance L over black, compared in all three channels. A PNG \
 holds display values: --exposure and --gamma then say how it was made, for rms_linear.
 
-The difference picture shows the largest difference among the channels' display values in colours from black (1e-4 or less)
-over violet and orange to pale yellow (1), by the logarithm; grey is what was left out. Below it is the scale, with ticks at
+The difference picture shows the largest difference among the channels' display values in colours from black (1e-4 or less) \
+over violet and orange to pale yellow (1), by the logarithm; grey is what was left out. Below it is the scale, with ticks at \
 1e-3, 1e-2 and 1e-1.";
 
 /// Compares two pictures of one size: RMS, SSIM, FLIP. B is the reference.
@@ -29,7 +29,7 @@ pub struct Compare {
     a: PathBuf,
     /// Another.
     b: PathBuf,
-    /// Compare only pixels that see a surface in A or B: alpha above 0, as far as they have alpha.
+    /// Compare only pixels that see a surface in A or B, by the alpha of those rendered with --background none.
     #[arg(long)]
     mask_background: bool,
     /// Print JSON instead of a table.

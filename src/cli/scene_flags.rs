@@ -46,7 +46,7 @@ pub struct SceneFlags {
     /// Turns the environment about the vertical axis, counter-clockwise seen from above, in degrees.
     #[arg(long, value_name = "DEG", value_parser = number(f64::MIN..=f64::MAX, "a finite number"))]
     pub rotation: Option<f64>,
-    /// Seed of everything random; the same seed gives the same bytes.
+    /// Seed of everything random; the same seed gives the same pixels on one device.
     #[arg(long, value_name = "N")]
     pub seed: Option<u64>,
 }

@@ -28,7 +28,7 @@ pub struct Threads {
     /// Whose threads: fitted, paper or gaussian.
     #[arg(long, value_name = "METHOD", default_value = ThreadKind::default().name())]
     method: String,
-    /// Seed of everything random; the same seed gives the same bytes.
+    /// Seed of everything random; the same seed gives the same threads.
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
     /// Neither read nor write cached threads.

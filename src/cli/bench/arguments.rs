@@ -155,7 +155,7 @@ pub const QUICK_TOLERANCE: f64 = 1e-3;
 /// Against what errors are measured.
 #[derive(clap::Args)]
 pub struct TruthArguments {
-    /// Error of the reference pictures, in display values, that is good enough (default 2e-4, on the GPU 1e-3).
+    /// Error of the reference pictures, in display values, that is good enough (default of `bench error` 2e-4, on the GPU and of others 1e-3).
     #[arg(long, value_name = "X", value_parser = number(f64::MIN_POSITIVE..=1.0, "a number above 0, at most 1"))]
     reference_tolerance: Option<f64>,
     /// Where the reference pictures are made, as `threadlight render --help` explains.

@@ -9,8 +9,8 @@ use threadlight::low_level::evaluate::{Row, Shard, Sweep, plots, reference, tabl
 use threadlight::low_level::method::Method;
 
 const EXAMPLES: &str = "\
-Without --materials, gold is measured; without --methods, all of them; without --counts, 1,4,16,32,64,100,512; without
---size, pictures have the scene's size; without --reference-tolerance, it is 2e-4.
+Without --materials, gold is measured; without --methods, all of them; without --counts, 1,4,16,32,64,100,512; without \
+--size, pictures have the scene's size; without --reference-tolerance, it is 2e-4, or 1e-3 on the GPU.
 
 Examples:
   threadlight bench error
@@ -18,9 +18,9 @@ Examples:
   threadlight bench error --materials gold,clay --environments studio,sky --shard 2/4 --json part_2.json
   threadlight bench error --methods paper --scene sphere,dragon.obj --json errors.json --plot plots
 
-Each picture is compared with the reference picture of its material, environment and scene, over the pixels that see a
-surface. Tables are printed: mean RMS and SSIM for each material (the paper's tables 2 and 3), and over all of them
-(table 4) with FLIP, the worst RMS, lookups for each pixel that sees a surface, the time on the GPU, that of
+Each picture is compared with the reference picture of its material, environment and scene, over the pixels that see a \
+surface. Tables are printed: mean RMS and SSIM for each material (the paper's tables 2 and 3), and over all of them \
+(table 4) with FLIP, the worst RMS, lookups for each pixel that sees a surface, the time on the GPU, that of \
 shading alone and, where fitted threads were measured, how many times as long as they the other methods shade for the same RMS.
 
 The JSON is a list of rows with these fields, in this order:
@@ -35,8 +35,8 @@ The JSON is a list of rows with these fields, in this order:
                                                     materials and environments in all
   expected_rms                                      only with --expected: what rms was expected to be
 
-The plots are SVG, log-log, a line a method: rms_over_threads.svg (the paper's figure 12) and rms_over_shade_ms.svg, and
-where there are several materials, MATERIAL_rms_over_threads.svg and MATERIAL_rms_over_shade_ms.svg; with --expected, also
+The plots are SVG, log-log, a line a method: rms_over_threads.svg (the paper's figure 12) and rms_over_shade_ms.svg, and \
+where there are several materials, MATERIAL_rms_over_threads.svg and MATERIAL_rms_over_shade_ms.svg; with --expected, also \
 expected_over_measured.svg.";
 
 /// Measures RMS, SSIM, FLIP and time on the GPU against the reference. Lists are separated by commas.

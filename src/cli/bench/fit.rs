@@ -18,7 +18,7 @@ Examples:
   threadlight bench fit
   threadlight bench fit --materials alumina-oxide.binary,nickel.binary --counts 4,16,64,128 --json fit.json
 
-Errors are RMS, relative to the radiance, over view angles as a sphere shows them: under the lights that the threads were fitted
+Errors are RMS, relative to the radiance, over view angles as a sphere shows them: under the lights that the threads were fitted \
 to, and under others at other angles. Threads are made each time; none are read or written.
 
 The JSON is a list of rows with these fields, in this order:

@@ -15,7 +15,7 @@ use threadlight::low_level::threads::MAX_COUNT;
 use threadlight::{Error, Result};
 
 const EXAMPLES: &str = "\
-Without --materials, all built-in ones are shown; without --methods, fitted, paper, importance and filtered; without --counts,
+Without --materials, all built-in ones are shown; without --methods, fitted, paper, importance and filtered; without --counts, \
 1,4,16,64,100; without --size, pictures are 160x120; without --reference-tolerance, it is 1e-3.
 
 Examples:

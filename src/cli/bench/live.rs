@@ -21,7 +21,7 @@ Examples:
   threadlight bench live --material red-plastic --drag red-plastic.ior --from 1.3 --to 2 --json ior.json
   threadlight bench live --material clay --drag clay.reflectance --from \"[0.8,0.1,0.1]\" --to \"[0.1,0.1,0.8]\"
 
-Every draft is made from the one before; those of the way back begin where the way there has ended. Errors are RMS of display
+Every draft is made from the one before; those of the way back begin where the way there has ended. Errors are RMS of display \
 values against the reference. The change is the largest one of a display value from one picture to the next.
 
 The JSON is a list of steps with these fields, in this order:

@@ -19,7 +19,7 @@ use threadlight::low_level::vulkan::Device;
 use threadlight::{Error, Result};
 
 const EXAMPLES: &str = "\
-Without --materials, gold and red-plastic are measured; without --methods, fitted, paper, importance and filtered; without
+Without --materials, gold and red-plastic are measured; without --methods, fitted, paper, importance and filtered; without \
 --counts, 1,4,16,64; without --size, pictures are 160x120; without --reference-tolerance, it is 1e-3.
 
 Examples:
@@ -28,14 +28,14 @@ Examples:
   threadlight bench report report --from rows.json
   threadlight bench report --from part_1.json part_2.json --plot plots
 
-Writes DIR/report.html, which needs no other file: machine, device, versions and command; time by threads with the floor and as
-things double (the paper's table 1); errors (tables 2 to 4) over samples and over time (figure 12); methods side by side (figures
-10 and 11); all materials, built-in ones too, by the first of the methods at the highest of the counts (figure 13); and every row.
+Writes DIR/report.html, which needs no other file: machine, device, versions and command; time by threads with the floor and as \
+things double (the paper's table 1); errors (tables 2 to 4) over samples and over time (figure 12); methods side by side (figures \
+10 and 11); all materials, built-in ones too, by the first of the methods at the highest of the counts (figure 13); and every row. \
 Times are of the first material, environment and scene.
 
-With --from, errors are those of earlier runs of `bench error --json`, such as all parts of one by --shard, and methods are shown side by side for the first material,
-environment and scene only. Without DIR nothing is measured: the tables of these errors are printed, and --plot and --json write
-what those of `bench error` write. Files that were not measured with the same settings, or that have the same row, are refused, and so
+With --from, errors are those of earlier runs of `bench error --json`, such as all parts of one by --shard, and methods are shown side by side for the first material, \
+environment and scene only. Without DIR nothing is measured: the tables of these errors are printed, and --plot and --json write \
+what those of `bench error` write. Files that were not measured with the same settings, or that have the same row, are refused, and so \
 are parts by --shard if one is missing or was interrupted.";
 
 /// Measures everything and writes it as one HTML page. Lists are separated by commas.

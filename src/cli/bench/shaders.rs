@@ -21,9 +21,9 @@ Examples:
   RADV_FORCE_FAMILY=navi21 threadlight bench shaders --device radv      # a GPU that is not there: Mesa compiles for it all the same
 
 Nothing runs: the figures are what the driver's compiler counts and estimates, and no time. `for` is what a shader is compiled for:
-the scene, as when it is rendered, or any scene, with all models, sources and tangents. On Mesa's RADV, VGPRs and SGPRs are registers, spills
-those that go through memory, waves those that a SIMD has room for, latency and inv. thr. (inverse throughput) estimated cycles of a
-wave, in which each loop counts a fixed number of times. / bare is inverse throughput a lane over that of bare lookups. Of other drivers
+the scene, as when it is rendered, or any scene, with all models, sources and tangents. On Mesa's RADV, VGPRs and SGPRs are registers, spills \
+those that go through memory, waves those that a SIMD has room for, latency and inv. thr. (inverse throughput) estimated cycles of a \
+wave, in which each loop counts a fixed number of times. / bare is inverse throughput a lane over that of bare lookups. Of other drivers \
 the table has all that they tell.
 
 The JSON is a list of rows with these fields, in this order:

@@ -10,7 +10,7 @@ use threadlight::low_level::method::Method;
 use threadlight::low_level::threads::MAX_COUNT;
 
 const EXAMPLES: &str = "\
-Without --materials, gold is measured; without --methods, fitted and paper; without --counts, 16,32,64,100,200,512; without --size,
+Without --materials, gold is measured; without --methods, fitted and paper; without --counts, 16,32,64,100,200,512; without --size, \
 pictures have the scene's size.
 
 Examples:
@@ -18,12 +18,12 @@ Examples:
   threadlight bench speed --scene dragon.obj --materials alumina-oxide.binary --environments lebombo.hdr
   threadlight bench speed --methods paper,filtered --counts 16,64 --size 320x240 --json speed.json --plot plots
 
-The first tables are the paper's table 1: for each number of threads the time on the GPU of each pass and of all of them, and
-the floor: what a compute pass takes that makes as many trilinear lookups in the same environment, of levels that differ from
+The first tables are the paper's table 1: for each number of threads the time on the GPU of each pass and of all of them, and \
+the floor: what a compute pass takes that makes as many trilinear lookups in the same environment, of levels that differ from \
 lookup to lookup and from pixel to pixel, and nothing else.
 
-The others have what a frame costs as its pixels (a quarter, half, all of --size), its sub-pixels (1, 2 and 4 per axis), its
-threads (a quarter, half, all of --threads) and its triangles (each split into 4 and 16) grow; ratio is the time over that of
+The others have what a frame costs as its pixels (a quarter, half, all of --size), its sub-pixels (1, 2 and 4 per axis), its \
+threads (a quarter, half, all of --threads) and its triangles (each split into 4 and 16) grow; ratio is the time over that of \
 the line above.
 
 All that is compared takes turns, frame by frame; times are medians.

@@ -17,9 +17,9 @@ Examples:
   threadlight bench stress --device swiftshader --json stress.json
   threadlight bench stress --all --only table --only lamps
 
-Materials, surfaces, light, views and pictures at the ends of what they may be, by fitted threads and by the paper's: 8 of them,
-64 x 48 pixels. With --all also what takes long, by all methods, and all once more under light so bright that pyramids are in
-single precision. Each pixel is compared with the CPU's form of the method, given the same surface. The exit code is 1 where a
+Materials, surfaces, light, views and pictures at the ends of what they may be, by the three methods that have threads, 8 of them, \
+64 x 48 pixels. With --all also what takes long, by all methods, and all once more under light so bright that pyramids are in \
+single precision. Each pixel is compared with the CPU's form of the method, given the same surface. The exit code is 1 where a \
 pixel is NaN or infinite, its display value is not that of its radiance, or the RMS is above its bound.
 
 The JSON is a list of rows with these fields, in this order:
@@ -36,7 +36,7 @@ The JSON is a list of rows with these fields, in this order:
 pub struct BenchStress {
     #[command(flatten)]
     machine: MachineFlags,
-    /// All cases, by all methods, with pyramids in both of their formats: takes many minutes on a CPU.
+    /// All cases, by all methods, with pyramids in both of their formats: takes more than an hour on a CPU.
     #[arg(long)]
     all: bool,
     /// Only the cases whose names have this in them, or another TEXT of another --only.

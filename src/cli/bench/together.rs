@@ -20,7 +20,7 @@ Examples:
   threadlight bench together
   threadlight bench together --materials alumina-oxide.binary,nickel.binary,gold --environments lebombo.hdr --json together.json
 
-The picture has a sphere of each material. It is compared with the same picture of each material alone, all spheres of that: with the
+The picture has a sphere of each material. It is compared with the same picture of each material alone, all spheres of that: with the \
 mean of these. All pictures take turns; times are medians.
 
 The JSON is a list of rows with these fields, in this order:
