@@ -7,6 +7,9 @@ use super::cases::Shard;
 use super::sweep::Settings;
 use crate::error::{Error, Result};
 
+/// Which part a row is of, and how many combinations of materials and environments all parts have, if that is known.
+type Part = (Shard, Option<usize>);
+
 /// All rows of `files`, in their order, as those of a whole sweep.
 ///
 /// # Errors
@@ -16,8 +19,8 @@ pub fn merged<'a>(files: impl IntoIterator<Item = (&'a Path, Vec<Row>)>) -> Resu
     // The first file of each scene with its settings, and the file of each row.
     let mut scenes: HashMap<String, (&Path, Option<Settings>)> = HashMap::new();
     let mut known: HashMap<([String; 4], u32), &Path> = HashMap::new();
-    // Of each method and count on each scene, and of so many parts: the part of each row, and how many combinations all have.
-    let mut parts: BTreeMap<(String, u32, String, usize), Vec<(Shard, Option<usize>)>> = BTreeMap::new();
+    // The rows of each method and count on each scene, and of so many parts.
+    let mut parts: BTreeMap<(String, u32, String, usize), Vec<Part>> = BTreeMap::new();
     let mut all = Vec::new();
     for (path, rows) in files {
         for row in rows {
