@@ -1,4 +1,5 @@
 //! The scene file: TOML to and from [`Scene`], with errors that name file, line and key.
+use std::collections::HashSet;
 use std::ops::RangeBounds;
 use std::path::{Path, PathBuf};
 
@@ -144,28 +145,33 @@ fn parse(text: &str, base_dir: &Path) -> Result<Scene, String> {
         materials: Vec::new(),
         objects: Vec::new(),
     };
+    let mut names = HashSet::new();
     for table in file.material {
-        let line = quote_line(text, table.span().start);
-        let material = material(table.into_inner()).map_err(|problem| format!("{line}: {problem}"))?;
-        if scene.materials.iter().any(|other| other.name == material.name) {
-            return Err(format!("{line}: there are two materials with `name` \"{}\"", material.name));
+        let at = table.span().start;
+        // Lines are counted for errors only: a scene may have tens of thousands of tables.
+        let in_line = |problem: String| format!("{}: {problem}", quote_line(text, at));
+        let material = material(table.into_inner()).map_err(in_line)?;
+        if !names.insert(material.name.clone()) {
+            return Err(in_line(format!("there are two materials with `name` \"{}\"", material.name)));
         }
         scene.materials.push(material);
     }
     if scene.materials.is_empty() {
         scene.materials = Scene::default().materials;
+        names.extend(scene.materials.iter().map(|material| material.name.clone()));
     }
     let first_material = scene.materials.first().map_or(DEFAULT_MATERIAL, |material| &material.name).to_owned();
     for keys in file.object {
-        let line = quote_line(text, keys.span().start);
-        let object = object(keys.into_inner(), &first_material).map_err(|problem| format!("{line}: {problem}"))?;
-        if scene.materials.iter().all(|material| material.name != object.material) {
+        let at = keys.span().start;
+        let in_line = |problem: String| format!("{}: {problem}", quote_line(text, at));
+        let object = object(keys.into_inner(), &first_material).map_err(in_line)?;
+        if !names.contains(&object.material) {
             let names: Vec<_> = scene.materials.iter().map(|material| material.name.as_str()).collect();
-            return Err(format!(
-                "{line}: the object's `material` \"{}\" is not among the scene's: {}",
+            return Err(in_line(format!(
+                "the object's `material` \"{}\" is not among the scene's: {}",
                 object.material,
                 names.join(", ")
-            ));
+            )));
         }
         scene.objects.push(object);
     }
