@@ -3,10 +3,10 @@ use super::number;
 use anyhow::Context;
 use std::io::Write;
 use std::path::PathBuf;
+use threadlight::Result;
 use threadlight::low_level::evaluate::{Comparable, Display, Metrics, compare, difference_picture};
-use threadlight::low_level::output::{self, Format};
+use threadlight::low_level::output;
 use threadlight::low_level::scene::{EXPOSURE, GAMMA};
-use threadlight::{Error, Result};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -49,10 +49,7 @@ pub struct Compare {
 impl Compare {
     pub fn run(self) -> anyhow::Result<()> {
         if let Some(path) = &self.difference {
-            if Format::of(path)? != Format::Png {
-                return Err(Error::in_file(path, "is no PNG", "end its name in .png").into());
-            }
-            output::check_writable(path)?;
+            output::check_writable_png(path)?;
         }
         let display = Display { exposure: self.exposure, gamma: self.gamma };
         let read = |path| -> Result<_> { Ok(Comparable::from_picture(&output::read_image(path)?, display)) };

@@ -103,8 +103,9 @@ fn gather(environment: &Environment, observer: &dyn Observer) -> Result<Vec<Cell
     // In so many parts, summed in their order: the same on any number of cores.
     const PARTS: usize = 16;
     // At least 2: radiance is bilinear between the centres of pixels, so these alone would not tell how wide it is.
-    let times = FEWEST_COLUMNS.div_ceil(environment.width.min(2 * environment.height)).max(2);
-    let rows = times * environment.height;
+    let times = |pixels: usize, fewest: usize| fewest.div_ceil(pixels).max(2);
+    let times = [times(environment.width, FEWEST_COLUMNS), times(environment.height, FEWEST_COLUMNS / 2)];
+    let rows = times[1] * environment.height;
     let part = |part: usize| gather_rows(environment, times, part * rows / PARTS..(part + 1) * rows / PARTS, observer);
     let parts: Vec<_> = (0..PARTS).into_par_iter().map(part).collect::<Result<_>>()?;
     let cell = |index: usize| {
@@ -122,21 +123,22 @@ fn gather(environment: &Environment, observer: &dyn Observer) -> Result<Vec<Cell
     Ok((0..6 * CELLS_SIZE * CELLS_SIZE).map(cell).collect())
 }
 
-/// That of these rows of pixels, each divided into `times` along both axes; means are yet to be divided by their weights.
+/// That of these rows of pixels, each divided into `times` along its two axes; means are yet to be divided by their weights.
 fn gather_rows(
     environment: &Environment,
-    times: usize,
+    times: [usize; 2],
     rows: Range<usize>,
     observer: &dyn Observer,
 ) -> Result<Vec<Cell>> {
     let mut cells = vec![Cell::default(); 6 * CELLS_SIZE * CELLS_SIZE];
-    let edge = |row: usize| (std::f64::consts::PI * row as f64 / (times * environment.height) as f64).cos();
+    let edge = |row: usize| (std::f64::consts::PI * row as f64 / (times[1] * environment.height) as f64).cos();
     for row in rows {
         observer.check()?;
-        let solid_angle = std::f64::consts::TAU / (times * environment.width) as f64 * (edge(row) - edge(row + 1));
-        for column in 0..times * environment.width {
-            let place = |index: usize| (index as f64 + 0.5) / times as f64 - 0.5;
-            let direction = environment.direction(place(column), place(row));
+        let solid_angle = std::f64::consts::TAU / (times[0] * environment.width) as f64 * (edge(row) - edge(row + 1));
+        for column in 0..times[0] * environment.width {
+            let [column, row] =
+                [(column, times[0]), (row, times[1])].map(|(i, times)| (i as f64 + 0.5) / times as f64 - 0.5);
+            let direction = environment.direction(column, row);
             let light = (solid_angle * environment.radiance(direction)).as_vec3();
             let (face, s, t) = face_of(direction);
             let index = |x: f64| ((x * CELLS_SIZE as f64) as usize).min(CELLS_SIZE - 1);
@@ -160,7 +162,7 @@ mod tests {
 
     #[test]
     fn a_constant_stays_as_it_is_however_few_pixels_it_has() {
-        for (width, height) in [(1, 1), (3, 2), (64, 32)] {
+        for (width, height) in [(1, 1), (3, 2), (64, 32), (1, 300), (300, 1)] {
             let map = environment(width, height, |_, _| [1.0, 0.1, 7.0]);
             let irradiance = irradiance_map(&map, &()).unwrap();
             for texel in &irradiance.levels[0] {

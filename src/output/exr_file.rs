@@ -6,8 +6,8 @@ use std::path::Path;
 use exr::meta::attribute::{AttributeValue, Chromaticities, Text};
 use exr::meta::{BlockDescription, MetaData};
 use exr::prelude::{
-    AnyChannel, AnyChannels, Encoding, FlatImage, FlatSamples, Image, Layer, LayerAttributes, ReadChannels, ReadLayers,
-    Vec2, WritableImage,
+    AnyChannel, AnyChannels, Encoding, FlatImage, FlatSamples, Image, IntegerBounds, Layer, LayerAttributes,
+    ReadChannels, ReadLayers, Vec2, WritableImage,
 };
 
 use super::{Format, PictureFile, check_pixels, write_whole};
@@ -128,7 +128,8 @@ fn sort_attributes(bytes: &mut [u8]) {
 }
 
 /// Reads an EXR: the first layer with channels R, G and B (perhaps with a common prefix, such as `beauty.R`), or with
-/// only Y, which then stands for all three. Half, float and integer samples, any compression that the crate knows.
+/// only Y, which then stands for all three. Half, float and integer samples, any compression that the crate knows. The picture is what
+/// the display window shows: black, and transparent if there is alpha, where the layer has no data.
 pub fn parse_exr(path: &Path, bytes: &[u8]) -> Result<PictureFile> {
     let broken = |cause: exr::error::Error| {
         Error::in_file(
@@ -147,6 +148,8 @@ pub fn parse_exr(path: &Path, bytes: &[u8]) -> Result<PictureFile> {
         };
         std::iter::repeat_n(area(header.layer_size).max(tile) as u64, header.channels.list.len().max(1))
     });
+    let shown = meta.headers.first().map_or(0, |header| area(header.shared_attributes.display_window.size));
+    let samples = samples.chain(std::iter::repeat_n(shown as u64, 4));
     check_pixels(path, samples, bytes.len(), MAX_SAMPLES_PER_BYTE)?;
     let image: FlatImage = exr::prelude::read()
         .no_deep_data()
@@ -175,14 +178,38 @@ pub fn parse_exr(path: &Path, bytes: &[u8]) -> Result<PictureFile> {
             rgba.iter_mut().zip(channel.sample_data.values_as_f32()).for_each(|(pixel, value)| pixel[index] = value);
         }
     }
+    let window = image.attributes.display_window;
+    let alpha = find_channel(layer, &prefix, "A").is_some();
     Ok(PictureFile {
-        width: layer.size.0 as u32,
-        height: layer.size.1 as u32,
-        rgba,
-        alpha: find_channel(layer, &prefix, "A").is_some(),
+        width: window.size.0 as u32,
+        height: window.size.1 as u32,
+        rgba: within(window, layer, rgba, [0.0, 0.0, 0.0, if alpha { 0.0 } else { 1.0 }]),
+        alpha,
         format: Format::Exr,
         attributes: attribute_texts(&image, layer),
     })
+}
+
+/// `pixels` of `layer` where `window` shows them, `nothing` where it has none.
+fn within(window: IntegerBounds, layer: &FlatLayer, pixels: Vec<[f32; 4]>, nothing: [f32; 4]) -> Vec<[f32; 4]> {
+    let at = layer.attributes.layer_position;
+    if (at, layer.size) == (window.position, window.size) {
+        return pixels;
+    }
+    let Vec2(width, height) = window.size;
+    let place = |index: usize, window: i32, layer: i32, size: usize| {
+        usize::try_from(index as i64 + i64::from(window) - i64::from(layer)).ok().filter(|place| *place < size)
+    };
+    let mut shown = vec![nothing; width * height];
+    for (row, shown) in shown.chunks_exact_mut(width.max(1)).enumerate() {
+        let Some(y) = place(row, window.position.1, at.1, layer.size.1) else { continue };
+        for (column, pixel) in shown.iter_mut().enumerate() {
+            if let Some(x) = place(column, window.position.0, at.0, layer.size.0) {
+                *pixel = pixels[y * layer.size.0 + x];
+            }
+        }
+    }
+    shown
 }
 
 type FlatLayer = Layer<AnyChannels<FlatSamples>>;
@@ -225,4 +252,38 @@ fn attribute_texts(image: &FlatImage, layer: &FlatLayer) -> BTreeMap<String, Str
         Some((name.to_string(), value))
     })
     .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use exr::prelude::SpecificChannels;
+
+    /// The picture that an EXR of 2 x 1 pixels, the first at (3, -1), shows in a window of this place and size.
+    fn shown(position: (i32, i32), size: (usize, usize)) -> PictureFile {
+        let attributes = LayerAttributes { layer_position: Vec2(3, -1), ..LayerAttributes::default() };
+        let colours = SpecificChannels::rgba(|Vec2(x, _): Vec2<usize>| (1.0 + x as f32, 0.5, 0.25, 0.75_f32));
+        let layer = Layer::new((2, 1), attributes, Encoding::UNCOMPRESSED, colours);
+        let mut image = Image::from_layer(layer);
+        image.attributes.display_window = IntegerBounds::new(position, size);
+        let mut bytes = Cursor::new(Vec::new());
+        image.write().to_buffered(&mut bytes).unwrap();
+        parse_exr(Path::new("test.exr"), &bytes.into_inner()).unwrap()
+    }
+
+    #[test]
+    fn a_picture_is_what_its_display_window_shows() {
+        let [first, second, nothing] = [[1.0, 0.5, 0.25, 0.75], [2.0, 0.5, 0.25, 0.75], [0.0; 4]];
+        for (position, size, rgba) in [
+            ((3, -1), (2, 1), vec![first, second]),
+            ((2, -2), (3, 2), vec![nothing, nothing, nothing, nothing, first, second]),
+            ((4, -1), (1, 1), vec![second]),
+            ((4, -1), (2, 1), vec![second, nothing]),
+            ((-5, 7), (2, 1), vec![nothing; 2]),
+        ] {
+            let picture = shown(position, size);
+            assert_eq!((picture.width as usize, picture.height as usize), size);
+            assert_eq!(picture.rgba, rgba, "{position:?} {size:?}");
+        }
+    }
 }

@@ -35,6 +35,14 @@ impl Format {
     }
 }
 
+/// [`check_writable`] of a PNG.
+pub fn check_writable_png(path: &Path) -> Result<()> {
+    if Format::of(path)? != Format::Png {
+        return Err(Error::in_file(path, "is no PNG", "end its name in .png"));
+    }
+    check_writable(path)
+}
+
 /// A picture as read from a file, row by row from the top left.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PictureFile {

@@ -42,17 +42,28 @@ impl BackgroundMap {
     pub fn new(device: &Arc<Device>, environment: &Environment) -> Result<Self> {
         let remedy = "scale it down, or leave the background out with --background none";
         check_map_size(device, environment, [environment.width, environment.height], remedy)?;
-        // A sun as bright as the largest half float is white on any display, so here, unlike in shading, it is cut off.
-        let texel = |rgb: &[f32; 3]| [rgb[0], rgb[1], rgb[2], 1.0].map(|value| f16::from_f32(value.min(65504.0)));
-        let texels: Vec<[f16; 4]> = environment.texels.iter().map(texel).collect();
+        let texels = environment.texels.iter().map(|&[r, g, b]| [r, g, b, 1.0]);
+        let single = vk::Format::R32G32B32A32_SFLOAT;
+        let (format, bytes) = if !in_half_floats(environment) && device.filters_linearly(single) {
+            (single, bytemuck::cast_slice(&texels.collect::<Vec<[f32; 4]>>()).to_vec())
+        } else {
+            let half = |value: f32| f16::from_f32(value.min(f16::MAX.to_f32()));
+            let texels: Vec<[f16; 4]> = texels.map(|texel| texel.map(half)).collect();
+            (vk::Format::R16G16B16A16_SFLOAT, bytemuck::cast_slice(&texels).to_vec())
+        };
         let (width, height) = (environment.width as u32, environment.height as u32);
-        let shape = ImageShape::plane(vk::Format::R16G16B16A16_SFLOAT, width, height);
-        let bytes = bytemuck::cast_slice(&texels).to_vec();
+        let shape = ImageShape::plane(format, width, height);
         Ok(Self {
             image: vulkan::Image::with_texels(device, "environment map", shape, &[bytes])?,
             sampler: Sampler::new(device, "environment map", SamplerKind::WrappedLinear)?,
         })
     }
+}
+
+/// Whether half floats hold the brightest pixel, and with a thousandth of its precision what is a thousandth as bright.
+fn in_half_floats(environment: &Environment) -> bool {
+    let brightest = environment.texels.iter().flatten().copied().fold(0.0, f32::max);
+    brightest == 0.0 || (1e3 * f16::MIN_POSITIVE.to_f32()..=f16::MAX.to_f32()).contains(&brightest)
 }
 
 /// An error for a map of `environment`, of this width and height, if the device's images cannot be as large.

@@ -2,6 +2,8 @@
 use glam::{DMat4, DVec3, Mat4, dcamera};
 use serde::{Deserialize, Serialize};
 
+use super::three_numbers;
+
 /// Where the default view stands, seen from a unit sphere at the origin.
 const DEFAULT_EYE: DVec3 = DVec3::new(1.5, 1.0, 3.5);
 /// Vertical field of view of the default view.
@@ -25,10 +27,11 @@ pub struct Camera {
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct CameraKeys {
+    #[serde(deserialize_with = "three_numbers")]
     eye: DVec3,
-    #[serde(default)]
+    #[serde(default, deserialize_with = "three_numbers")]
     target: DVec3,
-    #[serde(default = "default_up")]
+    #[serde(default = "default_up", deserialize_with = "three_numbers")]
     up: DVec3,
     #[serde(default = "default_fov_y_deg")]
     fov_y_deg: f64,

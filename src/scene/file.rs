@@ -10,6 +10,7 @@ use toml::Spanned;
 use super::{
     Camera, DEFAULT_MATERIAL, EXPOSURE, EnvironmentSettings, GAMMA, INTENSITY, ImageSettings, MAX_SAMPLES, MAX_SIZE_PX,
     MAX_SUBPIXELS, MaterialSettings, MaterialSource, ObjectSettings, Scene, ShadingSettings, Source, TangentRule,
+    three_numbers,
 };
 use crate::brdf::{Brdf, change_base_files, resolve_base_files};
 use crate::error::{Error, Result};
@@ -320,7 +321,7 @@ fn scale<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f32, D::Error> {
 }
 
 fn finite_vector<'de, D: Deserializer<'de>>(deserializer: D) -> Result<[f32; 3], D::Error> {
-    let vector = <[f32; 3]>::deserialize(deserializer)?;
+    let vector: [f32; 3] = three_numbers(deserializer)?;
     if vector.iter().all(|value| value.is_finite()) {
         Ok(vector)
     } else {

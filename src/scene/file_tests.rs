@@ -244,3 +244,16 @@ fn errors_of_files_name_the_file() {
     std::fs::write(&path, "[environment]\nfile = 'x.hdr'").unwrap();
     assert_eq!(Scene::load(&path).unwrap().environment.source, Source::File(folder.path().join("x.hdr")));
 }
+
+#[test]
+fn vectors_have_three_numbers() {
+    for (text, count) in [
+        ("[camera]\neye = [0, 0, 5, 6]", 4),
+        ("[camera]\neye = [0, 0, 5]\nup = [0, 1]", 2),
+        ("[[object]]\nbuiltin = 'sphere'\ntranslate = [1, 2, 3, 4]", 4),
+        ("[[object]]\nbuiltin = 'sphere'\ntangent = { around = [0, 1, 0, 5] }", 4),
+    ] {
+        let error = error(text);
+        assert!(error.contains(&format!("invalid length {count}, expected three numbers")), "{text}: {error}");
+    }
+}

@@ -284,6 +284,12 @@ mod tests {
     }
 
     #[test]
+    fn a_byte_order_mark_is_no_part_of_the_first_word() {
+        let triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+        assert_eq!(load(format!("\u{feff}{triangle}")).unwrap(), load(triangle).unwrap());
+    }
+
+    #[test]
     fn groups_and_materials_do_not_cut_the_mesh() {
         let grouped = CUBE.replace("\nf 3", "\no lid\nusemtl red\nf 3");
         assert_eq!(load(grouped).unwrap(), load(CUBE).unwrap());

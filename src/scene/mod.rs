@@ -3,7 +3,8 @@ use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 use glam::{DMat3, DQuat, EulerRot, Mat4, Quat, Vec3};
-use serde::{Deserialize, Serialize};
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::brdf::{Brdf, Custom, base_files, base_files_of};
 use crate::file_format::file_formats;
@@ -24,6 +25,14 @@ pub use pattern::Pattern;
 pub use tangent_rule::TangentRule;
 
 file_formats!(Mesh: obj_file);
+
+/// A vector of three numbers, no fewer and no more: serde drops those after the third.
+fn three_numbers<'de, T: Deserialize<'de>, V: From<[T; 3]>, D: Deserializer<'de>>(from: D) -> Result<V, D::Error> {
+    let numbers = Vec::<T>::deserialize(from)?;
+    let count = numbers.len();
+    let three = <[T; 3]>::try_from(numbers).map_err(|_| D::Error::invalid_length(count, &"three numbers"))?;
+    Ok(V::from(three))
+}
 
 /// The built-in material of an object that names none in a scene without materials.
 pub const DEFAULT_MATERIAL: &str = "gold";

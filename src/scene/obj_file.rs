@@ -38,7 +38,9 @@ fn parse_textured(path: &Path, bytes: &[u8]) -> Result<TexturedMesh> {
 /// faces that share the position takes its place, weighted by their angles there. Degenerate triangles are dropped.
 fn parse_parts(path: &Path, bytes: &[u8], is_textured: bool) -> Result<TexturedMesh> {
     // Names in old files are in any encoding; the numbers are ASCII in all of them.
-    let obj = read_obj(&String::from_utf8_lossy(bytes), is_textured)
+    let text = String::from_utf8_lossy(bytes);
+    // Some editors put a byte order mark first, which would be part of the first word.
+    let obj = read_obj(text.trim_start_matches('\u{feff}'), is_textured)
         .map_err(|problem| Error::in_file(path, problem, "repair or export it again"))?;
     let (textured, dropped) = clean(&obj);
     let mesh = &textured.mesh;

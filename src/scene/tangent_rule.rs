@@ -2,6 +2,8 @@
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
+use super::three_numbers;
+
 /// Which way tangents go on an object, in its own space before it is scaled and turned.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase", try_from = "RawRule")]
@@ -40,8 +42,8 @@ impl TangentRule {
 #[derive(Deserialize)]
 #[serde(rename_all = "lowercase")]
 enum RawRule {
-    Around([f32; 3]),
-    Along([f32; 3]),
+    Around(#[serde(deserialize_with = "three_numbers")] [f32; 3]),
+    Along(#[serde(deserialize_with = "three_numbers")] [f32; 3]),
     Uv,
 }
 

@@ -52,6 +52,10 @@ impl DeviceDescription {
     /// Whether `--device asked` means this device: its index, or part of its name or its driver's, in any case.
     pub(super) fn answers_to(&self, asked: &str) -> bool {
         let asked = asked.to_lowercase();
+        // It is a part of every name.
+        if asked.is_empty() {
+            return false;
+        }
         match asked.parse::<usize>() {
             Ok(index) => index == self.index,
             Err(_) => {

@@ -74,7 +74,7 @@ impl CasesArguments {
         let materials = if self.materials.is_empty() { &by_default } else { &self.materials };
         let scenes = named("--scene", &self.scene)?;
         let size = self.size.or(defaults.size);
-        Ok(Cases {
+        let cases = Cases {
             methods: once("--methods", methods)?,
             counts: once("--counts", counts)?,
             materials: named_materials("--materials", materials)?,
@@ -85,7 +85,13 @@ impl CasesArguments {
                 .collect::<Result<_>>()?,
             seed: self.seed,
             shard: Shard::WHOLE,
-        })
+        };
+        if cases.estimators().is_empty() {
+            let most = |variant: &Variant| format!("{} has at most {}", variant.name(), variant.method.max_count(1));
+            let remedy = cases.methods.iter().map(most).collect::<Vec<_>>().join(", ");
+            return Err(Error::input("--counts", "has none that these methods can have", remedy));
+        }
+        Ok(cases)
     }
 
     /// What measurements ask for what they need.

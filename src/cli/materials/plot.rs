@@ -2,6 +2,7 @@
 use super::Named;
 use crate::cli::stem;
 use std::path::{Path, PathBuf};
+use threadlight::Error;
 use threadlight::low_level::evaluate::material_plot;
 use threadlight::low_level::output;
 
@@ -19,6 +20,9 @@ pub struct Plot {
 
 impl Plot {
     pub fn run(self) -> anyhow::Result<()> {
+        if self.output.extension().is_none_or(|extension| !extension.eq_ignore_ascii_case("svg")) {
+            return Err(Error::in_file(&self.output, "is no SVG", "end its name in .svg").into());
+        }
         output::check_writable(&self.output)?;
         let name = stem(Path::new(&self.named.material));
         let svg = material_plot::svg(&*self.named.load()?, &name, &self.output)?;
