@@ -14,8 +14,8 @@
 //!   Micro-Facet Surfaces", 2007). Their formula is without 1/n^2, by which radiance falls where its cone widens; then energy does not
 //!   add up.
 //! - The rest is light that the inside of the coat sends back to the base, once or often: all that is beyond the critical angle, and 1 - T of the
-//!   rest. Its energy from each angle is that of all orders for isotropic bases, less 0.5 %: `interreflection.rs` sums them in the mean over azimuth. For a
-//!   diffuse base that is Saunderson's correction (1942), f = T_i T_o reflectance / (n^2 pi (1 - reflectance r)), r the coat's reflectance
+//!   rest. Its energy from each angle is that of all orders for isotropic bases, less 0.5 %: `interreflection.rs` sums them in the mean over
+//!   azimuth. For a diffuse base that is Saunderson's correction (1942), f = T_i T_o reflectance / (n^2 pi (1 - reflectance r)), r the coat's reflectance
 //!   for diffuse light from within. What is lost is the direction. In the mirror direction the sum says by which factor later light raises the
 //!   lobe: that is 1 + k k. What then lacks leaves evenly: h_i h_o / N, with N such that the integral is what lacks, in the manner of Kulla and
 //!   Conty (2017). Both are exact for a diffuse base and for a mirror; between them a lobe of later light is taken for the base's

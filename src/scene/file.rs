@@ -148,10 +148,8 @@ fn parse(text: &str, base_dir: &Path) -> Result<Scene, String> {
     };
     let mut names = HashSet::new();
     for table in file.material {
-        let at = table.span().start;
-        // Lines are counted for errors only: a scene may have tens of thousands of tables.
-        let in_line = |problem: String| format!("{}: {problem}", quote_line(text, at));
-        let material = material(table.into_inner()).map_err(in_line)?;
+        let in_line = in_line(text, table.span().start);
+        let material = material(table.into_inner()).map_err(&in_line)?;
         if !names.insert(material.name.clone()) {
             return Err(in_line(format!("there are two materials with `name` \"{}\"", material.name)));
         }
@@ -163,9 +161,8 @@ fn parse(text: &str, base_dir: &Path) -> Result<Scene, String> {
     }
     let first_material = scene.materials.first().map_or(DEFAULT_MATERIAL, |material| &material.name).to_owned();
     for keys in file.object {
-        let at = keys.span().start;
-        let in_line = |problem: String| format!("{}: {problem}", quote_line(text, at));
-        let object = object(keys.into_inner(), &first_material).map_err(in_line)?;
+        let in_line = in_line(text, keys.span().start);
+        let object = object(keys.into_inner(), &first_material).map_err(&in_line)?;
         if !names.contains(&object.material) {
             let names: Vec<_> = scene.materials.iter().map(|material| material.name.as_str()).collect();
             return Err(in_line(format!(
@@ -200,6 +197,12 @@ fn parse(text: &str, base_dir: &Path) -> Result<Scene, String> {
         }
     }
     Ok(scene)
+}
+
+/// Says of a problem in which line of `text` it is, that of the byte at `position`. Lines are counted for errors only: a scene may have tens of
+/// thousands of tables.
+fn in_line(text: &str, position: usize) -> impl Fn(String) -> String {
+    move |problem| format!("{}: {problem}", quote_line(text, position))
 }
 
 /// "line 7 (`width = 0`)" for the line of `text` that holds the byte at `position`.

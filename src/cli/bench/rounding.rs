@@ -16,7 +16,7 @@ Examples:
 
 The CPU's form of a method shades the same surfaces without a rounding and with it. Fractions: lookups in cube maps blend texels and \
 levels by so many bits; Vulkan promises 4, and 8 are usual. Light in half floats: cube maps hold these. A step off: all numbers of the \
-normals, or of fitted threads, are the next ones that their 16 bits have; to round to the nearest is 1/sqrt(12) of that, RMS. Sums backwards:
+normals, or of fitted threads, are the next ones that their 16 bits have; to round to the nearest is 1/sqrt(12) of that, RMS. Sums backwards: \
 from the last thread to the first. The device: its own picture, with all that it does.
 
 The JSON is a list of rows with these fields, in this order:
