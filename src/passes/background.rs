@@ -60,7 +60,7 @@ impl BackgroundMap {
     }
 }
 
-/// Whether half floats hold the brightest pixel, and with a thousandth of its precision what is a thousandth as bright.
+/// Whether half floats hold the brightest pixel, and in their full precision what is a thousandth as bright.
 fn in_half_floats(environment: &Environment) -> bool {
     let brightest = environment.texels.iter().flatten().copied().fold(0.0, f32::max);
     brightest == 0.0 || (1e3 * f16::MIN_POSITIVE.to_f32()..=f16::MAX.to_f32()).contains(&brightest)
