@@ -232,7 +232,7 @@ mod tests {
         assert_eq!(custom.evaluate(w_i, w_o), wrapped.evaluate(w_i, w_o));
         assert_eq!(custom.evaluate(-w_i, w_o), DVec3::ZERO);
         assert_eq!(half_vector_width(&custom), half_vector_width(&wrapped));
-        assert_eq!(lobe_radius(&custom), lobe_radius(&wrapped));
+        assert_eq!(lobe_radius(&custom, 0.0), lobe_radius(&wrapped, 0.0));
         assert_ne!(custom.fingerprint(), Brdf::custom(Wrapped(ggx(0.2))).fingerprint());
         assert_eq!(custom.fingerprint(), Brdf::custom(Wrapped(ggx(0.1))).fingerprint());
     }
@@ -250,7 +250,7 @@ mod tests {
                 .iter()
                 .all(|texel| texel[..3].iter().all(|value| value.to_f32() == 0.0))
         );
-        assert_eq!((half_vector_width(&brdf), lobe_radius(&brdf)), (FRAC_PI_2, FRAC_PI_2));
+        assert_eq!((half_vector_width(&brdf), lobe_radius(&brdf, 0.0)), (FRAC_PI_2, FRAC_PI_2));
         let brdf = Brdf::custom(Constant(dvec3(0.1, f64::NAN, 0.3)));
         let table = tabulate(&brdf).0;
         assert!((table.evaluate(DVec3::Z, DVec3::Z) - dvec3(0.1, 0.0, 0.3)).abs().max_element() < 1e-7);

@@ -86,7 +86,7 @@ impl Interreflection {
 
     fn over_any(base: &Brdf, coat: &Coat, interface: &Interface) -> Self {
         let angles = Angles::new(coat);
-        let width = half_vector_width(base).min(lobe_radius(base));
+        let width = half_vector_width(base).min(lobe_radius(base, 0.0));
         let shares: Vec<Shares> = (0..angles.count())
             .into_par_iter()
             .map(|i| Shares::seen_from(&angles, angles.cos_inside(i), base, coat, interface, width))

@@ -1,7 +1,7 @@
 //! How narrow a BRDF's lobe is, and along which axis.
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use glam::{DVec2, DVec3};
+use glam::DVec2;
 
 use super::Brdf;
 
@@ -24,14 +24,15 @@ const LEAST_RISE: f64 = 0.1;
 
 /// The angle of the half vector to the normal from which f, as far as it is above its least value, falls to less than half at twice the
 /// angle: nearer to the normal there is but a plateau, or a cusp of little energy. A right angle if there is no such lobe. In radians.
-/// Seen along the normal; of an anisotropic BRDF the least over azimuths of the half vector.
-pub fn lobe_radius(brdf: &Brdf) -> f64 {
-    azimuths(brdf.is_isotropic()).map(|azimuth| lobe_radius_along(brdf, azimuth)).fold(FRAC_PI_2, f64::min)
+/// Seen from `theta_o` (radians), with half vectors across the plane of incidence; of an anisotropic BRDF the least over their azimuths.
+pub fn lobe_radius(brdf: &Brdf, theta_o: f64) -> f64 {
+    azimuths(brdf.is_isotropic()).map(|azimuth| lobe_radius_along(brdf, theta_o, azimuth)).fold(FRAC_PI_2, f64::min)
 }
 
-fn lobe_radius_along(brdf: &Brdf, azimuth: DVec2) -> f64 {
-    let least = angles().map(|angle| profile(brdf, azimuth, angle)).fold(f64::INFINITY, f64::min).max(0.0);
-    let rise = |angle: f64| profile(brdf, azimuth, angle) - least;
+fn lobe_radius_along(brdf: &Brdf, theta_o: f64, azimuth: DVec2) -> f64 {
+    let profile = |angle: f64| profile(brdf, theta_o, azimuth, angle);
+    let least = angles().map(profile).fold(f64::INFINITY, f64::min).max(0.0);
+    let rise = |angle: f64| profile(angle) - least;
     // Beyond 45 degrees f is 0, which is no lobe.
     first_angle(|angle| {
         2.0 * angle < 0.5 * FRAC_PI_2 && rise(angle) > LEAST_RISE * least && rise(angle) > 2.0 * rise(2.0 * angle)
@@ -84,8 +85,8 @@ fn exact_width(brdf: &Brdf, azimuth: DVec2) -> f64 {
 }
 
 fn is_off_peak(brdf: &Brdf, azimuth: DVec2, angle: f64) -> bool {
-    let peak = profile(brdf, azimuth, 0.0);
-    (profile(brdf, azimuth, angle) - peak).abs() > 0.25 * peak
+    let peak = profile(brdf, 0.0, azimuth, 0.0);
+    (profile(brdf, 0.0, azimuth, angle) - peak).abs() > 0.25 * peak
 }
 
 /// Azimuths of half vectors at which to look for a lobe: any one will do if the BRDF is isotropic. Lobes are long towards few azimuths and
@@ -95,10 +96,11 @@ fn azimuths(is_isotropic: bool) -> impl Iterator<Item = DVec2> {
     (0..count).map(move |i| DVec2::from_angle(2.0 * PI * f64::from(i) / f64::from(count)).rotate(DVec2::Y))
 }
 
-/// f, summed over channels, where the half vector is at `theta_h` to the normal.
-fn profile(brdf: &Brdf, azimuth: DVec2, theta_h: f64) -> f64 {
-    let theta_i = 2.0 * theta_h;
-    brdf.evaluate((azimuth * theta_i.sin()).extend(theta_i.cos()), DVec3::Z).element_sum()
+/// f, summed over channels, seen from `theta_o`, where the half vector is at `theta_h` to the normal, across the plane of incidence.
+fn profile(brdf: &Brdf, theta_o: f64, azimuth: DVec2, theta_h: f64) -> f64 {
+    let w_o = (-azimuth.perp() * theta_o.sin()).extend(theta_o.cos());
+    let half_vector = (azimuth * theta_h.sin()).extend(theta_h.cos());
+    brdf.evaluate(2.0 * w_o.dot(half_vector) * half_vector - w_o, w_o).element_sum()
 }
 
 /// The ratio of one angle to the next.
@@ -124,16 +126,16 @@ mod tests {
         for (alpha, distribution) in [(0.001, "ggx"), (0.02, "beckmann"), (0.2, "ggx")] {
             let parameters = format!("distribution = '{distribution}'\nalpha = {alpha}\neta = 0.2\nk = 3.9");
             let brdf = Brdf::from_parameters("conductor", parameters.parse().unwrap()).unwrap();
-            for width in [half_vector_width(&brdf), lobe_radius(&brdf)] {
+            for width in [half_vector_width(&brdf), lobe_radius(&brdf, 0.0), lobe_radius(&brdf, 1.5)] {
                 assert!((0.3..1.0).contains(&(width / alpha)), "{distribution} {alpha}: {width}");
             }
         }
         // A lobe is found however much light is scattered beside it.
         let parameters = "distribution = 'ggx'\nalpha = 0.05\nior = 1.5\ndiffuse = 0.9";
-        let plastic = lobe_radius(&Brdf::from_parameters("plastic", parameters.parse().unwrap()).unwrap());
+        let plastic = lobe_radius(&Brdf::from_parameters("plastic", parameters.parse().unwrap()).unwrap(), 0.0);
         assert!((0.3..1.0).contains(&(plastic / 0.05)), "{plastic}");
         let lambert = Brdf::from_parameters("lambert", "reflectance = 0.5".parse().unwrap()).unwrap();
-        assert_eq!((half_vector_width(&lambert), lobe_radius(&lambert)), (FRAC_PI_2, FRAC_PI_2));
+        assert_eq!((half_vector_width(&lambert), lobe_radius(&lambert, 0.0)), (FRAC_PI_2, FRAC_PI_2));
     }
 
     #[test]
@@ -147,7 +149,7 @@ mod tests {
                 let stretched =
                     brdf(format!("alpha_x = {alpha_x}\nalpha_y = {alpha_y}\nrotation_deg = {rotation_deg}"));
                 let round = brdf(format!("alpha = {}", f64::min(alpha_x, alpha_y)));
-                for width in [half_vector_width, lobe_radius] {
+                for width in [half_vector_width, |brdf: &_| lobe_radius(brdf, 0.0)] {
                     let ratio = width(&stretched) / width(&round);
                     // One step of the angles that are tried.
                     assert!((0.79..1.26).contains(&ratio), "{alpha_x} {alpha_y} {rotation_deg}: {ratio}");

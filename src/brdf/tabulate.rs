@@ -33,7 +33,7 @@ pub fn tabulate(brdf: &Brdf) -> (Brdf, f64) {
     let lobe = LobeShape::of(brdf);
     // tan(theta_h / 2) is half of theta_h, and half of the width is where f is within a tenth or so of its peak.
     let knee_of = |width: f64| (0.25 * width).clamp(1e-4, 1.0);
-    let knee = knee_of(lobe.width_rad.min(lobe_radius(brdf)));
+    let knee = knee_of(lobe.width_rad.min(lobe_radius(brdf, 0.0)));
     let f = |w_i: DVec3, w_o: DVec3| brdf.evaluate(w_i, w_o);
     let azimuths = if lobe.is_isotropic { &AZIMUTH_DEG[..1] } else { &AZIMUTH_DEG[..] };
     let views =

@@ -3,7 +3,8 @@ use glam::{DMat3, DVec3, dvec3};
 
 use super::cubature::Cubature;
 use super::light::{CellPlace, Light};
-use crate::brdf::{Brdf, MIN_COS_THETA_D, lobe_radius};
+use super::lobe::Lobe;
+use crate::brdf::Brdf;
 use crate::environment::Environment;
 use crate::evaluate::metrics::Display;
 use crate::progress::Observer;
@@ -67,17 +68,6 @@ impl Point {
             sums[place] += f * w_i.z;
         }
     }
-
-    /// Whether a lobe whose half vectors are within `radius` (radians) of the normal may hide between the nodes of a cell, which are
-    /// half an edge apart: the cell holds the mirror direction, or nearly so, and is wider than the lobe.
-    fn may_hide_lobe(&self, radius: f64, place: CellPlace) -> bool {
-        let w_i = self.frame.transpose() * place.middle();
-        let mirror = dvec3(-self.w_o.x, -self.w_o.y, self.w_o.z);
-        // Reflection doubles angles, but across the plane of incidence shrinks them by the cosine. Beyond its bound cells are small enough to
-        // find part of a lobe, and what is found is split like all else.
-        let narrow = 2.0 * radius * self.w_o.z.max(MIN_COS_THETA_D);
-        place.side() > narrow && w_i.distance(mirror) < place.side()
-    }
 }
 
 /// The radiance of a pixel and what is known of its error.
@@ -105,8 +95,7 @@ impl Display {
 pub struct Integrator<'a> {
     light: Light<'a>,
     intensity: f64,
-    /// With the radii of their lobes.
-    brdfs: Vec<(&'a Brdf, f64)>,
+    brdfs: Vec<(&'a Brdf, Lobe)>,
     pub(super) subpixels: usize,
 }
 
@@ -118,7 +107,7 @@ impl<'a> Integrator<'a> {
         brdfs: impl IntoIterator<Item = &'a Brdf>,
         subpixels: u32,
     ) -> Self {
-        let brdfs = brdfs.into_iter().map(|brdf| (brdf, lobe_radius(brdf))).collect();
+        let brdfs = brdfs.into_iter().map(|brdf| (brdf, Lobe::of(brdf))).collect();
         Self { light: Light::new(environment), intensity, brdfs, subpixels: (subpixels * subpixels) as usize }
     }
 
@@ -144,7 +133,14 @@ impl<'a> Integrator<'a> {
             points.iter().for_each(|point| point.add_f_cos(self.brdfs[point.material].0, directions, &mut sums));
             sums
         };
-        let must_split = |place| points.iter().any(|point| point.may_hide_lobe(self.brdfs[point.material].1, place));
+        let lobes: Vec<_> = points.iter().map(|point| self.brdfs[point.material].1.seen_from(point.w_o)).collect();
+        let must_split = |place: CellPlace| {
+            let (middle, half_edges) = (place.middle(), place.half_edges());
+            points.iter().zip(&lobes).any(|(point, lobe)| {
+                let to_local = point.frame.transpose();
+                lobe.may_hide(to_local * middle, half_edges.map(|edge| to_local * edge))
+            })
+        };
         let mut cubature = Cubature::new(&self.light, f_cos, must_split);
         let scale = self.intensity / self.subpixels as f64;
         for split in 1.. {

@@ -54,8 +54,23 @@ impl CellPlace {
 
     /// The direction in the middle.
     pub fn middle(self) -> DVec3 {
-        let [phi, theta] = [self.column, self.row].map(|index| (f64::from(index) + 0.5) * self.side());
+        let [phi, theta] = self.middle_angles();
         DVec3::new(theta.sin() * phi.sin(), theta.cos(), -theta.sin() * phi.cos())
+    }
+
+    /// From the middle to that of an edge of constant phi, whichever is longer of the two edges' ends taken for its length, and to that
+    /// of an edge of constant theta.
+    pub fn half_edges(self) -> [DVec3; 2] {
+        let [phi, theta] = self.middle_angles();
+        let half = 0.5 * self.side();
+        let widest = [theta - half, theta + half].map(f64::sin).into_iter().fold(theta.sin(), f64::max);
+        let along_phi = DVec3::new(phi.cos(), 0.0, phi.sin());
+        let along_theta = DVec3::new(theta.cos() * phi.sin(), -theta.sin(), -theta.cos() * phi.cos());
+        [half * widest * along_phi, half * along_theta]
+    }
+
+    fn middle_angles(self) -> [f64; 2] {
+        [self.column, self.row].map(|index| (f64::from(index) + 0.5) * self.side())
     }
 
     /// Nodes in `N` equal steps from edge to edge along each axis, row by row: names and directions. `N` - 1 divides 4.

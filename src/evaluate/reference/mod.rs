@@ -4,8 +4,8 @@
 //! and nothing random. The sphere is cut into cells; over each, BRDF times cosine is a polynomial through a few nodes, and
 //! the integral of radiance times each polynomial is known exactly (`light`). So every pixel of the environment counts in full, and only
 //! the BRDF has to be resolved: cells are split where that changes the result most, pixel by pixel, until what splitting still
-//! changes is below the tolerance (`cubature`). Around mirror directions cells are split from the start until they
-//! are as small as the lobe (`brdf::lobe_radius`), so that none is missed, however narrow.
+//! changes is below the tolerance (`cubature`). Where a lobe may be, cells are split from the start until they are
+//! as small as it is narrow (`lobe`), so that none is missed.
 //!
 //! [`Environment::radiance`]: crate::environment::Environment::radiance
 //! [`Brdf::evaluate`]: crate::brdf::Brdf::evaluate
@@ -31,6 +31,7 @@ mod cubature;
 mod gpu;
 mod integrator;
 mod light;
+mod lobe;
 mod progressive;
 mod step;
 #[cfg(test)]

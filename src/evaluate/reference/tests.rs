@@ -71,6 +71,61 @@ fn a_white_furnace_gives_the_albedo_of_every_model_at_every_angle() {
     }
 }
 
+/// The albedo of GGX seen from unit `w_o` in the frame of its axes: the midpoint rule over slopes of half vectors, in steps that grow from the
+/// width of the lobe to its tails.
+fn ggx_albedo(brdf: &Brdf, alpha: DVec2, w_o: DVec3) -> DVec3 {
+    let (steps, end) = (1000, 8.0);
+    let step = 2.0 * end / f64::from(steps);
+    let slopes: Vec<[f64; 2]> =
+        (0..steps).map(|i| step * (f64::from(i) + 0.5) - end).map(|t| [t.sinh(), t.cosh() * step]).collect();
+    let mut sum = DVec3::ZERO;
+    for ([x, dx], [y, dy]) in slopes.iter().flat_map(|x| slopes.iter().map(move |y| (x, y))) {
+        let slope = alpha * DVec2::new(*x, *y);
+        let half_vector = slope.extend(1.0).normalize();
+        let cos_theta_d = w_o.dot(half_vector);
+        let w_i = 2.0 * cos_theta_d * half_vector - w_o;
+        if cos_theta_d > 0.0 && w_i.z > 0.0 {
+            let solid_angle = 4.0 * cos_theta_d * half_vector.z.powi(3) * alpha.x * alpha.y * dx * dy;
+            sum += brdf.evaluate(w_i, w_o) * w_i.z * solid_angle;
+        }
+    }
+    sum
+}
+
+#[test]
+fn a_white_furnace_gives_the_albedo_of_lobes_a_hundred_times_as_long_as_wide() {
+    let white = environment(16, 8, |_, _| [1.0; 3]);
+    for alpha in [DVec2::splat(0.1), DVec2::new(0.001, 0.1), DVec2::new(0.01, 1.0)] {
+        let parameters = format!("distribution = 'ggx'\nalpha_x = {}\nalpha_y = {}\nmetal = 'Al'", alpha.x, alpha.y);
+        let brdf = brdf("conductor", &parameters);
+        let integrator = Integrator::new(&white, 1.0, [&brdf], 1);
+        for [theta_o_deg, azimuth_deg] in
+            [[0.0, 0.0], [45.0, 20.0], [45.0, 90.0], [75.0, 50.0], [85.0, 10.0], [88.0, 80.0]]
+        {
+            let (sin_theta_o, cos_theta_o) = f64::to_radians(theta_o_deg).sin_cos();
+            let w_o = (sin_theta_o * DVec2::from_angle(f64::to_radians(azimuth_deg))).extend(cos_theta_o);
+            let point = Point::new(DVec3::Z, w_o, 0).with_tangent(DVec3::X);
+            let found = integrator.pixel(&[point], 1e-4, DISPLAY).radiance;
+            let exact = ggx_albedo(&brdf, alpha, w_o);
+            let error = ((found - exact) / exact).abs().max_element();
+            assert!(error < 1e-3, "{alpha} {theta_o_deg} {azimuth_deg}: {found}, not {exact}");
+        }
+    }
+}
+
+#[test]
+fn a_white_furnace_gives_the_albedo_of_a_narrow_lobe_that_is_there_at_grazing_views_only() {
+    // Fresnel's factor is that of Schlick from 0.
+    let white = environment(16, 8, |_, _| [1.0; 3]);
+    let brdf = brdf("ashikhmin_shirley", "diffuse = 0.5\nspecular = 0.0\nexponent = 1e5");
+    let integrator = Integrator::new(&white, 1.0, [&brdf], 1);
+    for theta_o_deg in [0.0, 45.0, 70.0, 80.0, 85.0] {
+        let found = integrator.pixel(&[seen_from(theta_o_deg)], 1e-4, DISPLAY).radiance.x;
+        let exact = brdf.albedo(theta_o_deg.to_radians()).x;
+        assert!((found / exact - 1.0).abs() < 2e-3, "{theta_o_deg}: {found}, not {exact}");
+    }
+}
+
 #[test]
 fn a_lamp_of_1e5_is_found_in_the_flank_of_a_lobe() {
     // Polynomials through the flank swing below zero, which beside such a lamp outweighs all else; displays show that as black.

@@ -1,0 +1,81 @@
+//! Where the lobe of a BRDF may be, and how narrow it is there: so that no cell of the quadrature hides it between its nodes.
+use std::f64::consts::FRAC_PI_2;
+
+use glam::{DVec2, DVec3};
+
+use crate::brdf::{Brdf, LobeShape, MIN_COS_THETA_D, lobe_radius};
+
+/// View angles at which lobes are looked for: some models have them at grazing views only.
+const VIEWS_DEG: [f64; 5] = [0.0, 30.0, 60.0, 75.0, 85.0];
+
+/// An anisotropic lobe is followed along its long axis for so many of its lengths: of GGX's, which has the longest tails, 0.2 % is beyond.
+const LENGTHS: f64 = 16.0;
+
+/// What is so many half edges from the middle of a cell counts as in it: a lobe beside a cell is in it in part.
+const NEARLY: f64 = 2.0;
+
+/// The half vectors of a lobe: about the normal, or of an anisotropic BRDF about an arc through the normal.
+pub struct Lobe {
+    /// The radius at each of [`VIEWS_DEG`], in radians.
+    radii: [f64; VIEWS_DEG.len()],
+    /// The width across the long axis over the one along it.
+    narrowness: f64,
+    /// In the tangent plane, a unit vector.
+    long_axis: DVec2,
+    /// The tangent of the arc's angle to the normal where it ends: 0 of an isotropic BRDF.
+    most_slope: f64,
+}
+
+impl Lobe {
+    pub fn of(brdf: &Brdf) -> Self {
+        let LobeShape { is_isotropic, narrowness, long_axis, .. } = LobeShape::of(brdf);
+        let radii = VIEWS_DEG.map(|theta_o_deg| lobe_radius(brdf, theta_o_deg.to_radians()));
+        let narrowest = radii.iter().copied().fold(FRAC_PI_2, f64::min);
+        let most_slope = if is_isotropic { 0.0 } else { LENGTHS * narrowest / narrowness };
+        Self { radii, narrowness, long_axis, most_slope }
+    }
+
+    /// It as seen from unit `w_o`, which is in the frame of the surface: with the least radius at the view angles beside that of `w_o`.
+    pub fn seen_from(&self, w_o: DVec3) -> SeenLobe<'_> {
+        let theta_o_deg = w_o.z.acos().to_degrees();
+        let next = VIEWS_DEG.iter().position(|&view| view > theta_o_deg).unwrap_or(VIEWS_DEG.len() - 1);
+        SeenLobe { lobe: self, w_o, radius: self.radii[next].min(self.radii[next - 1]) }
+    }
+}
+
+/// A lobe as a view sees it: the directions that its half vectors mirror the view into.
+pub struct SeenLobe<'a> {
+    lobe: &'a Lobe,
+    w_o: DVec3,
+    /// Of half vectors, in radians.
+    radius: f64,
+}
+
+impl SeenLobe<'_> {
+    /// Whether part of it may hide between the nodes of a cell: the cell is wider than the lobe, and holds part of it, or nearly so.
+    /// `middle` is that of the cell, and `half_edges` go from there to the middles of two edges; all in the frame of the surface.
+    pub fn may_hide(&self, middle: DVec3, half_edges: [DVec3; 2]) -> bool {
+        let Lobe { narrowness, long_axis, most_slope, .. } = *self.lobe;
+        // Along the half vector. In the lobe it has nothing across the long axis, and not too much along it.
+        let sum = middle + self.w_o;
+        // How far a coordinate goes from the middle of the cell to its edges, with the curvature of the sphere.
+        let sagitta = 0.5 * half_edges.map(DVec3::length_squared).iter().sum::<f64>();
+        let spread = |axis: DVec3| {
+            half_edges.map(|edge| edge.dot(axis).abs()).iter().sum::<f64>() + sagitta * middle.dot(axis).abs()
+        };
+        let [along, across] = [long_axis, long_axis.perp()].map(|axis| axis.extend(0.0));
+        let [along_spread, across_spread, up_spread] = [along, across, DVec3::Z].map(spread);
+        let nearest = (sum.dot(along).abs() - NEARLY * along_spread).max(0.0);
+        let highest = sum.z + NEARLY * up_spread;
+        let holds_it = middle.z + NEARLY * up_spread > 0.0
+            && sum.dot(across).abs() < NEARLY * across_spread
+            && nearest <= most_slope * highest;
+        // Reflection doubles angles, but across the plane of incidence shrinks them by the cosine. Beyond its bound cells are small enough to
+        // find part of a lobe, and what is found is split like all else.
+        let cos_theta_d = (0.5 * sum.length()).max(MIN_COS_THETA_D);
+        // Tails of an anisotropic lobe widen as they fall: GGX's are as wide as contours of 1 + (h_x / alpha_x)^2 + (h_y / alpha_y)^2.
+        let radius = self.radius.max(narrowness * nearest / highest);
+        let widest = if most_slope > 0.0 { across_spread } else { across_spread.max(along_spread) };
+        holds_it && widest > radius * cos_theta_d
+    }
+}
