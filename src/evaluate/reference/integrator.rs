@@ -143,6 +143,7 @@ impl<'a> Integrator<'a> {
         };
         let mut cubature = Cubature::new(&self.light, f_cos, must_split);
         let scale = self.intensity / self.subpixels as f64;
+        let mut first_weight = None;
         for split in 1.. {
             // Polynomials may swing below zero, which radiance never is: by so much the estimate is wrong, whatever its cells say. A display
             // shows no difference between that and black.
@@ -151,10 +152,12 @@ impl<'a> Integrator<'a> {
             let radiance_error = (scale * ERROR_LEFT * cubature.squares.map(f64::sqrt)).max(-estimate);
             let channel = |i: usize| display.error(radiance[i], radiance_error[i]);
             let display_error = DVec3::from_array([0, 1, 2].map(channel));
-            // A channel matters as much as its error is seen.
+            // A channel matters as much as its error is seen. The first cells were ranked by weights of 1, so others' are relative to the first.
             let seen = display_error / radiance_error.max(DVec3::splat(f64::MIN_POSITIVE));
+            let weights = seen * seen;
+            let first_weight = *first_weight.get_or_insert(weights.max_element().max(f64::MIN_POSITIVE));
             let done = rms(display_error) <= tolerance || cubature.len() >= MOST_CELLS;
-            if done || !cubature.refine(seen * seen) {
+            if done || !cubature.refine(weights / first_weight) {
                 let evaluations = (cubature.evaluations() * points.len()) as u64;
                 return Ok(PixelEstimate { radiance, radiance_error, display_error, evaluations });
             }

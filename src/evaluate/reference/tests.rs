@@ -242,6 +242,18 @@ fn suns_of_a_million_in_near_mirrors_at_grazing_angles_converge() {
 }
 
 #[test]
+fn dim_light_at_a_long_exposure_is_as_bright_light_at_a_short_one() {
+    let (map, brdf) = (sky(500.0), conductor(0.1));
+    let [bright, dim] = [1.0, 1e-8].map(|intensity| {
+        let display = Display { exposure: 1.0 / intensity, ..DISPLAY };
+        let estimate = Integrator::new(&map, intensity, [&brdf], 1).pixel(&[seen_from(40.0)], 1e-4, display);
+        (estimate.radiance / intensity, estimate.evaluations)
+    });
+    assert!((bright.0 / dim.0 - 1.0).abs().max_element() < 1e-6, "{bright:?}, {dim:?}");
+    assert_eq!(bright.1, dim.1);
+}
+
+#[test]
 fn a_normal_that_faces_away_is_as_if_just_before() {
     let map = sky(10.0);
     let brdf = conductor(0.2);
