@@ -200,9 +200,11 @@ pub fn parameter<'t>(table: &'t Table, key: &str) -> Option<&'t Value> {
     }
 }
 
-/// Gives a parameter a value by its [`Parameter::key`]. A table that is not there is made.
+/// Gives a parameter a value by its [`Parameter::key`]. A table that is not there is made; within what is no table there are no
+/// parameters, so such a key stands for itself, and no model knows it.
 pub fn set_parameter(table: &mut Table, key: &str, value: Value) {
-    let Some((outer, inner)) = key.split_once('.') else {
+    let split = key.split_once('.').filter(|(outer, _)| table.get(*outer).is_none_or(Value::is_table));
+    let Some((outer, inner)) = split else {
         table.insert(key.into(), value);
         return;
     };

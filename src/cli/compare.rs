@@ -49,7 +49,8 @@ pub struct Compare {
 impl Compare {
     pub fn run(self) -> anyhow::Result<()> {
         if let Some(path) = &self.difference {
-            output::check_writable_png(path)?;
+            output::check_png(path)?;
+            output::check_writable(path)?;
         }
         let display = Display { exposure: self.exposure, gamma: self.gamma };
         let read = |path| -> Result<_> { Ok(Comparable::from_picture(&output::read_image(path)?, display)) };

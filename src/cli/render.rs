@@ -103,9 +103,7 @@ impl Render {
             let remedy = "name a picture with -o FILE.png, or ask for --stats or --print-plan";
             return Err(Error::input("render", "has nothing to write", remedy));
         }
-        for path in self.output.iter().chain(&self.stats) {
-            output::check_writable(path)?;
-        }
+        output::check_all_writable(self.output.iter().chain(&self.stats))?;
         let scene = self.scene.scene()?;
         let is_reference = scene.shading.method == Method::Reference.name();
         let useless = [
@@ -117,6 +115,16 @@ impl Render {
         if let Some((flag, _)) = useless.into_iter().find(|(_, useless)| *useless) {
             let problem = format!("is of no use to method \"{}\"", scene.shading.method);
             return Err(Error::input(flag, problem, "leave it out, or choose another --method"));
+        }
+        // A script may go through all methods with these.
+        let ignored = [
+            ("--threads", self.scene.threads.is_some() && is_reference),
+            ("--seed", self.scene.seed.is_some() && is_reference),
+            ("--repeat", self.repeat > 1 && is_reference),
+            ("--pattern", self.scene.pattern.is_some() && !Method::from_name(&scene.shading.method)?.has_pattern()),
+        ];
+        for (flag, _) in ignored.into_iter().filter(|(_, is_ignored)| *is_ignored) {
+            tracing::warn!("{flag} is ignored: method \"{}\" knows nothing of it", scene.shading.method);
         }
         Ok(scene)
     }

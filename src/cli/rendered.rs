@@ -49,7 +49,9 @@ pub struct Stats<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     way_around: Option<&'static str>,
     method: &'a str,
-    threads: u32,
+    /// Or samples; not for method `reference`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    threads: Option<u32>,
     subpixels: u32,
     width: u32,
     height: u32,
@@ -63,8 +65,8 @@ pub struct Stats<'a> {
     lookups: u64,
     passes: Vec<Pass<'a>>,
     frame_ms: f64,
-    thread_generation_ms: f64,
-    thread_cache: &'a str,
+    #[serde(flatten)]
+    thread_stats: Option<ThreadStats>,
     device_memory_bytes: u64,
     validation_messages: usize,
     /// Only with `--error`.
@@ -73,6 +75,13 @@ pub struct Stats<'a> {
     /// Only for method `reference`.
     #[serde(flatten)]
     reference: Option<&'a ReferenceStats>,
+}
+
+/// How threads were come by; not for method `reference`.
+#[derive(serde::Serialize)]
+struct ThreadStats {
+    thread_generation_ms: f64,
+    thread_cache: &'static str,
 }
 
 /// What is known of the error of a reference.
@@ -101,7 +110,7 @@ impl<'a> Stats<'a> {
             device,
             way_around: rendering.way_around.map(WayAround::name),
             method: prepared.method.name(),
-            threads: prepared.sampling.count,
+            threads: reference.is_none().then_some(prepared.sampling.count),
             subpixels: prepared.view.subpixels,
             width: prepared.view.width,
             height: prepared.view.height,
@@ -111,12 +120,20 @@ impl<'a> Stats<'a> {
             lookups: rendering.lookups,
             passes: rendering.passes.iter().map(|pass| Pass { name: &pass.name, gpu_ms: pass.gpu_ms }).collect(),
             frame_ms: rendering.frame_ms,
-            thread_generation_ms: 1e3 * threads.iter().map(|asked| asked.time.as_secs_f64()).sum::<f64>(),
-            thread_cache: if threads.iter().all(|asked| asked.origin != Origin::Made) { "hit" } else { "miss" },
+            thread_stats: reference.is_none().then(|| ThreadStats::new(threads)),
             device_memory_bytes: rendering.device_memory_bytes,
             validation_messages,
             expected_rms: *expected_rms,
             reference: reference.as_ref(),
+        }
+    }
+}
+
+impl ThreadStats {
+    fn new(threads: &[Asked]) -> Self {
+        Self {
+            thread_generation_ms: 1e3 * threads.iter().map(|asked| asked.time.as_secs_f64()).sum::<f64>(),
+            thread_cache: if threads.iter().all(|asked| asked.origin != Origin::Made) { "hit" } else { "miss" },
         }
     }
 }

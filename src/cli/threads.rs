@@ -56,8 +56,8 @@ impl Threads {
             let remedy = format!("method \"{}\" has 1 to {}", kind.name(), kind.max_count());
             return Err(Error::input("--count", format!("{count} is out of range"), remedy).into());
         }
-        self.output.as_deref().map_or(Ok(()), output::check_writable)?;
-        self.plot.as_deref().map_or(Ok(()), output::check_writable_png)?;
+        self.plot.as_deref().map_or(Ok(()), output::check_png)?;
+        output::check_all_writable(self.output.iter().chain(&self.plot))?;
         let source = MaterialSource::named(&self.material);
         let name = match &source {
             MaterialSource::File(path) => stem(path),

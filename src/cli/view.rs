@@ -4,11 +4,11 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::value_parser;
 use std::path::PathBuf;
 use std::time::Duration;
-use threadlight::low_level::output::{self, Format};
+use threadlight::Result;
+use threadlight::low_level::output;
 use threadlight::low_level::viewer::latency::Record;
 use threadlight::low_level::viewer::{self, Ended, ViewerSettings, input};
 use threadlight::low_level::vulkan::PresentMode;
-use threadlight::{Error, Result};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -61,13 +61,8 @@ const SIZE: (u32, u32) = (980, 720);
 
 impl ViewArguments {
     pub fn run(self) -> anyhow::Result<()> {
-        if let Some(path) = &self.screenshot {
-            if Format::of(path)? != Format::Png {
-                return Err(Error::in_file(path, "is no PNG", "end the name of --screenshot in .png").into());
-            }
-            output::check_writable(path)?;
-        }
-        self.stats.as_deref().map_or(Ok(()), output::check_writable)?;
+        self.screenshot.as_deref().map_or(Ok(()), output::check_png)?;
+        output::check_all_writable(self.screenshot.iter().chain(&self.stats))?;
         let mut scene = self.scene.scene()?;
         if self.scene.scene.is_none() && self.scene.size.is_none() {
             (scene.image.width, scene.image.height) = SIZE;

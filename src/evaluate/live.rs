@@ -2,11 +2,13 @@
 use std::sync::Arc;
 use std::time::Instant;
 
+use super::metrics::check_size;
 use super::reference::{ReferenceSettings, reference};
 use super::tables::{Section, Table};
 use super::{Comparable, Display, compare};
 use crate::error::{Error, Result};
 use crate::memo::{Memo, Round, Step};
+use crate::method::Method;
 use crate::pipeline::{DeviceScene, Wanted, median};
 use crate::prepare::{Prepared, prepare, prepare_draft};
 use crate::progress::{Observer, OnlyCancels};
@@ -56,8 +58,8 @@ struct Truth {
 /// Drags and measures; `found` has the steps until an error or an interruption. `memo` keeps references and filtered environments.
 ///
 /// # Errors
-/// A parameter or values that there are not, a scene that cannot be prepared, a material whose threads cannot be drafted,
-/// [`Error::Cancelled`].
+/// A parameter or values that there are not, a scene that cannot be prepared, a method other than `fitted`, pictures too small to
+/// compare, [`Error::Cancelled`].
 pub fn run(
     drag: &Drag,
     settings: &ReferenceSettings,
@@ -66,6 +68,13 @@ pub fn run(
     observer: &dyn Observer,
     found: &mut Vec<LiveStep>,
 ) -> Result<()> {
+    let image = &drag.scene.image;
+    check_size(image.width as usize, image.height as usize)?;
+    let method = &drag.scene.shading.method;
+    if Method::from_name(method)? != Method::Fitted {
+        let remedy = format!("use method {}", Method::Fitted.name());
+        return Err(Error::input(format!("method \"{method}\""), "has no drafts", remedy));
+    }
     let values = &drag.values;
     let total = 3 * values.len() - 2;
     let mut done = 0;
@@ -90,9 +99,12 @@ pub fn run(
     for at in there_and_back {
         let round = drafts.round(&inner);
         let start = Instant::now();
-        let draft = prepare_draft(&drag.scene_at(&values[at])?, &shown.0, &round)?.ok_or_else(|| {
-            Error::input(format!("material \"{}\"", drag.material), "cannot be drafted", "drag a model's parameter")
-        })?;
+        let scene = drag.scene_at(&values[at])?;
+        // What changes no threads, as a rotation, needs no draft.
+        let draft = match prepare_draft(&scene, &shown.0, &round)? {
+            Some(draft) => draft,
+            None => prepare(&scene, &round)?,
+        };
         let draft_ms = start.elapsed().as_secs_f64() * 1e3;
         let picture = picture(&draft, device, &memo.round(&inner))?;
         let Truth { reference, fit_ms, finished_rms } = &truths[at];

@@ -117,6 +117,15 @@ impl Comparable {
     }
 }
 
+/// An error unless pictures of this size can be compared.
+pub fn check_size(width: usize, height: usize) -> Result<()> {
+    if width.min(height) >= WINDOW {
+        return Ok(());
+    }
+    let problem = format!("the pictures are {width} x {height}, SSIM needs {WINDOW} x {WINDOW} pixels");
+    Err(Error::input("comparison", problem, "give larger pictures"))
+}
+
 /// Compares two pictures; the order matters only to FLIP, and little there: `b` is its reference.
 ///
 /// With `mask_background` only pixels count where `a` or `b` sees a surface, as far as they tell (alpha above 0); all
@@ -132,10 +141,7 @@ pub fn compare(a: &Comparable, b: &Comparable, mask_background: bool) -> Result<
         let sizes = format!("{width} x {height} and {} x {}", b.width, b.height);
         return refuse(format!("the pictures' sizes differ, {sizes}"), "give pictures of one size");
     }
-    if width.min(height) < WINDOW {
-        let problem = format!("the pictures are {width} x {height}, SSIM needs {WINDOW} x {WINDOW} pixels");
-        return refuse(problem, "give larger pictures");
-    }
+    check_size(width, height)?;
     let remedy = "render with --background none to EXR or PNG, or leave out --mask-background";
     let Ok(compared) = compared_pixels(a, b, mask_background) else {
         return refuse("neither picture has an alpha channel that tells its background".to_owned(), remedy);

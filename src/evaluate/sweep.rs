@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::cases::{Cases, Place, Shard};
 use super::expected::TrueSample;
-use super::metrics::{Comparable, Metrics, compare};
+use super::metrics::{Comparable, Metrics, check_size, compare};
 use super::reference_picture::ReferencePicture;
 use super::sheet::over_grey;
 use crate::error::Result;
@@ -149,6 +149,9 @@ pub fn run(
     observer: &dyn Observer,
     measured: &mut Measured,
 ) -> Result<()> {
+    for (_, scene) in &sweep.cases.scenes {
+        check_size(scene.image.width as usize, scene.image.height as usize)?;
+    }
     let total = sweep.row_count();
     observer.progress(0, total);
     sweep.cases.for_each_place(memo, observer, &mut |place| {

@@ -13,7 +13,7 @@ pub(crate) use cache_file::keep_file;
 pub(crate) use exr_file::parse_exr;
 pub use exr_file::{ExrHeader, write_exr};
 pub use png_file::write_png;
-pub use whole_file::{check_writable, write_whole};
+pub use whole_file::{check_all_writable, check_writable, write_whole};
 
 /// The file formats of a picture, told apart by the extension of the file's name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,12 +35,12 @@ impl Format {
     }
 }
 
-/// [`check_writable`] of a PNG.
-pub fn check_writable_png(path: &Path) -> Result<()> {
-    if Format::of(path)? != Format::Png {
-        return Err(Error::in_file(path, "is no PNG", "end its name in .png"));
+/// An error unless the name at `path` is that of a PNG.
+pub fn check_png(path: &Path) -> Result<()> {
+    match Format::of(path)? {
+        Format::Png => Ok(()),
+        Format::Exr => Err(Error::in_file(path, "is no PNG", "end its name in .png")),
     }
-    check_writable(path)
 }
 
 /// A picture as read from a file, row by row from the top left.

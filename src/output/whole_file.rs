@@ -18,11 +18,31 @@ const MOST_AGE: Duration = Duration::from_secs(60);
 /// Says at once whether a file could be written to `path`, so that a long rendering does not end in an error.
 pub fn check_writable(path: &Path) -> Result<()> {
     match target(path) {
-        _ if path.is_dir() => Err(Error::unwritable(path, "it is a folder")),
+        _ if path.is_dir() || names_a_folder(path) => Err(Error::unwritable(path, "it is a folder")),
         // A pipe may have no reader yet.
         Target::Stream => Ok(()),
         Target::File(file) => temporary_beside(path, &file).map(drop),
     }
+}
+
+/// The same of several files of one command, which are not to overwrite each other.
+pub fn check_all_writable<'a>(paths: impl IntoIterator<Item = &'a PathBuf>) -> Result<()> {
+    let mut files = Vec::new();
+    for path in paths {
+        check_writable(path)?;
+        if let Target::File(file) = target(path) {
+            if files.contains(&file) {
+                return Err(Error::in_file(path, "is to be written twice", "give each file a name of its own"));
+            }
+            files.push(file);
+        }
+    }
+    Ok(())
+}
+
+/// Whether the name ends in a separator, which no file's does.
+fn names_a_folder(path: &Path) -> bool {
+    path.to_string_lossy().ends_with(std::path::is_separator)
 }
 
 /// Writes `bytes` to `path`: into a temporary file in the same folder first, then renamed, so that whoever looks sees
@@ -61,13 +81,22 @@ fn target(path: &Path) -> Target {
     match path.metadata() {
         Ok(metadata) if !metadata.is_file() && !metadata.is_dir() => Target::Stream,
         Ok(_) => Target::File(path.canonicalize().unwrap_or_else(|_| path.to_owned())),
-        Err(_) => Target::File(path.to_owned()),
+        Err(_) => {
+            // Two names of one file that is not there yet differ in their folders.
+            let folder = folder_of(path).canonicalize().ok();
+            let file = folder.zip(path.file_name()).map(|(folder, name)| folder.join(name));
+            Target::File(file.unwrap_or_else(|| path.to_owned()))
+        }
     }
+}
+
+fn folder_of(file: &Path) -> &Path {
+    file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
 /// An empty file in the folder of `file`, deleted when dropped. Errors name `path`.
 fn temporary_beside(path: &Path, file: &Path) -> Result<NamedTempFile> {
-    let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let folder = folder_of(file);
     let mut builder = tempfile::Builder::new();
     builder.prefix(PREFIX).rand_bytes(LETTERS);
     // A temporary file is private (0600) unless told otherwise; the picture is to be as readable as any other file.
@@ -123,6 +152,20 @@ mod tests {
         }
         write_whole(&folder.path().join("new"), b"new").unwrap();
         assert_eq!(names(folder.path()), [".threadlight-abc124", ".threadlight-x", "new", "threadlight-abc123"]);
+    }
+
+    #[test]
+    fn one_file_is_not_written_twice_by_whatever_names() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name);
+        std::fs::create_dir(path("below")).unwrap();
+        check_all_writable(&[path("a"), path("b"), path("below/a")]).unwrap();
+        for name in ["a", "below/../a", "./a"] {
+            let error = check_all_writable(&[path("a"), path("b"), path(name)]).unwrap_err().to_string();
+            assert!(error.contains("is to be written twice"), "{error}");
+        }
+        check_all_writable(&["/dev/null", "/dev/null"].map(PathBuf::from)).unwrap();
+        assert!(check_writable(&path("c.png/")).unwrap_err().to_string().contains("it is a folder"));
     }
 
     #[cfg(unix)]

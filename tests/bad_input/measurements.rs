@@ -58,6 +58,7 @@ fn sweeps_that_cannot_be_measured_are_refused() {
         ("--scene missing.toml", &["missing.toml"]),
         ("--scene missing.obj", &["missing.obj"]),
         ("--size 640", &["--size", "640x480"]),
+        ("--methods fitted --size 40x10", &["40 x 10", "11 x 11"]),
         ("--shard 3", &["--shard", "2/8"]),
         ("--shard 3/2", &["--shard", "2/8"]),
         ("--shard 1/2", &["--shard", "at most 1"]),
@@ -86,6 +87,22 @@ fn measurements_of_time_that_cannot_be_made_are_refused() {
         ("--device unheard-of", &["unheard-of"]),
     ] {
         refuses(&folder, &format!("bench speed {arguments}"), names);
+    }
+}
+
+#[test]
+fn drags_that_cannot_be_measured_are_refused() {
+    let folder = pictures();
+    for (arguments, names) in [
+        ("--drag alpha", &["--drag", "gold.alpha"][..]),
+        ("--drag gold.alpha.x", &["gold", "alpha.x: is not a parameter"]),
+        ("--drag silver.alpha", &["silver", "gold"]),
+        ("--drag gold.beta", &["gold", "beta: is not a parameter"]),
+        ("--drag gold.alpha --method paper", &["paper", "fitted"]),
+        ("--drag gold.alpha --size 8x8", &["8 x 8", "11 x 11"]),
+        ("--drag gold.alpha --reference-tolerance 0", &["--reference-tolerance", "positive"]),
+    ] {
+        refuses(&folder, &format!("bench live --from 0.1 --to 0.2 {arguments}"), names);
     }
 }
 

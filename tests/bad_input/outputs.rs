@@ -15,11 +15,14 @@ fn outputs_that_cannot_be_written_are_refused_before_any_work() {
         ("-o out/image", "out/image"),
         ("-o out/image.png --stats absent/stats.json", "absent/stats.json"),
         ("-o out/image.png --stats folder.png", "folder.png"),
+        ("-o out/image.png/", "it is a folder"),
+        ("-o out/image.png --stats ./out/image.png", "./out/image.png: is to be written twice"),
     ] {
         refuses(&folder, &format!("render --threads 1 {flags}"), &[name]);
     }
     refuses(&folder, "threads gold -o absent/gold.threads", &["absent/gold.threads"]);
     refuses(&folder, "threads gold -o out/gold.threads --plot absent/gold.png", &["absent/gold.png"]);
+    refuses(&folder, "threads gold -o out/gold.png --plot out/gold.png", &["out/gold.png: is to be written twice"]);
     // Nothing was computed in vain.
     assert!(!folder.path().join("cache").exists());
 }

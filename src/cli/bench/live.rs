@@ -1,5 +1,6 @@
 //! `threadlight bench live`: what drafts of threads cost and are worth while a parameter is dragged.
 use super::arguments::{QUICK_TOLERANCE, write_json};
+use crate::cli::number;
 use crate::cli::progress::TerminalProgress;
 use crate::cli::scene_flags::{MachineFlags, SceneFlags};
 use clap::value_parser;
@@ -10,6 +11,7 @@ use threadlight::low_level::evaluate::reference::ReferenceSettings;
 use threadlight::low_level::evaluate::tables;
 use threadlight::low_level::memo::Memo;
 use threadlight::low_level::output;
+use threadlight::low_level::scene::Scene;
 use threadlight::low_level::vulkan::{Device, Instance};
 use threadlight::{Error, Result};
 
@@ -38,7 +40,7 @@ pub struct BenchLive {
     scene: SceneFlags,
     #[command(flatten)]
     machine: MachineFlags,
-    /// Name of a material of the scene, a dot, and a parameter of it.
+    /// Name of a material of the scene, a dot, and a parameter of it, such as varnish.coat.alpha.
     #[arg(long, value_name = "MATERIAL.KEY")]
     drag: String,
     /// Its first value, as in a scene file: a number, or a list of three.
@@ -51,7 +53,7 @@ pub struct BenchLive {
     #[arg(long, value_name = "N", default_value_t = 60, value_parser = value_parser!(u32).range(2..=10_000))]
     steps: u32,
     /// Estimated error of the reference, RMS of display values.
-    #[arg(long, value_name = "X", default_value_t = QUICK_TOLERANCE)]
+    #[arg(long, value_name = "X", default_value_t = QUICK_TOLERANCE, value_parser = number(f64::MIN_POSITIVE..=1.0, "a positive number up to 1"))]
     reference_tolerance: f64,
     /// Write all measurements as JSON.
     #[arg(long, value_name = "FILE")]
@@ -65,13 +67,7 @@ impl BenchLive {
         if self.scene.scene.is_none() && self.scene.size.is_none() {
             (scene.image.width, scene.image.height) = (80, 60);
         }
-        let (material, key) = self.drag.rsplit_once('.').ok_or_else(|| {
-            Error::input(
-                "--drag",
-                format!("\"{}\" has no dot", self.drag),
-                "name material and parameter, as gold.alpha",
-            )
-        })?;
+        let (material, key) = material_and_key(&scene, &self.drag)?;
         let [from, to] = [("--from", &self.from), ("--to", &self.to)].map(|(flag, text)| numbers(flag, text));
         let values = between(&from?, &to?, self.steps)?;
         let drag = Drag { scene, material: material.to_owned(), key: key.to_owned(), values };
@@ -89,6 +85,16 @@ impl BenchLive {
         }
         Ok(result?)
     }
+}
+
+/// The material of `scene` and the parameter that `drag` names: both may have dots.
+fn material_and_key<'d>(scene: &Scene, drag: &'d str) -> Result<(&'d str, &'d str)> {
+    let splits = drag.match_indices('.').map(|(dot, _)| (&drag[..dot], &drag[dot + 1..]));
+    let is_there = |name: &str| scene.materials.iter().any(|material| material.name == name);
+    splits.clone().rfind(|(name, _)| is_there(name)).or(splits.clone().next_back()).ok_or_else(|| {
+        let problem = format!("\"{drag}\" has no dot");
+        Error::input("--drag", problem, "name material and parameter, as gold.alpha")
+    })
 }
 
 /// A number or a list of numbers, as in a scene file.
