@@ -18,26 +18,18 @@ pub struct Light {
 }
 
 impl Light {
-    /// The same as half floats hold it: each pyramid over its scale.
+    /// The same as half floats hold it.
     pub fn in_half_floats(&self) -> Self {
-        let half = |pyramid: &Keyed<Pyramid>| Keyed::new(pyramid.key, pyramid.in_half_floats());
-        let blurred_half = |pyramid: &Keyed<VmfPyramid>| {
-            Keyed::new(pyramid.key, VmfPyramid { levels: pyramid.levels.in_half_floats() })
-        };
         Self {
-            box_filtered: self.box_filtered.as_ref().map(half),
-            blurred: self.blurred.as_ref().map(|light| BlurredLight {
-                rest: blurred_half(&light.rest),
-                sources: light.sources.as_ref().map(blurred_half),
-                irradiance: half(&light.irradiance),
-                needs: light.needs,
-            }),
-            prefiltered: self
-                .prefiltered
-                .as_ref()
-                .map(|light| PrefilteredLight { by_ggx: half(&light.by_ggx), irradiance: half(&light.irradiance) }),
+            box_filtered: self.box_filtered.as_ref().map(|pyramid| in_half_floats(pyramid, pyramid.radiance_scale())),
+            blurred: self.blurred.as_ref().map(BlurredLight::in_half_floats),
+            prefiltered: self.prefiltered.as_ref().map(PrefilteredLight::in_half_floats),
         }
     }
+}
+
+fn in_half_floats(pyramid: &Keyed<Pyramid>, scale: f32) -> Keyed<Pyramid> {
+    Keyed::new(pyramid.key, pyramid.in_half_floats(scale))
 }
 
 /// What the split sum looks up.
@@ -47,6 +39,18 @@ pub struct PrefilteredLight {
     pub by_ggx: Keyed<Pyramid>,
     /// Irradiance over pi.
     pub irradiance: Keyed<Pyramid>,
+}
+
+impl PrefilteredLight {
+    /// By what radiance is divided for half floats: one scale for all that is added up.
+    pub fn radiance_scale(&self) -> f32 {
+        self.by_ggx.radiance_scale()
+    }
+
+    fn in_half_floats(&self) -> Self {
+        let half = |pyramid| in_half_floats(pyramid, self.radiance_scale());
+        Self { by_ggx: half(&self.by_ggx), irradiance: half(&self.irradiance) }
+    }
 }
 
 /// What fitted threads look up.
@@ -60,6 +64,27 @@ pub struct BlurredLight {
     pub irradiance: Keyed<Pyramid>,
     /// What kernels look up besides.
     pub needs: KernelNeeds,
+}
+
+impl BlurredLight {
+    /// By what radiance is divided for half floats: one scale for all that is added up.
+    pub fn radiance_scale(&self) -> f32 {
+        let of_sources = self.sources.as_ref().map_or(0.0, |sources| sources.levels.radiance_scale());
+        of_sources.max(self.rest.levels.radiance_scale())
+    }
+
+    fn in_half_floats(&self) -> Self {
+        let scale = self.radiance_scale();
+        let half = |pyramid: &Keyed<VmfPyramid>| {
+            Keyed::new(pyramid.key, VmfPyramid { levels: pyramid.levels.in_half_floats(scale) })
+        };
+        Self {
+            rest: half(&self.rest),
+            sources: self.sources.as_ref().map(half),
+            irradiance: in_half_floats(&self.irradiance, scale),
+            needs: self.needs,
+        }
+    }
 }
 
 /// What kernels look up besides the pyramid of the environment without its small sources.

@@ -14,8 +14,8 @@ use crate::progress::Observer;
 /// Level 0 is no finer than this: 6 x 1024^2 texels of 16 bytes are 96 MiB.
 pub(super) const MAX_FACE_SIZE: usize = 1024;
 
-/// Largest finite half float.
-const F16_MAX: f64 = 65504.0;
+/// A scale beyond this would push dim light, below 0.004, into the subnormal half floats, where steps become visible.
+const MOST_HALF_SCALE: f32 = 64.0;
 
 /// Light below this is dim: half floats have less than half of their range for it.
 const DIM: f64 = 1.0 / 64.0;
@@ -47,7 +47,7 @@ fn rounded(fraction: f64, bits: u32) -> f64 {
     (fraction * steps).round() / steps
 }
 
-/// A cube map with all its levels, each half the size of the one before, down to one texel a face.
+/// A cube map with its levels, each half the size of the one before; those that are box-filtered go down to one texel a face.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pyramid {
     /// Texels along the edge of a face at level 0; a power of two.
@@ -112,19 +112,24 @@ impl Pyramid {
     /// The power of two by which radiance is divided so that half floats can hold it; 1 where they can as it is. Light that is all dim is
     /// brought up to 1: below 6e-5 half floats lose bits, and below 6e-8 all of it.
     pub fn radiance_scale(&self) -> f32 {
-        let max = f64::from(self.levels[0].iter().flatten().copied().fold(0.0, f32::max));
+        let max = self.brightest();
         let exponent = match max {
             0.0 => 0.0,
             max if max < DIM => max.log2().ceil().max(LEAST_EXPONENT),
-            max => (max / F16_MAX).log2().ceil().max(0.0),
+            max => (max / f16::MAX.to_f64()).log2().ceil().max(0.0),
         };
         exponent.exp2() as f32
     }
 
-    /// Whether half floats serve: a scale beyond 64 would push dim light (below 0.004) into their subnormal numbers,
-    /// where steps become visible. Otherwise use [`Self::texels_rgba32f`].
-    pub fn fits_half(&self) -> bool {
-        self.radiance_scale() <= 64.0
+    fn brightest(&self) -> f64 {
+        f64::from(self.levels[0].iter().flatten().copied().fold(0.0, f32::max))
+    }
+
+    /// Whether half floats serve for radiance over `scale`, which may be that of brighter light: for what is not all dim, and by no scale that
+    /// makes dim light of the rest. Otherwise use [`Self::texels_rgba32f`].
+    pub fn fits_half(&self, scale: f32) -> bool {
+        let brightest = self.brightest();
+        scale <= MOST_HALF_SCALE && (brightest == 0.0 || brightest / f64::from(scale) >= DIM)
     }
 
     /// Texels of a level divided by `scale` (see [`Self::radiance_scale`]), alpha 1, for the GPU.
@@ -133,9 +138,8 @@ impl Pyramid {
         self.levels[level].par_iter().map(|&[r, g, b]| [encode(r), encode(g), encode(b), f16::ONE]).collect()
     }
 
-    /// What the GPU has of it where it has half floats.
-    pub fn in_half_floats(&self) -> Self {
-        let scale = self.radiance_scale();
+    /// What the GPU has of it where it has half floats of radiance over `scale`.
+    pub fn in_half_floats(&self, scale: f32) -> Self {
         let decode = |[r, g, b, _]: [f16; 4]| [r, g, b].map(|value| scale * value.to_f32());
         let level = |level| self.texels_rgba16f(level, scale).into_iter().map(decode).collect();
         Self { face_size: self.face_size, levels: (0..self.levels.len()).map(level).collect() }
@@ -527,7 +531,7 @@ mod tests {
             (1e30, 0.0, false),
         ] {
             let pyramid = Pyramid::box_filtered(&environment(4, 2, |_, _| [value; 3]));
-            assert_eq!(pyramid.fits_half(), fits);
+            assert_eq!(pyramid.fits_half(pyramid.radiance_scale()), fits);
             if scale > 0.0 {
                 assert_eq!(pyramid.radiance_scale(), scale);
             }
@@ -537,5 +541,8 @@ mod tests {
             assert!((decoded - value).abs() <= value / 2048.0);
             assert_eq!(pyramid.texels_rgba32f(0, 1.0)[0], [value, value, value, 1.0]);
         }
+        // The scale may be that of brighter light.
+        let dim = Pyramid::box_filtered(&environment(4, 2, |_, _| [0.5; 3]));
+        assert!(dim.fits_half(1.0) && dim.fits_half(32.0) && !dim.fits_half(64.0) && !dim.fits_half(16384.0));
     }
 }

@@ -52,8 +52,8 @@ impl DeviceLight {
             let scale = pyramid.radiance_scale();
             on_device.pyramid = Some(DevicePyramid::new(device, "environment pyramid", pyramid, scale, way_around)?);
         }
-        if let Some(PrefilteredLight { by_ggx, irradiance }) = &light.prefiltered {
-            let scale = by_ggx.radiance_scale();
+        if let Some(prefiltered) = &light.prefiltered {
+            let (PrefilteredLight { by_ggx, irradiance }, scale) = (prefiltered, prefiltered.radiance_scale());
             on_device.pyramid = Some(DevicePyramid::new(device, "environment pyramid", by_ggx, scale, way_around)?);
             on_device.irradiance = Some(DevicePyramid::new(device, "irradiance map", irradiance, scale, way_around)?);
         }
@@ -81,9 +81,7 @@ impl DeviceLight {
         self.finest_level = finest_level(&blurred.rest);
         let pyramid = &blurred.rest.levels;
         let source_pyramid = blurred.sources.as_ref().map_or(&nothing, |pyramid| &pyramid.levels);
-        // One scale for all that is added up.
-        let of_sources = blurred.sources.as_ref().map(|sources| sources.levels.radiance_scale());
-        let scale = of_sources.unwrap_or(0.0).max(pyramid.radiance_scale());
+        let scale = blurred.radiance_scale();
         let map = match blurred.needs.map {
             true => LightMap::with_sources_marked(environment),
             false => LightMap { width: 1, height: 1, texels: vec![[0.0; 4]] },
@@ -144,7 +142,7 @@ impl DevicePyramid {
         way_around: Option<WayAround>,
     ) -> Result<Self> {
         let single = vk::Format::R32G32B32A32_SFLOAT;
-        let use_single = !pyramid.fits_half() && device.filters_linearly(single);
+        let use_single = !pyramid.fits_half(scale) && device.filters_linearly(single);
         let level = |level| -> Vec<u8> {
             if use_single {
                 bytemuck::cast_slice(&pyramid.texels_rgba32f(level, scale)).to_vec()
