@@ -31,11 +31,9 @@ layout(set = 0, binding = 4, std430) readonly buffer Shaders {
 
 layout(push_constant) uniform Push {
     uvec2 size_px;
-    // Sub-pixels count as one smooth surface whose normals' variance along each of two axes is below the first, and whose tangents' around the
-    // normal below the second, in rad^2,
+    // Of normals along each of two axes, and of tangents around the normal, in rad^2: below both, sub-pixels are one smooth surface,
     vec2 smooth_variance;
-    // if all normals lie within this angle of the first one's.
-    float cos_smooth;
+    float cos_smooth; // if all their normals are also within this angle of the first one's
     uint shader_of_mixed; // the shader of pixels of materials that have different ones
 } push;
 
@@ -130,10 +128,10 @@ void main() {
     }
     uint k = gl_LocalInvocationIndex;
     if (k < CLASSES && listed[k] > 0) {
-        uint place = atomicAdd(counters.classes[k].tile_count, 1);
+        uint tile_place = atomicAdd(counters.classes[k].tile_count, 1);
         uint tile_count = gl_NumWorkGroups.x * gl_NumWorkGroups.y;
-        tile_list.tiles[k * tile_count + place] = pack_tile(this_tile(), first_slot(k), listed[k]);
-        atomicMax(counters.classes[k].groups_x, min(place + 1, MAX_GROUPS));
+        tile_list.tiles[k * tile_count + tile_place] = pack_tile(this_tile(), first_slot(k), listed[k]);
+        atomicMax(counters.classes[k].groups_x, min(tile_place + 1, MAX_GROUPS));
         atomicMax(counters.classes[k].groups_y, 1);
         atomicMax(counters.classes[k].groups_z, 1);
         atomicAdd(counters.counted.pixels[kind_of(k)], listed[k]);

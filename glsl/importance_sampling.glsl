@@ -105,7 +105,7 @@ vec3 sample_half_vector(uint start, vec2 u) {
     return vec3(2.0 * sqrt(s * (1.0 - s)) * vec2(cos(phi), sin(phi)), 1.0 - 2.0 * s);
 }
 
-// Density in 1/sr of the half vector h by the row at `start`; which cell holds h is the same for all rows.
+// The cell of the table that holds a half vector: the same for all rows.
 struct SliceCell {
     uint ring;
     uint azimuth;

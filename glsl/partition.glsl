@@ -24,9 +24,9 @@ vec4 shade_pixel(uvec2 pixel, bool interior) {
         if (is_covered(texel)) {
             ++covered;
             Surface surface = surface_of_subpixel(subpixel, texel);
-            surface.normal_variance = stride > 1 ? normal_variance : 0.0;
-            sum += estimate(surface, materials[geometry_material(texel)], stride > 1 ? j : 0, stride);
+            surface.normal_variance = normal_variance;
+            sum += estimate(surface, materials[geometry_material(texel)], interior ? j : 0, stride);
         }
     }
-    return vec4(stride > 1 ? sum : sum / float(subpixel_count), float(covered) / float(subpixel_count));
+    return vec4(interior ? sum : sum / float(subpixel_count), float(covered) / float(subpixel_count));
 }

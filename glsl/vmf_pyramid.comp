@@ -31,7 +31,7 @@ layout(push_constant) uniform Push {
 const float TEXELS_A_WIDTH = 2.0;
 const float KERNEL_EXTENT = 8.0;
 
-// 1 - the mean cosine of a vMF kernel, 1 + 1 / kappa - coth(kappa).
+// 1 - the mean cosine of a vMF kernel, 1 + 1 / kappa - coth(kappa) (F12).
 float vmf_deficit(float kappa) {
     // Beyond 10, coth is 1 to the last bit of what is left.
     return kappa > 10.0 ? 1.0 / kappa : 1.0 + 1.0 / kappa - 1.0 / tanh(kappa);
@@ -39,13 +39,14 @@ float vmf_deficit(float kappa) {
 
 float kappa_of_deficit(float deficit) {
     float kappa = 1.0 / deficit;
-    // There it is the deficit's inverse itself, and elsewhere close to that.
+    // Beyond 10 kappa is the deficit's inverse; below, that is where the iteration starts.
     for (int i = 0; kappa <= 10.0 && i < 20; ++i) {
         kappa *= vmf_deficit(kappa) / deficit;
     }
     return kappa;
 }
 
+// 1 - the mean cosine of what a texel was convolved with (F13).
 float texel_deficit(uint kernel, float size, vec3 direction) {
     float solid_angle = texel_solid_angle(size, direction);
     if (kernel == BOX) {
@@ -115,7 +116,7 @@ void main() {
     vec3 centre = normalize(cube_point(id.z, (vec2(id.xy) + 0.5) / float(push.size)));
     float from = texel_deficit(push.from_kernel, float(push.from_size), centre);
     float wanted = texel_deficit(push.kernel, float(push.size), centre);
-    float kappa = kappa_of_deficit((wanted - from) / (1.0 - from));
+    float kappa = kappa_of_deficit((wanted - from) / (1.0 - from)); // (F14)
     float extent = min(KERNEL_EXTENT / kappa, 2.0); // 1 - cos of the cone that the kernel fills
     float sin_cone = extent < 1.0 ? sqrt(extent * (2.0 - extent)) : 1.0;
     vec4 sum = vec4(0.0);
@@ -142,5 +143,5 @@ void main() {
             }
         }
     }
-    write(id, sum.rgb / sum.a);
+    write(id, sum.rgb / sum.a); // (F15)
 }

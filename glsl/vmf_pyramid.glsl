@@ -15,7 +15,7 @@ float power_of_4(int n) {
 }
 
 // Variance along each axis of a kernel of `level`, over that of level 0: of whole levels 4^level, of level -1, the environment as it
-// is, none; between them kernels blend, and so do their variances.
+// is, none; between them kernels blend, and so do their variances (F16).
 float variance_of_level(float level) {
     float whole = floor(level);
     return level < 0.0 ? level + 1.0 : power_of_4(int(whole)) * (1.0 + 3.0 * (level - whole));
@@ -36,7 +36,7 @@ float variance_of_pixel(float normal_variance) {
     return 4.0 * normal_variance / (FINEST_WIDTH_RAD * FINEST_WIDTH_RAD);
 }
 
-// The level of a kernel with so much more variance.
+// The level of a kernel with so much more variance (F27).
 float level_within_pixel(float level, float added_variance) {
     return level_of_variance(variance_of_level(level) + added_variance);
 }
@@ -60,7 +60,7 @@ vec3 sharp_radiance(vec3 d, float sources) {
 // little is lost; and nearly all lobes but mirrors have no use then for the environment as it is, which costs several lookups.
 const float AS_SHARP = 0.625;
 
-// How much of a kernel of `level` is the environment as it is, the rest being the finest level.
+// How much of a kernel of `level` is the environment as it is, the rest being the finest level (F16).
 float sharp_part(float level) {
     return max(1.0 - variance_of_level(level) / (AS_SHARP * variance_of_level(push.finest_level)), 0.0);
 }

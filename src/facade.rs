@@ -117,7 +117,7 @@ impl Renderer {
     /// ```
     ///
     /// # Errors
-    /// A material that there is not; a number of threads from 1 to 128 it is not.
+    /// A material that there is not; a number of threads that is not from 1 to 128.
     pub fn threads(&self, material: impl Into<MaterialSource>, count: usize) -> Result<Threads> {
         let round = self.memo.round(&());
         let (brdf, _) = in_own_axes(&round.ask(&LoadMaterial(&material.into()))?);

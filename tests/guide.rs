@@ -86,22 +86,64 @@ fn what_does_not_exist_is_found_out() {
     assert_eq!(found, expected);
 }
 
+/// The number of an equation of ours, as in "(F12)".
+fn equation(word: &str) -> Option<usize> {
+    word.strip_prefix("(F")?.strip_suffix(')')?.parse().ok()
+}
+
+/// The numbers of equations that a text cites in brackets.
+fn cited_equations(text: &str) -> impl Iterator<Item = usize> {
+    text.split(['(', ')']).filter_map(|part| equation(&format!("({part})")))
+}
+
+/// The files in `folder` and below whose names end in one of `extensions`.
+fn files_below(folder: &Path, extensions: &[&str]) -> Vec<PathBuf> {
+    let entries =
+        fs::read_dir(folder).expect("a readable folder").map(|entry| entry.expect("a readable folder").path());
+    let has_one =
+        |path: &Path| path.extension().is_some_and(|own| extensions.iter().any(|extension| own == *extension));
+    entries
+        .flat_map(|path| match path.is_dir() {
+            true => files_below(&path, extensions),
+            false => Vec::from_iter(has_one(&path).then_some(path)),
+        })
+        .collect()
+}
+
+#[test]
+fn files_that_cite_an_equation_are_named_by_the_chapter_that_has_it() {
+    let chapter = fs::read_to_string(root().join("src/guide/method.md")).expect("the chapter");
+    let in_chapter: Vec<_> =
+        chapter.lines().filter_map(|line| equation(line.split_whitespace().next_back()?)).collect();
+    let sources =
+        ["src", "glsl"].map(|folder| files_below(&root().join(folder), &["rs", "glsl", "comp", "frag", "vert"]));
+    let mut citations = 0;
+    for path in sources.concat() {
+        let text = fs::read_to_string(&path).expect("a readable source");
+        let name = path.strip_prefix(root()).expect("it is below").display().to_string();
+        for cited in cited_equations(&text) {
+            assert!(in_chapter.contains(&cited), "{name} cites (F{cited}), which the chapter does not have");
+            assert!(chapter.contains(&name), "{name} cites (F{cited}), but the chapter does not name the file");
+            citations += 1;
+        }
+    }
+    assert!(citations > 20, "{citations}");
+}
+
 #[test]
 fn equations_are_numbered_in_order() {
     let text = fs::read_to_string(root().join("src/guide/method.md")).expect("the chapter");
-    let number = |word: &str| word.strip_prefix("(F")?.strip_suffix(')')?.parse::<usize>().ok();
     let mut in_block = false;
     let mut numbers = Vec::new();
     for line in text.lines() {
         if line.trim_start().starts_with("```") {
             in_block = !in_block;
         } else if in_block {
-            numbers.extend(line.split_whitespace().next_back().and_then(number));
+            numbers.extend(line.split_whitespace().next_back().and_then(equation));
         }
     }
     assert!(numbers.len() > 20 && numbers.iter().copied().eq(1..=numbers.len()), "{numbers:?}");
-    let cited = text.split(['(', ')']).filter_map(|part| number(&format!("({part})")));
-    assert!(cited.into_iter().all(|cited| (1..=numbers.len()).contains(&cited)));
+    assert!(cited_equations(&text).all(|cited| (1..=numbers.len()).contains(&cited)));
 }
 
 #[test]

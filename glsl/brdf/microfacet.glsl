@@ -14,7 +14,7 @@ float microfacet_density(float distribution, vec3 h, vec2 alpha) {
     float cos2 = h.z * h.z;
     if (distribution == DISTRIBUTION_BECKMANN) {
         float exponent = sin2_alpha2 / cos2;
-        // e^-80 is about the smallest float; beyond, 0 / 0 threatens at grazing h.
+        // e^-80 is 2e-35, as good as nothing; far beyond, 0 / 0 threatens at grazing h.
         return exponent < 80.0 ? exp(-exponent) * 0.318309886 / (alpha.x * alpha.y * cos2 * cos2) : 0.0;
     }
     // At most a million: its square times alpha_x alpha_y, no less than a millionth, is in range.

@@ -23,7 +23,7 @@ struct Lobe {
 };
 
 // How far `direction` is from the middle of the lobe, in radians: of a long one measured across it, with what is along it shortened by as
-// much as the lobe is long.
+// much as the lobe is long (F34).
 float away_from(Lobe lobe, Surface surface, Material material, vec3 direction) {
     if (HAS_TANGENTS == 0 || material.threads.azimuth_count == 1) {
         return distance(direction, lobe.mirror);
@@ -37,9 +37,9 @@ float away_from(Lobe lobe, Surface surface, Material material, vec3 direction) {
 }
 
 // How far a source is from where the BRDF cannot be taken at a few points of it, because it is mirrored towards the eye and wider than
-// the lobe; in half standard deviations of the source. Within a half vector of lobe_width f loses a quarter, as a Gaussian does
+// the lobe; in units of two standard deviations of the source (F28). Within a half vector of lobe_width f loses a quarter, as a Gaussian does
 // at 0.76 of its width; reflection doubles that. Twin: src/environment/sources.rs, with CLEAR for the bounds of its use below.
-float clearance(float source_width, float lobe_width, float away) {
+float clearance(float away, float source_width, float lobe_width) {
     return (away + 4.0 * 2.6 * lobe_width) / (2.0 * source_width);
 }
 
@@ -49,7 +49,7 @@ const float FAR = 4.0;
 // The clearance of a source that counts as no narrower than `least_width`.
 float clearance_of(Source source, Lobe lobe, Surface surface, Material material, float least_width) {
     float away = away_from(lobe, surface, material, source.direction.xyz);
-    return clearance(max(source.direction.w, least_width), lobe.width, away);
+    return clearance(away, max(source.direction.w, least_width), lobe.width);
 }
 
 // Whether a source is to be taken part by part, if it has any: where few points of it do not do beside the lobe, or it is so wide that
@@ -73,7 +73,7 @@ uint descend(uint s, Lobe lobe, Surface surface, Material material, float least_
 }
 
 // How much of the answer to sources is the BRDF's, where this is the least clearance of one: the rest is the kernels', which fit best
-// where the mirrored view is.
+// where the mirrored view is (F29).
 float share_of_brdf(float least_clearance) {
     return smoothstep(1.25, 2.5, least_clearance);
 }
@@ -118,7 +118,7 @@ struct AtSources {
 };
 
 // Of a square of light around a direction of this z, whose standard deviation along z is this: what part of it has risen above the
-// horizon, times z in the middle of that part; and that z.
+// horizon, times z in the middle of that part; and that z (F31).
 vec2 risen(float z, float deviation) {
     // Light straight above has none.
     float half_side = max(sqrt(3.0) * deviation, 1e-6);
@@ -278,7 +278,7 @@ vec3 albedo_at(Rows rows) {
     return albedo;
 }
 
-// Three loops, not one with three branches: where a driver masks lanes out, each pays for what none of its lanes does. For the same reason
+// (F10) and (F30). Three loops, not one with three branches: where a driver masks lanes out, each pays for what none of its lanes does. For the same reason
 // tests are at the ends of loops.
 vec3 estimate(Surface surface, Material material, uint first, uint stride) {
     ThreadTable table = material.threads;
@@ -325,7 +325,7 @@ vec3 estimate(Surface surface, Material material, uint first, uint stride) {
             }
         } while ((k += stride) < table.count);
     }
-    vec3 cosine_part = albedo_at(rows) - float(stride) * weights;
+    vec3 cosine_part = albedo_at(rows) - float(stride) * weights; // (F11)
     ++lookups;
     vec3 irradiance = textureLod(irradiance_map, surface.frame[2], 0.0).rgb;
     sum = float(stride) * sum + cosine_part * irradiance;

@@ -24,7 +24,7 @@ struct WeightedSum {
 // Each sub-pixel looks where its part of the threads points, and the directions of one fill the gaps between those of another,
 // but only where their normals agree. Normals d apart reflect 2 d apart, and gaps stay open once that is half of their
 // width: then each lookup has to stand for the 4 d beside it in either direction. For 2 x 2 sub-pixels the variance is d^2 / 4
-// along each axis, so (4 d)^2 is 64 times that, for each of the other sub-pixels.
+// along each axis, so (4 d)^2 is 64 times that, for each of the other sub-pixels (F5).
 float lookup_solid_angle(Surface surface, Material material, Partition share, float log2_p) {
     float share_sr = exp2(-log2_p) / float(material.threads.count);
     float footprint_sr = 64.0 * float(share.stride - 1) * surface.normal_variance;
@@ -48,7 +48,7 @@ void add_term(inout WeightedSum sum, Surface surface, Material material, mat3 fr
     sum.radiance += weight * radiance;
 }
 
-// The mean radiance, weighted channel by channel; black where nothing is reflected.
+// The mean radiance, weighted channel by channel (F6); black where nothing is reflected.
 vec3 weighted_mean(WeightedSum sum) {
     return mix(sum.radiance / sum.weight, vec3(0.0), lessThanEqual(sum.weight, vec3(0.0)));
 }
@@ -89,7 +89,7 @@ vec3 threads_following_view(Surface surface, Material material, Rows rows, Parti
 }
 
 // The threads of the first row, in a frame that does not turn, carried to this view along their half vectors: lobes stay
-// lobes, and p changes by the Jacobian 4 (w_o . h) of the reflection.
+// lobes, and p changes by the ratio of both reflections' Jacobians, (n . h) / (w_o . h) (F7).
 vec3 threads_of_facing_view(Surface surface, Material material, Partition share) {
     mat3 frame = fixed_frame(surface.frame[2], to_environment(push.camera.right.xyz));
     vec3 w_o = surface.w_o * frame;

@@ -29,10 +29,10 @@ const WIDEST_RAD: f64 = 0.006;
 pub const CLEAR: [f32; 2] = [1.25, 2.5];
 
 /// How far a source `away` from the mirrored view is from where the BRDF cannot be taken at a few points of it, because it is mirrored
-/// towards the eye and wider than the lobe; in half standard deviations, `width`, of the source. All in radians.
+/// towards the eye and wider than the lobe; in units of two standard deviations, `source_width`, of the source. All in radians.
 /// Twin of `clearance` in glsl/methods/fitted.glsl.
-pub fn clearance(away: f32, width: f32, lobe_width: f32) -> f32 {
-    (away + 4.0 * 2.6 * lobe_width) / (2.0 * width)
+pub fn clearance(away: f32, source_width: f32, lobe_width: f32) -> f32 {
+    (away + 4.0 * 2.6 * lobe_width) / (2.0 * source_width)
 }
 
 /// A source: light around a direction.

@@ -127,7 +127,7 @@ fn vmf_deficit(kappa: f64) -> f64 {
 /// kappa of the vMF kernel whose mean cosine is 1 - `deficit`.
 fn kappa_of_deficit(deficit: f64) -> f64 {
     let kappa = 1.0 / deficit;
-    // There it is the deficit's inverse itself, and elsewhere close to that.
+    // Beyond 10 kappa is the deficit's inverse; below, that is where the iteration starts.
     if kappa > 10.0 { kappa } else { (0..20).fold(kappa, |kappa, _| kappa * vmf_deficit(kappa) / deficit) }
 }
 

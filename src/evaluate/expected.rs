@@ -53,7 +53,7 @@ impl TrueSample {
         Ok(Self { truth: Comparable::from_radiance(pixels.len(), 1, &radiance, true, display), pixels, display })
     }
 
-    /// The RMS of display values to be expected of a picture: that of the pixels that were looked at. 0 where no surface is seen.
+    /// The RMS of display values to be expected of a picture: that of the pixels that were looked at (F39). 0 where no surface is seen.
     /// `radiance` is as [`Rendering::radiance`](crate::pipeline::Rendering::radiance) has it, without the environment behind.
     pub fn expected_rms(&self, radiance: &[[f32; 4]]) -> f64 {
         let here: Vec<_> = self.pixels.iter().map(|&pixel| radiance[pixel]).collect();

@@ -184,7 +184,7 @@ pub fn speed_charts(timings: &Timings) -> Vec<Chart> {
             label: "threads or samples".to_owned(),
             ticks: counts(timings.frames.iter().map(|frame| frame.threads)),
         },
-        y: Axis { label: "time of shading, ms".to_owned(), ticks: Vec::new() },
+        y: Axis { label: "time on the device, ms".to_owned(), ticks: Vec::new() },
         curves,
     }];
     let times = |label: &str| Axis { label: label.to_owned(), ticks: (0..8).map(|power| 2_f64.powi(power)).collect() };

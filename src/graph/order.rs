@@ -12,7 +12,7 @@ struct Edge {
 
 /// The declared indices of the live passes in the order in which they run.
 ///
-/// Only culled-in passes count: a cycle among passes that do not run is not found.
+/// Only passes that run count: a cycle among passes that do not run is not found.
 pub(super) fn order<W>(graph: &Graph<W>, live: &[bool]) -> Result<Vec<usize>, GraphError> {
     let edges = edges(graph, live);
     let mut waiting: Vec<usize> = (0..live.len()).filter(|&pass| live[pass]).collect();

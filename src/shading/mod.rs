@@ -156,7 +156,7 @@ impl<'a> CpuShader<'a> {
     /// Makes what the method of `prepared` looks up, as the device has it.
     ///
     /// # Errors
-    /// A shader that cannot be read.
+    /// Cancelled.
     pub fn new(prepared: &'a Prepared, round: &Round) -> Result<Self> {
         let Prepared { method, environment, materials, .. } = prepared;
         let evaluates_brdf = method.evaluates_brdf(environment);

@@ -5,7 +5,7 @@
 //! | bytes | content |
 //! |---|---|
 //! | 8 | magic `THREADS\0` |
-//! | 4 | u32 format version, now 15 |
+//! | 4 | u32 format version, [`FORMAT_VERSION`] |
 //! | 4 | u32 length H of the header |
 //! | H | header, JSON: `method` ("fitted", "paper" or "gaussian"), `material`, `count`, `rows`, `seed`, and `azimuths` and `sets` if there is more than one |
 //! | ... | the rows, then the threads, see below |

@@ -62,7 +62,7 @@ fn push(s_i: DVec3, s_j: DVec3, distance2: f64, reach: f64, is_first: bool) -> D
     strength(angle / reach) * away
 }
 
-/// Moves `samples` along their forces until they settle, or for `iterations` steps; `fixed` ones stay where they are.
+/// Moves `samples` along their forces (F2) until they settle, or for `iterations` steps; `fixed` ones stay where they are.
 pub fn settle(
     slice: &Slice,
     samples: &mut [DVec3],
@@ -105,7 +105,8 @@ pub fn settle(
                 }
                 let step = (STEP * force(i, samples, &sigma)).clamp_length_max(LONGEST_STEP);
                 let next = (s + sigma[i] * step).normalize();
-                let mean_density = 1.0 / (samples.len() as f64 * 2.0 * PI * (1.0 - sigma[i].cos()).max(1e-14));
+                let cone_sr = 4.0 * PI * (0.5 * sigma[i]).sin().powi(2);
+                let mean_density = 1.0 / (samples.len() as f64 * cone_sr);
                 let density = slice.pdf(next);
                 let is_inside = density >= LEAST_DENSITY * mean_density || density > slice.pdf(s);
                 if is_inside && next.z > MIN_COS { (next, step.length()) } else { (s, 0.0) }

@@ -115,7 +115,7 @@ fn evaluated(slice: &Slice, candidates: [DVec3; 2]) -> Sample {
     for direction in candidates {
         let rounded = Sample::new(direction, 0.0);
         let p = slice.pdf(rounded.direction());
-        // Below that single precision has no reciprocal.
+        // Far below any pdf that carries light, and its reciprocal is far from the largest number of single precision.
         if p > 1e-30 {
             return Sample { p: p.min(f64::from(f32::MAX)) as f32, ..rounded };
         }

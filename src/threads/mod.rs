@@ -51,7 +51,7 @@ pub type WithThreads<'a> = (&'a LobeShape, Option<&'a Threads>);
 /// it by, and far below what any view angle of a table needs.
 pub const MIN_COS: f64 = 1e-4;
 
-/// Most threads that a table can have.
+/// Most of the paper's threads that a table can have.
 pub const MAX_COUNT: usize = 1024;
 
 /// Which threads.

@@ -25,14 +25,14 @@ impl Resolution {
 ///
 /// It is tabulated over the half vector h: theta_h = 90 deg x^2 with x uniform, phi_h uniform over the whole circle (measured
 /// tables need not be mirror-symmetric about the plane of incidence). With w_i the reflection of w_o about h,
-/// dw_i = 4 (w_o . h) dw_h. A glossy lobe thus lies about x = 0 at every view angle, and the square resolves a narrow one.
+/// dw_i = 4 (w_o . h) dw_h (F1). A glossy lobe thus lies about x = 0 at every view angle, and the square resolves a narrow one.
 pub struct Slice<'a> {
     brdf: SeenBrdf<'a>,
     w_o: DVec3,
-    /// Luminance of f below which nothing counts: 0, or see [`Slice::lobes`].
+    /// Luminance of f below which nothing counts: 0, or the median of f ([`Slice::with_lobes`]).
     base: f64,
     albedo: DVec3,
-    /// What `density` integrates to.
+    /// The integral of luminance f (n . w_i) above the base: the denominator of equation (4).
     total: f64,
     resolution: Resolution,
     /// CDF over x: a value more than steps, from 0 to 1.
@@ -354,8 +354,7 @@ mod tests {
     }
 
     #[test]
-    fn points_of_equal_mass_give_the_albedo_as_a_monte_carlo_estimate() {
-        // The mean of 1 / p over points drawn with p is the solid angle of where p > 0: all of the hemisphere.
+    fn points_of_a_diffuse_surface_are_cosine_distributed() {
         let brdf = Brdf::from_parameters("lambert", toml::toml! { reflectance = 0.5 }).unwrap();
         for theta_o_deg in [0.0f64, 40.0, 70.0] {
             let slice = Slice::new(&SeenBrdf::from_all_around(&brdf), theta_o_deg.to_radians());

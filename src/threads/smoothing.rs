@@ -1,4 +1,4 @@
-//! Smoothing, section 3.2.2: each thread moves by half its Laplacian vector over theta_o.
+//! Smoothing, section 3.2.2: each thread moves by half its Laplacian vector over theta_o (F3).
 use glam::DVec3;
 
 /// Smooths one thread, given as one unit direction per row. The first and the last stay: they have one neighbour.

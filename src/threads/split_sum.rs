@@ -39,7 +39,8 @@ pub struct SplitSum {
 }
 
 impl SplitSum {
-    /// Of `brdf`; of an anisotropic one the mean over the azimuths of the view.
+    /// Of `brdf`. Of an anisotropic one the roughness is that of the mean over the azimuths of the view, and albedos are the means of those
+    /// along and across the tangent.
     pub fn new(brdf: &Brdf) -> Self {
         let (seen, is_isotropic) = (SeenBrdf::from_all_around(brdf), brdf.is_isotropic());
         let answers: Vec<_> = FITTED_ROWS.into_par_iter().map(|row| Answers::new(&seen, row)).collect();

@@ -73,7 +73,7 @@ impl ThreadTable {
 
     /// Direction and pdf of `thread` seen from `theta_o` (radians), between rows: directions blend as unit vectors (a blend of
     /// phi would break where it wraps), pdfs by their logarithm: half-way between rows a white furnace is 2 to 3 times nearer
-    /// to the albedo than with a linear blend. Beyond the last row that row holds.
+    /// to the albedo than with a linear blend (F4). Beyond the last row that row holds.
     pub fn interpolate(&self, theta_o: f64, thread: usize) -> (DVec3, f64) {
         let position = (theta_o / FRAC_PI_2 * self.rows as f64).clamp(0.0, (self.rows - 1) as f64);
         let (low, t) = (position as usize, position.fract());

@@ -85,7 +85,7 @@ impl<'a, G: Fn(&[DVec3]) -> Vec<DVec3>> Cubature<'a, G> {
         Cell { place, change: DVec3::ZERO, squares: DVec3::ZERO }
     }
 
-    /// Splits a cell: the estimate changes by what its polynomial misses at the new nodes, and that is the parts' error.
+    /// Splits a cell: the estimate changes by what its polynomial misses at the new nodes, and that is the parts' error (F37).
     fn parts(&mut self, cell: Cell) -> [Cell; 4] {
         let values = self.values(cell.place.nodes::<FINE_NODES>());
         let interpolated = interpolate(&values);

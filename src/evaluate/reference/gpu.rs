@@ -91,7 +91,7 @@ impl Sums {
         self.radiance / f64::from(frames)
     }
 
-    /// The standard error of the mean, as display values show it.
+    /// The standard error of the mean, as display values show it (F38).
     fn display_error(&self, frames: u32, display: Display) -> DVec3 {
         let mean = self.mean(frames);
         // Rounding may make the variance of equal numbers negative.

@@ -23,7 +23,7 @@ pub const LAST_LEVEL: u32 = 23;
 
 /// Weights are kept for cells of about so many pixels a side or more; those of smaller ones are cheap to make again.
 const KEPT_PX: usize = 2;
-/// Kept levels end here, at 226 MB, however large the picture is; and here, where the sine of theta is a polynomial over a cell.
+/// Kept levels end here, at 302 MB in all, however large the picture is; and here, where the sine of theta is a polynomial over a cell.
 const LAST_KEPT_LEVEL: u32 = 10;
 const LEAST_KEPT_LEVEL: u32 = 5;
 
@@ -58,8 +58,8 @@ impl CellPlace {
         DVec3::new(theta.sin() * phi.sin(), theta.cos(), -theta.sin() * phi.cos())
     }
 
-    /// From the middle to that of an edge of constant phi, whichever is longer of the two edges' ends taken for its length, and to that
-    /// of an edge of constant theta.
+    /// Half of the cell's width at its widest row, towards the middle of an edge of constant phi; and half of its height, towards that of an
+    /// edge of constant theta.
     pub fn half_edges(self) -> [DVec3; 2] {
         let [phi, theta] = self.middle_angles();
         let half = 0.5 * self.side();

@@ -37,7 +37,7 @@ impl Lobe {
 
     /// It as seen from unit `w_o`, which is in the frame of the surface: with the least radius at the view angles beside that of `w_o`.
     pub fn seen_from(&self, w_o: DVec3) -> SeenLobe<'_> {
-        let theta_o_deg = w_o.z.acos().to_degrees();
+        let theta_o_deg = w_o.truncate().length().atan2(w_o.z).to_degrees();
         let next = VIEWS_DEG.iter().position(|&view| view > theta_o_deg).unwrap_or(VIEWS_DEG.len() - 1);
         SeenLobe { lobe: self, w_o, radius: self.radii[next].min(self.radii[next - 1]) }
     }

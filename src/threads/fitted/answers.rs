@@ -39,10 +39,10 @@ impl Pair {
         (values, by_cos)
     }
 
-    /// The integral of the product of two kernels, and its derivative by the cosine between their directions, of which `one_minus_cos`
-    /// is 1 less. `NARROW`: the kappas sum to more than [`NARROW_SUM`].
+    /// The integral of the product of two kernels, and its derivative by the cosine between their directions, which is
+    /// 1 - `one_minus_cos`. `NARROW`: the kappas sum to more than [`NARROW_SUM`].
     ///
-    /// With R = |a d + b c| it is a b sinh R / (4 pi R sinh a sinh b) (Jupp and Mardia 1989), here with the exponentials divided out.
+    /// With R = |a d + b c| it is a b sinh R / (4 pi R sinh a sinh b) (Jupp and Mardia 1989), here with the exponentials divided out (F18).
     #[inline(always)]
     fn overlap<const NARROW: bool>(&self, one_minus_cos: f32) -> (f32, f32) {
         // Both kappas are at least 1, so R is only small where directions are opposite; 1e-3 is far from where 1 / R matters.

@@ -34,7 +34,7 @@ pub fn in_sets(lobes: &Slice, count: usize, sets: usize) -> Vec<Kernel> {
     (0..count).map(moved).collect()
 }
 
-/// Kernels at the centroids of `count` cells of `lobes`, as wide as their second moments say, with the mass of the cell.
+/// Kernels at the centroids of `count` cells of `lobes`, as wide as their second moments say, with the mass of the cell (F26).
 /// What lobes stand on is left to the cosine kernel: started there, most kernels stay there, and a few cannot make out a lobe's core.
 ///
 /// Lloyd's relaxation (1982) of points of equal mass.

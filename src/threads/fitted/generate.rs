@@ -34,7 +34,7 @@ const TIED: f64 = 1e-6;
 pub(super) const MOST_MOVED: f64 = 0.06;
 
 /// The same for an anisotropic BRDF, whose rows have two neighbours, where kernels err between rows by more than this part of what the
-/// worse of both does.
+/// worse of both does (F33).
 const MOST_BETWEEN: f64 = 1.1;
 
 /// Test lights of a row: so many, and so many more for each thread. Of too few, many threads answer each alone and err between them: with
@@ -197,7 +197,8 @@ fn fit_all(
 /// How far kernels have moved, at most, from where they were `before` or where they are carried to, whichever is nearer: in widths and in
 /// levels, times their part of the `albedo`, and by how much that part has changed.
 pub(super) fn most_moved([before, carried]: [&[Kernel]; 2], kernels: &[Kernel], albedo: DVec3) -> f64 {
-    let share = |kernel: &Kernel| luminance(kernel.weight) / luminance(albedo);
+    // A black row has no weights.
+    let share = |kernel: &Kernel| luminance(kernel.weight) / luminance(albedo).max(f64::MIN_POSITIVE);
     let moved = |((a, carried), b): ((&Kernel, &Kernel), &Kernel)| {
         let away = a.direction.distance(b.direction).min(carried.direction.distance(b.direction));
         let away = away / scale_rad(a.level.min(b.level)) + (a.level - b.level).abs();
@@ -238,7 +239,7 @@ pub(super) fn scaled(kernels: &[Kernel], scale: f64) -> Vec<Kernel> {
     kernels.iter().map(|kernel| Kernel { weight: scale * kernel.weight, ..*kernel }).collect()
 }
 
-/// Kernels of the row for the view `from` as a start for that of `to`.
+/// Kernels of the row for the view `from` as a start for that of `to` (F32).
 pub(super) fn carried(kernels: &[Kernel], from: View, to: View) -> Vec<Kernel> {
     let [w_from, w_to] = [from, to].map(|View { theta_o, .. }| dvec3(theta_o.sin(), 0.0, theta_o.cos()));
     // In the frame of the view the surface turns against it.

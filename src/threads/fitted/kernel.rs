@@ -1,8 +1,8 @@
 //! Von Mises-Fisher kernels: what one trilinear lookup in the environment's pyramid weighs directions by.
 //!
-//! vMF(w; d, kappa) = kappa / (2 pi (1 - exp(-2 kappa))) exp(kappa (w . d - 1)); its width is sigma = 1 / sqrt(kappa). Level l of a
+//! vMF(w; d, kappa) = kappa / (2 pi (1 - exp(-2 kappa))) exp(kappa (w . d - 1)); its width is sigma = 1 / sqrt(kappa) (F8). Level l of a
 //! pyramid holds the environment convolved with the kernel of width [`FINEST_WIDTH_RAD`] 2^l, and a lookup between two levels has a
-//! linear blend of their kernels. Level -1 is the environment as it is.
+//! linear blend of their kernels (F9). Level -1 is the environment as it is.
 use std::f64::consts::PI;
 
 use glam::DVec3;

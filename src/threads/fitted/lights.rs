@@ -97,6 +97,7 @@ impl TestLights {
 
         let unit = unit(slice);
         let scale_of = |j: usize| j / (2 * per_scale);
+        // (F20)
         let weights = response.iter().enumerate().map(|(j, response)| {
             light_width(scale_of(j)).powf(WIDTH_EXPONENT) / (luminance(*response) / unit + DIM_RESPONSE)
         });
@@ -160,7 +161,7 @@ fn parts(directions: &[DVec3]) -> [Vec<f32>; 3] {
 
 impl Quadrature {
     /// The integral of f cos over each light at `directions`, whose parts are `parts`: points of equal mass of the slice and points of
-    /// each light, with the balance heuristic.
+    /// each light, with the balance heuristic (F19).
     fn responses(self, slice: &Slice, directions: &[DVec3], parts: &[Vec<f32>; 3]) -> Vec<DVec3> {
         let each = directions.len() / SCALES;
         let mut sums = self.of_slice_points(slice, parts, each);

@@ -75,7 +75,7 @@ impl<'a> Fit<'a> {
         squares(&self.lights.response)
     }
 
-    /// The square root of the sum over lights and channels of squared weighted residuals, over that of squared weighted responses; in units of
+    /// The square root of the sum over lights and channels of squared weighted residuals, over that of squared weighted responses (F23); in units of
     /// `lights` where nothing is answered, so that threads that are carried there have an error of finite size.
     pub fn relative_error(&self, kernels: &[Kernel]) -> f64 {
         let residuals = self.residuals(kernels, &Answers::new(kernels, self.lights), None);
@@ -83,7 +83,7 @@ impl<'a> Fit<'a> {
         (squares(&residuals) / if responses > 0.0 { responses } else { 1.0 }).sqrt()
     }
 
-    /// Weighted, of all kernels or of a set alone: red, green, blue.
+    /// (F21), of all kernels or of a set alone: red, green, blue.
     fn residuals(&self, kernels: &[Kernel], answers: &Answers, set: Option<usize>) -> [Vec<f32>; 3] {
         let TestLights { cosine, response, .. } = self.lights;
         let (first, stride) = set.map_or((0, 1), |set| (set, self.sets));
@@ -102,7 +102,7 @@ impl<'a> Fit<'a> {
         })
     }
 
-    /// What is left to answer, with the cost of that.
+    /// What is left to answer, with the cost of that: (F22) but for its last sum.
     fn rest(&self, kernels: &[Kernel], answers: &Answers) -> Rest {
         let together = self.residuals(kernels, answers, None);
         let mut cost = squares(&together) + self.prior_cost(kernels);
@@ -121,6 +121,7 @@ impl<'a> Fit<'a> {
         Rest { cost, of_sets }
     }
 
+    /// The last sum of (F22).
     fn prior_cost(&self, kernels: &[Kernel]) -> f64 {
         let Some((before, strength)) = self.prior else { return 0.0 };
         let cost = kernels.iter().zip(before).map(|(kernel, before)| {
@@ -132,7 +133,7 @@ impl<'a> Fit<'a> {
 
     /// The levels that each kernel may go to in one step, from and to. The cost has a kink at each whole level: a step ends there, and
     /// stays there where the cost rises both ways. Otherwise derivatives would be those of the wrong side, and one kernel at
-    /// a kink would keep all from moving.
+    /// a kink would keep all from moving (F25).
     fn level_bounds(&self, kernels: &[Kernel], answers: &Answers, rest: &Rest) -> Vec<[f64; 2]> {
         let slope = |k: usize, side: usize| -> f64 {
             let answers = &answers.by_level[side][k * self.lights.count()..];
@@ -385,7 +386,7 @@ fn products(columns: &[f32], length: usize) -> Mat<f32> {
     products
 }
 
-/// The step of damped normal equations, within bounds: a weight at zero that would fall stays there, and levels are bounded by `levels`.
+/// The step of damped normal equations (F24), within bounds: a weight at zero that would fall stays there, and levels are bounded by `levels`.
 fn step(kernels: &[Kernel], levels: &[[f64; 2]], hessian: &Mat<f32>, gradient: &[f32], damping: f32) -> Vec<Kernel> {
     let m = kernels.len();
     let mut matrix = hessian.clone();
