@@ -3,6 +3,7 @@
 #extension GL_GOOGLE_include_directive : require
 #include "bounded.glsl"
 #include "camera.glsl"
+#include "lat_long.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
@@ -26,10 +27,7 @@ void main() {
         return;
     }
     vec3 d = normalize(camera_ray(push.camera, (vec2(pixel) + 0.5) / vec2(push.size_px)));
-    d = vec3(push.rotation.x * d.x - push.rotation.y * d.z, d.y, push.rotation.y * d.x + push.rotation.x * d.z);
-    // Lat-long: phi from -z towards +x, theta from +y. At the poles any phi will do, but atan(0, 0) is undefined.
-    float phi = abs(d.x) + abs(d.z) > 0.0 ? atan(d.x, -d.z) : 0.0;
-    vec2 uv = vec2(phi / radians(360.0), acos(clamp(d.y, -1.0, 1.0)) / radians(180.0));
-    vec3 behind = bounded(textureLod(environment_map, uv, 0.0).rgb * push.radiance_scale);
+    vec2 place = lat_long(turned_back(push.rotation, d));
+    vec3 behind = bounded(textureLod(environment_map, place, 0.0).rgb * push.radiance_scale);
     imageStore(radiance, pixel, vec4(bounded(surface.rgb + (1.0 - surface.a) * behind), 1.0));
 }

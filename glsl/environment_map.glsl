@@ -1,5 +1,6 @@
 // The environment as it is: the lat-long map, bilinear between its pixel centres, wrapped in u and clamped in v.
 // Twin: src/environment/light_map.rs.
+#include "lat_long.glsl"
 
 // rgb: radiance; a: what the method wants to know of it besides. For light_sampling.glsl the density over the unit square (u, v)
 // with which it draws, for vmf_pyramid.glsl whether the pixel is of a small source.
@@ -21,11 +22,7 @@ struct Corners {
 
 Corners environment_corners(vec3 d) {
     ivec2 size = textureSize(environment_map, 0);
-    // From -z towards +x, and from +y. At the poles any phi will do, but atan(0, 0) is undefined.
-    float sin_theta = length(d.xz);
-    float phi = sin_theta > 0.0 ? atan(d.x, -d.z) : 0.0;
-    float theta = atan(sin_theta, d.y);
-    vec2 position = vec2(phi / radians(360.0), theta / radians(180.0)) * vec2(size) - 0.5;
+    vec2 position = lat_long(d) * vec2(size) - 0.5;
     vec2 corner = floor(position);
     // phi starts at -180 degrees: columns count from minus half a turn, at most one turn below 0.
     int left = (int(corner.x) + size.x) % size.x;

@@ -4,6 +4,7 @@
 // Twin: src/shading/importance_sampling.rs; the table: src/threads/slice_table.rs.
 #include "arc_tangent.glsl"
 #include "azimuths.glsl"
+#include "pi.glsl"
 
 const uint SLICE_ROWS = 90;     // theta_o = row 90 deg / SLICE_ROWS
 const uint AZIMUTH_ROWS = 45;   // the same of each azimuth of an anisotropic BRDF
@@ -140,7 +141,7 @@ float brdf_pdf(SliceRows rows, vec3 w_i, vec3 w_o, vec3 h) {
     }
     // dw_i = 4 (w_o . h) dw_h. Where w_i and w_o are above the horizon the product is at least their cosines' mean.
     float of_table = mass / (4.0 * cell.solid_angle_sr * dot(w_o, h));
-    return mix(of_table, w_i.z * 0.318309886, DIFFUSE_SHARE);
+    return mix(of_table, w_i.z * INVERSE_PI, DIFFUSE_SHARE);
 }
 
 // A direction and its density in 1/sr, which is 0 below the horizon.

@@ -6,6 +6,7 @@
 #include "bounded.glsl"
 #include "camera.glsl"
 #include "geometry_texel.glsl"
+#include "lat_long.glsl"
 #include "surface.glsl"
 #include "tiles.glsl"
 
@@ -13,10 +14,6 @@ layout(local_size_x = TILE_PIXELS) in;
 
 layout(constant_id = 0) const uint SUBPIXELS = 2; // per axis
 layout(constant_id = 5) const uint HAS_TANGENTS = 0; // 0: no material of the scene needs them
-
-// Between these view angles the threads start to follow the view; why, says methods/paper.glsl.
-const float FACING_DEG = 3.0;
-const float TURNING_DEG = 15.0;
 
 layout(set = 0, binding = 0) uniform utexture2D geometry;
 layout(set = 0, binding = 1, std430) readonly buffer Counters {
@@ -53,9 +50,8 @@ layout(push_constant) uniform Push {
 #include "material.glsl"
 #include "brdf_models.glsl"
 
-// World to environment coordinates: the environment is turned by the rotation, so directions are turned back.
 vec3 to_environment(vec3 d) {
-    return vec3(push.rotation.x * d.x - push.rotation.y * d.z, d.y, push.rotation.y * d.x + push.rotation.x * d.z);
+    return turned_back(push.rotation, d);
 }
 
 // Lookups in the environment that this invocation has made: methods count them.

@@ -160,12 +160,12 @@ impl DeviceScene {
         let mut graph = FrameGraph::new();
         let frame = declare(&mut graph, self, &self.view);
         let mut readbacks = Readbacks::new(&self.device, graph);
-        let counters = readbacks.buffer("read_counters", frame.counters, size_of::<Counters>() as u64)?;
-        let lookups = readbacks.buffer("read_lookups", frame.lookups, size_of::<u64>() as u64)?;
+        let counters = readbacks.buffer("counters", frame.counters, size_of::<Counters>() as u64)?;
+        let lookups = readbacks.buffer("lookups", frame.lookups, size_of::<u64>() as u64)?;
         let View { width, height, .. } = self.view;
-        let radiance = readbacks.image("read_radiance", frame.radiance, [width, height], 16, wanted.radiance)?;
-        let display = readbacks.image("read_display", frame.display, [width, height], 4, wanted.display)?;
-        let geometry = readbacks.image("read_geometry", frame.geometry, self.view.cache_size(), 8, wanted.geometry)?;
+        let radiance = readbacks.image("radiance", frame.radiance, [width, height], 16, wanted.radiance)?;
+        let display = readbacks.image("display", frame.display, [width, height], 4, wanted.display)?;
+        let geometry = readbacks.image("geometry", frame.geometry, self.view.cache_size(), 8, wanted.geometry)?;
         let Readbacks { graph, imports, .. } = readbacks;
         let executable = Executable::new(&self.device, graph, &imports)?;
 
@@ -230,7 +230,7 @@ impl Rendering {
 impl PassTime {
     /// Whether the pass only copies results into memory that the CPU reads.
     pub fn is_readback(&self) -> bool {
-        self.name.starts_with("read_")
+        is_readback(&self.name)
     }
 }
 
@@ -265,12 +265,8 @@ pub fn render_geometry(device: &Arc<Device>, prepared: &Prepared, round: &Round)
     let mut graph = FrameGraph::new();
     let geometry = geometry_cache(&mut graph, &pass, &prepared.view);
     let mut readbacks = Readbacks::new(device, graph);
-    let target = readbacks.image("read_geometry", geometry, prepared.view.cache_size(), 8, true)?;
-    let Readbacks { graph, imports, .. } = readbacks;
-    let executable = Executable::new(device, graph, &imports)?;
-    let mut frames = Frames::new(device, "geometry", 1)?;
-    executable.execute(&mut frames)?;
-    frames.wait()?;
+    let target = readbacks.image("geometry", geometry, prepared.view.cache_size(), 8, true)?;
+    readbacks.run("geometry")?;
     Ok(texels(target.as_deref()))
 }
 
@@ -282,7 +278,7 @@ pub fn time_bare_lookups(device: &Arc<Device>, bare: &BareLookups) -> Result<(f6
     let mut graph = FrameGraph::new();
     let sums = bare_lookups(&mut graph, bare);
     let mut readbacks = Readbacks::new(device, graph);
-    let target = readbacks.buffer("read_sums", sums, bare.sums_bytes())?;
+    let target = readbacks.buffer("sums", sums, bare.sums_bytes())?;
     let Readbacks { graph, imports, .. } = readbacks;
     let executable = Executable::new(device, graph, &imports)?;
     let mut frames = Frames::new(device, "bare lookups", 1)?;

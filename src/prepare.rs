@@ -419,10 +419,7 @@ pub(crate) fn check_count(method: Method, count: u32, subpixels: u32) -> Result<
 
 /// Centre and radius of a sphere in world space that holds `object`.
 fn world_sphere(meshes: &[NamedMesh], object: &PlacedMesh) -> (DVec3, f64) {
-    let (center, radius) = meshes[object.mesh].1.bounding_sphere();
-    let m = object.to_world.matrix3;
-    let scale = m.x_axis.length().max(m.y_axis.length()).max(m.z_axis.length());
-    (object.to_world.transform_point3(center.as_dvec3()), f64::from(radius) * scale)
+    object.placed_sphere(meshes[object.mesh].1.bounding_sphere())
 }
 
 /// An error for objects so large, small or far off that single precision, in which the GPU computes, would not hold areas

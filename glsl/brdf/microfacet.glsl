@@ -1,6 +1,7 @@
 // Microfacet distributions, shadowing and Fresnel reflectance. Twin of src/brdf/microfacet.rs, which cites the equations.
 #ifndef MICROFACET_GLSL
 #define MICROFACET_GLSL
+#include "pi.glsl"
 
 const float DISTRIBUTION_BECKMANN = 1.0; // else GGX
 
@@ -15,11 +16,11 @@ float microfacet_density(float distribution, vec3 h, vec2 alpha) {
     if (distribution == DISTRIBUTION_BECKMANN) {
         float exponent = sin2_alpha2 / cos2;
         // e^-80 is 2e-35, as good as nothing; far beyond, 0 / 0 threatens at grazing h.
-        return exponent < 80.0 ? exp(-exponent) * 0.318309886 / (alpha.x * alpha.y * cos2 * cos2) : 0.0;
+        return exponent < 80.0 ? exp(-exponent) * INVERSE_PI / (alpha.x * alpha.y * cos2 * cos2) : 0.0;
     }
     // At most a million: its square times alpha_x alpha_y, no less than a millionth, is in range.
     float denominator = cos2 + sin2_alpha2;
-    return 0.318309886 / (alpha.x * alpha.y * denominator * denominator);
+    return INVERSE_PI / (alpha.x * alpha.y * denominator * denominator);
 }
 
 // Smith's G1 / cos(theta), finite at grazing angles.

@@ -3,6 +3,7 @@
 // c.x, c.y: roughness_alpha along x, the tangent, and along y.
 #include "parameters.glsl"
 #include "microfacet.glsl"
+#include "pi.glsl"
 
 vec3 plastic(BrdfParameters parameters, vec3 w_i, vec3 w_o) {
     if (!(w_i.z > 0.0 && w_o.z > 0.0)) return vec3(0.0);
@@ -10,5 +11,5 @@ vec3 plastic(BrdfParameters parameters, vec3 w_i, vec3 w_o) {
     vec3 h = normalize(w_i + w_o);
     float coat = fresnel_dielectric(dot(w_o, h), ior) * torrance_sparrow(parameters.b.y, w_i, w_o, h, parameters.c.xy);
     float transmitted = (1.0 - fresnel_dielectric(w_i.z, ior)) * (1.0 - fresnel_dielectric(w_o.z, ior));
-    return vec3(coat) + parameters.a.rgb * (transmitted * 0.318309886);
+    return vec3(coat) + parameters.a.rgb * (transmitted * INVERSE_PI);
 }

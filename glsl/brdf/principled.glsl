@@ -3,6 +3,7 @@
 // c.x, c.y: roughness_alpha along x, the tangent, and along y.
 #include "parameters.glsl"
 #include "microfacet.glsl"
+#include "pi.glsl"
 
 vec3 principled(BrdfParameters parameters, vec3 w_i, vec3 w_o) {
     const float GGX = 0.0;
@@ -13,7 +14,7 @@ vec3 principled(BrdfParameters parameters, vec3 w_i, vec3 w_o) {
     float metallic = parameters.a.w;
     float lobe = torrance_sparrow(GGX, w_i, w_o, h, parameters.c.xy);
     float dielectric = fresnel_schlick(cos_theta_d, vec3(parameters.b.x)).x;
-    vec3 f = ((1.0 - dielectric) * 0.318309886 * base_colour + dielectric * lobe) * (1.0 - metallic)
+    vec3 f = ((1.0 - dielectric) * INVERSE_PI * base_colour + dielectric * lobe) * (1.0 - metallic)
         + fresnel_schlick(cos_theta_d, base_colour) * (lobe * metallic);
     float coat = parameters.b.y;
     if (coat > 0.0) {

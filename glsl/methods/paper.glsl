@@ -109,6 +109,10 @@ vec3 threads_of_facing_view(Surface surface, Material material, Partition share)
     return weighted_mean(sum);
 }
 
+// Between these view angles the threads start to follow the view.
+const float FACING_DEG = 3.0;
+const float TURNING_DEG = 15.0;
+
 // Where the normal faces the eye the shading frame turns once around within a few pixels, and the threads with it: their
 // error would show as a pinwheel. There the sum over threads that do not turn takes over.
 vec3 estimate(Surface surface, Material material, uint first, uint stride) {

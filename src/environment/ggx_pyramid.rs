@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::Pyramid;
 use super::cube::direction_of;
 use crate::brdf::ggx_lobe;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::progress::Observer;
 
 /// Texels along the edge of a face of level 0, at least: the last level has one. Twice as many as the source has, up to the most.
@@ -55,9 +55,7 @@ pub fn ggx_pyramid(source: &Pyramid, observer: &dyn Observer) -> Result<Pyramid>
             (sum / total).as_vec3().to_array()
         };
         let row_of_texels = |start: usize| -> Result<Vec<[f32; 3]>> {
-            if observer.cancelled() {
-                return Err(Error::Cancelled);
-            }
+            observer.check()?;
             Ok((start..start + size).map(texel).collect())
         };
         let rows: Vec<_> =

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::cube::{self, direction_of, exact_texel_solid_angle, face_of, point_of};
 use super::{Environment, to_dvec3};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::progress::Observer;
 
 /// Level 0 is no finer than this: 6 x 1024^2 texels of 16 bytes are 96 MiB.
@@ -203,9 +203,7 @@ fn finest_level(environment: &Environment, face_size: usize, observer: &dyn Obse
     };
     let lit = LitCells::new(environment, face_size);
     let texel = |columns: &mut Vec<_>, texel: usize| {
-        if observer.cancelled() {
-            return Err(Error::Cancelled);
-        }
+        observer.check()?;
         let (face, row, column) = (texel / face_size / face_size, texel / face_size % face_size, texel % face_size);
         if !lit.reach(face, row, column) {
             return Ok([0.0; 3]);

@@ -2,7 +2,7 @@
 use std::time::Instant;
 
 use super::tables::{Section, Table};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::memo::Memo;
 use crate::pipeline::median;
 use crate::prepare::in_own_axes;
@@ -65,9 +65,7 @@ pub fn run(fits: &Fits, memo: &Memo, observer: &dyn Observer, found: &mut Vec<Ti
                     break table;
                 }
             };
-            if observer.cancelled() {
-                return Err(Error::Cancelled);
-            }
+            observer.check()?;
             found.push(TimedFit {
                 material: material.clone(),
                 threads,

@@ -9,7 +9,7 @@ use super::sheet::{Sheet, Tile};
 use super::sweep::Measured;
 use super::tables::in_order;
 use crate::brdf::Brdf;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::memo::Memo;
 use crate::pipeline::Wanted;
 use crate::progress::Observer;
@@ -47,7 +47,7 @@ pub fn material_sheets(
         let of = format!("{}_{}", place.environment, place.scene);
         tiles.push((of, Tile { picture, caption: place.material.to_owned() }));
         observer.progress(tiles.len(), cases.place_count());
-        if observer.cancelled() { Err(Error::Cancelled) } else { Ok(()) }
+        observer.check()
     })?;
     let sheets = in_order(tiles.iter().map(|(of, _)| of.clone()));
     let sheet = |of: &String| {

@@ -145,8 +145,7 @@ pub fn over_grey(radiance: &[[f32; 4]], width: u32, height: u32, display: Displa
         Rgb([r, g, b].map(|value| {
             let surface = if coverage > 0.0 { f64::from(value) / coverage } else { 0.0 };
             // The clamp of a NaN is a NaN, which as a byte is 0.
-            let displayed = (display.exposure * surface).clamp(0.0, 1.0).powf(1.0 / display.gamma);
-            (255.0 * coverage * displayed + f64::from(GREY) * (1.0 - coverage)).round() as u8
+            (255.0 * coverage * display.value(surface) + f64::from(GREY) * (1.0 - coverage)).round() as u8
         }))
     })
 }

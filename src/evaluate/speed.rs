@@ -135,7 +135,7 @@ pub fn run(
     let mut advance = || {
         done += 1;
         observer.progress(done, total);
-        if observer.cancelled() { Err(Error::Cancelled) } else { Ok(()) }
+        observer.check()
     };
     speed.cases.for_each_place(memo, observer, &mut |place| {
         let mut entrants = Vec::new();

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::speed::render;
 use super::tables::{Section, Table};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::memo::{Memo, Round};
 use crate::pipeline::{DeviceScene, Rendering, median};
 use crate::prepare::prepare;
@@ -87,7 +87,7 @@ pub fn run(
     let mut advance = || {
         done += 1;
         observer.progress(done, total);
-        if observer.cancelled() { Err(Error::Cancelled) } else { Ok(()) }
+        observer.check()
     };
     let cancels = &OnlyCancels(observer);
     for (environment, source) in &together.environments {

@@ -4,9 +4,9 @@ use super::light::DevicePyramid;
 use super::{Readbacks, texels};
 use crate::Result;
 use crate::environment::Pyramid;
-use crate::graph::{Access, BufferDesc, DeviceResource, Executable, FrameGraph};
+use crate::graph::{Access, BufferDesc, DeviceResource, FrameGraph};
 use crate::vulkan::{
-    self, Buffer, ComputePipeline, Device, Frames, ImageKind, ImageShape, PipelineCache, Sampler, SamplerKind, compiled,
+    self, Buffer, ComputePipeline, Device, ImageKind, ImageShape, PipelineCache, Sampler, SamplerKind, compiled,
 };
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
@@ -106,13 +106,9 @@ pub fn ask(
         .cover([count, 1, 1]);
     let mut readbacks = Readbacks::new(device, graph);
     readbacks.imports.push(counts_import);
-    let answered = readbacks.buffer("read_answers", answers, list.size_bytes())?;
-    let counted = readbacks.buffer("read_counts", counts_handle, counts.size_bytes())?;
-    let Readbacks { graph, imports, .. } = readbacks;
-    let executable = Executable::new(device, graph, &imports)?;
-    let mut frames = Frames::new(device, "device check", 1)?;
-    executable.execute(&mut frames)?;
-    frames.wait()?;
+    let answered = readbacks.buffer("answers", answers, list.size_bytes())?;
+    let counted = readbacks.buffer("counts", counts_handle, counts.size_bytes())?;
+    readbacks.run("device check")?;
 
     let answered: Vec<Vec4> = texels(Some(&answered));
     let of = |start: u32, end: u32, scale: f32| -> Vec<Vec4> {

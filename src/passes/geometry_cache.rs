@@ -68,6 +68,15 @@ pub struct PlacedMesh {
     pub tangent: Option<PlacedTangent>,
 }
 
+impl PlacedMesh {
+    /// Centre and radius of a sphere in world space that holds what the sphere around `center` in object space does.
+    pub fn placed_sphere(&self, (center, radius): (Vec3, f32)) -> (DVec3, f64) {
+        let m = self.to_world.matrix3;
+        let scale = m.x_axis.length().max(m.y_axis.length()).max(m.z_axis.length());
+        (self.to_world.transform_point3(center.as_dvec3()), scale * f64::from(radius))
+    }
+}
+
 /// Which way the tangents of an object go.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlacedTangent {
@@ -164,10 +173,7 @@ impl GeometryCache {
 
     /// Centre and radius of a sphere around an object, in world space.
     fn bounds(&self, object: &PlacedMesh) -> (DVec3, f64) {
-        let (center, radius) = self.meshes[object.mesh].bounds;
-        let m = object.to_world.matrix3;
-        let scale = m.x_axis.length().max(m.y_axis.length()).max(m.z_axis.length());
-        (object.to_world.transform_point3(center.as_dvec3()), scale * f64::from(radius))
+        object.placed_sphere(self.meshes[object.mesh].bounds)
     }
 
     /// Distance from the eye to the far side of the scene: the unit of length in which it is drawn, so that neither tiny nor

@@ -30,7 +30,7 @@ pub use geometry_cache::{DeviceMesh, GeometryCache, PlacedMesh, PlacedTangent, g
 pub use light::DeviceLight;
 #[cfg(feature = "viewer")]
 pub use present::{Area, present};
-pub use readback::{Readbacks, texels};
+pub use readback::{Readbacks, is_readback, texels};
 pub use shade::{DeviceMaterials, Sampling, Shade, Shaded, ShadedMaterial, models_used, shade};
 pub use tone_map::{ToneMap, tone_map};
 #[cfg(feature = "viewer")]

@@ -1,9 +1,17 @@
 //! Copies what the CPU wants to see into memory that it can read.
 use crate::Result;
-use crate::graph::{Access, BufferDesc, BufferHandle, DeviceResource, FrameGraph, Handle, ImageHandle};
-use crate::vulkan::{self, BufferUse, Device};
+use crate::graph::{Access, BufferDesc, BufferHandle, DeviceResource, Executable, FrameGraph, Handle, ImageHandle};
+use crate::vulkan::{self, BufferUse, Device, Frames};
 use ash::vk;
 use std::sync::Arc;
+
+/// What names of passes begin with that only copy results into memory that the CPU reads.
+const PREFIX: &str = "read_";
+
+/// Whether the pass of this name is one of [`Readbacks`].
+pub fn is_readback(pass: &str) -> bool {
+    pass.starts_with(PREFIX)
+}
 
 /// Adds copies into host memory to a graph.
 pub struct Readbacks<'a, 'd> {
@@ -20,6 +28,18 @@ impl<'a, 'd> Readbacks<'a, 'd> {
         Self { graph, device, imports: Vec::new() }
     }
 
+    /// Executes the graph once, and waits for it.
+    ///
+    /// # Errors
+    /// Whatever Vulkan refuses; errors name the work as `name`.
+    pub fn run(self, name: &str) -> Result<()> {
+        let Self { graph, device, imports } = self;
+        let executable = Executable::new(device, graph, &imports)?;
+        let mut frames = Frames::new(device, name, 1)?;
+        executable.execute(&mut frames)?;
+        Ok(frames.wait()?)
+    }
+
     /// Imports a buffer that the CPU will read after the frame.
     fn target(&mut self, name: &str, size_bytes: u64) -> Result<(BufferHandle, Arc<vulkan::Buffer>)> {
         let usage = vk::BufferUsageFlags::TRANSFER_DST;
@@ -34,8 +54,9 @@ impl<'a, 'd> Readbacks<'a, 'd> {
     /// # Errors
     /// No memory left.
     pub fn buffer(&mut self, name: &str, source: BufferHandle, size_bytes: u64) -> Result<Arc<vulkan::Buffer>> {
-        let (mut handle, target) = self.target(&format!("{name}_target"), size_bytes)?;
-        self.graph.copy_buffer(name, source, &mut handle);
+        let pass = format!("{PREFIX}{name}");
+        let (mut handle, target) = self.target(&format!("{pass}_target"), size_bytes)?;
+        self.graph.copy_buffer(&pass, source, &mut handle);
         self.graph.output(handle);
         Ok(target)
     }
@@ -55,9 +76,10 @@ impl<'a, 'd> Readbacks<'a, 'd> {
         if !wanted {
             return Ok(None);
         }
+        let pass = format!("{PREFIX}{name}");
         let (mut handle, target) =
-            self.target(&format!("{name}_target"), texel_bytes * u64::from(width) * u64::from(height))?;
-        self.graph.copy_image(name, source, &mut handle);
+            self.target(&format!("{pass}_target"), texel_bytes * u64::from(width) * u64::from(height))?;
+        self.graph.copy_image(&pass, source, &mut handle);
         self.graph.output(handle);
         Ok(Some(target))
     }

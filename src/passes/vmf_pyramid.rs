@@ -3,11 +3,11 @@
 //! In many short submissions, since a device without a second queue (such as a processor) draws no frame until a submission has ended,
 //! and so that it can be cancelled.
 use super::{Readbacks, texels};
+use crate::Result;
 use crate::environment::{BlurKernel, BlurStep, Pyramid, VmfPyramid};
 use crate::graph::{Access, BufferDesc, DeviceResource, Executable, FrameGraph};
 use crate::progress::Observer;
 use crate::vulkan::{Buffer, BufferUse, ComputePipeline, Device, Frames, PipelineCache, compiled};
-use crate::{Error, Result};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 use std::cell::Cell;
@@ -51,7 +51,7 @@ pub fn vmf_pyramid(
         blur(device, &pipeline, step, from, &map, &mut || {
             done += 1;
             observer.progress(done, total);
-            if observer.cancelled() { Err(Error::Cancelled) } else { Ok(()) }
+            observer.check()
         })?;
         // The others have served.
         if step.kernel == BlurKernel::Vmf {
@@ -119,12 +119,8 @@ fn read_back(device: &Arc<Device>, map: &Arc<Buffer>) -> Result<Vec<[f32; 3]>> {
     let handle = graph.import_buffer("vmf_map", desc, Some(Access::StorageWriteCompute), None);
     let mut readbacks = Readbacks::new(device, graph);
     readbacks.imports.push((handle.into(), DeviceResource::Buffer(map.clone())));
-    let target = readbacks.buffer("read_map", handle, map.size_bytes())?;
-    let Readbacks { graph, imports, .. } = readbacks;
-    let executable = Executable::new(device, graph, &imports)?;
-    let mut frames = Frames::new(device, "vmf_pyramid", 1)?;
-    executable.execute(&mut frames)?;
-    frames.wait()?;
+    let target = readbacks.buffer("map", handle, map.size_bytes())?;
+    readbacks.run("vmf_pyramid")?;
     Ok(texels(Some(&target)))
 }
 

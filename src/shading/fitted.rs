@@ -3,7 +3,7 @@ use std::f32::consts::{FRAC_PI_2, PI};
 
 use glam::{IVec2, Vec2, Vec3, Vec4};
 
-use super::{CpuShader, Point, Surface, turned};
+use super::{CpuShader, Point, Surface, smoothstep, turned};
 use crate::brdf::MIN_COS_THETA_D;
 use crate::environment::sources::{CLEAR, clearance};
 use crate::environment::{LightMap, SourceRecord};
@@ -58,11 +58,6 @@ fn blurred_radiance(twin: &CpuShader, direction: Vec3, level: f32, sources: f32)
 
 /// Twin of `FAR`.
 const FAR: f32 = 4.0;
-
-fn smoothstep([from, to]: [f32; 2], x: f32) -> f32 {
-    let x = ((x - from) / (to - from)).clamp(0.0, 1.0);
-    x * x * (3.0 - 2.0 * x)
-}
 
 /// A lobe, seen from w_o in the shading frame. Twin of `Lobe`.
 struct Lobe<'a> {

@@ -86,6 +86,12 @@ impl Surface {
     }
 }
 
+/// GLSL's function of this name, between two edges.
+fn smoothstep([from, to]: [f32; 2], x: f32) -> f32 {
+    let x = ((x - from) / (to - from)).clamp(0.0, 1.0);
+    x * x * (3.0 - 2.0 * x)
+}
+
 /// `w` of the shading frame, turned about z by an angle of this cosine and sine. Twin of `turned`.
 fn turned(w: Vec3, angle: Vec2) -> Vec3 {
     angle.rotate(w.truncate()).extend(w.z)

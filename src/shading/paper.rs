@@ -3,7 +3,7 @@ use std::f32::consts::FRAC_PI_2;
 
 use glam::{Mat3, Vec2, Vec3, Vec4};
 
-use super::{Point, Surface, turned};
+use super::{Point, Surface, smoothstep, turned};
 use crate::tangent::tangent_along;
 use crate::threads::{ThreadTable, Threads};
 
@@ -13,7 +13,7 @@ fn fixed_frame(n: Vec3, axis: Vec3) -> Mat3 {
     Mat3::from_cols(x, n.cross(x), n)
 }
 
-/// View angles between which the threads start to follow the view, as in the shader.
+/// Twins of those of the shader.
 const FACING_DEG: f32 = 3.0;
 const TURNING_DEG: f32 = 15.0;
 
@@ -117,9 +117,7 @@ impl Paper<'_> {
 
     fn estimate(&self, surface: &Surface, axis: Vec3) -> Vec3 {
         let rows = self.rows_at(surface);
-        let (from, to) = (FACING_DEG.to_radians(), TURNING_DEG.to_radians());
-        let x = ((surface.theta_o - from) / (to - from)).clamp(0.0, 1.0);
-        let following = x * x * (3.0 - 2.0 * x);
+        let following = smoothstep([FACING_DEG, TURNING_DEG].map(f32::to_radians), surface.theta_o);
         let mut mean = Vec3::ZERO;
         if following > 0.0 {
             mean += following * self.threads_following_view(surface, &rows);

@@ -38,8 +38,8 @@ impl Step for UploadMesh<'_> {
     }
 }
 
-/// A material as shading needs it: its BRDF, and its threads for methods that have any.
-pub type Shaded<'a> = (&'a Keyed<Brdf>, Option<&'a Keyed<Threads>>);
+/// BRDF and threads of a material, by which what is uploaded of it is known.
+pub type KeyedMaterial<'a> = (&'a Keyed<Brdf>, Option<&'a Keyed<Threads>>);
 
 /// Uploads what a method looks up of materials.
 pub struct UploadMaterials<'a> {
@@ -48,7 +48,7 @@ pub struct UploadMaterials<'a> {
     /// What for.
     pub method: Method,
     /// In the order of the indices that objects have.
-    pub materials: &'a [Shaded<'a>],
+    pub materials: &'a [KeyedMaterial<'a>],
     /// Whether BRDFs are evaluated.
     pub evaluates_brdf: bool,
     /// Level 0 of the blurred environment on the scale of kernels, if that is looked up.

@@ -12,13 +12,21 @@ pub const STEP_RAD: f64 = PI / 18.0;
 /// ends included, to 90 degrees if the BRDF has mirror planes along and across the tangent, to 180 if half a turn leaves it as it is, to 360.
 pub fn azimuth_count(brdf: &Brdf) -> usize {
     let Symmetry { isotropic, half_turn, mirror_x, mirror_y } = brdf.symmetry();
-    let span = match (half_turn, mirror_x && mirror_y) {
+    count_of(match (half_turn, mirror_x && mirror_y) {
         _ if isotropic => 0.0,
         (true, true) => FRAC_PI_2,
         (true, false) => PI,
         (false, _) => TAU,
-    };
-    (span / STEP_RAD).round() as usize + 1
+    })
+}
+
+/// Whether it is the [`azimuth_count`] of some BRDF.
+pub fn is_azimuth_count(count: usize) -> bool {
+    [0.0, FRAC_PI_2, PI, TAU].map(count_of).contains(&count)
+}
+
+fn count_of(span_rad: f64) -> usize {
+    (span_rad / STEP_RAD).round() as usize + 1
 }
 
 /// Where a surface is seen from.

@@ -32,6 +32,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+use super::azimuths::is_azimuth_count;
 use super::fitted::FittedTable;
 use super::{ThreadKind, ThreadTable, Threads};
 use crate::error::{Error, Result};
@@ -135,8 +136,8 @@ fn decode(bytes: &[u8]) -> Result<Threads, String> {
     let expected = per_row.and_then(|words| words.checked_mul(all_rows?)?.checked_mul(4));
     let are_two = sets > 1 && expected.is_some_and(|bytes| Some(payload.len()) == bytes.checked_mul(2));
     let expected = if are_two { Some(payload.len()) } else { expected };
-    let is_possible = (azimuths, sets) == (1, 1)
-        || kind.are_kernels() && [1, 10, 19, 37].contains(&azimuths) && (1..=count).contains(&sets);
+    let is_possible =
+        (azimuths, sets) == (1, 1) || kind.are_kernels() && is_azimuth_count(azimuths) && (1..=count).contains(&sets);
     if count == 0 || rows == 0 || !is_possible || expected != Some(payload.len()) {
         return Err("has a header that does not fit its content".into());
     }

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::MIN_COS;
 use super::cones::Cones;
 use super::slice::Slice;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::progress::Observer;
 
 /// Equation (9): strength of the force at x = distance / sum of the cones' radii.
@@ -87,9 +87,7 @@ pub fn settle(
     // Small sets are not worth handing out one by one.
     let grain = 16;
     for iteration in 0..iterations {
-        if observer.cancelled() {
-            return Err(Error::Cancelled);
-        }
+        observer.check()?;
         if iteration % STEPS_PER_CONE == 0 {
             let guess = std::mem::take(&mut sigma);
             let both = samples.par_iter().zip(&guess).with_min_len(grain);

@@ -8,7 +8,7 @@ use super::slice::{Slice, fibonacci_lattice};
 use super::{MIN_COS, Sample, ThreadSettings, ThreadTable, theta_o};
 use super::{forces, peaks, smoothing};
 use crate::brdf::{Brdf, SeenBrdf};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::progress::Observer;
 
 /// Most steps along the forces in a row; with 50 or 200 pictures came out no nearer to their references, only later.
@@ -26,9 +26,7 @@ pub fn generate(brdf: &Brdf, settings: &ThreadSettings, observer: &dyn Observer)
     let advance = || observer.progress(done.fetch_add(1, Ordering::Relaxed).div_ceil(2), rows);
     let seen = SeenBrdf::from_all_around(brdf);
     let tabulate = |row| {
-        if observer.cancelled() {
-            return Err(Error::Cancelled);
-        }
+        observer.check()?;
         let slice = Slice::new(&seen, theta_o(row, rows));
         let peak = peaks::sharp_peak(&slice);
         advance();
@@ -130,6 +128,7 @@ mod tests {
     use std::sync::atomic::AtomicBool;
 
     use super::*;
+    use crate::error::Error;
     use crate::threads::{MAX_COUNT, ThreadKind, test_materials};
 
     fn small(count: usize, rows: usize) -> ThreadSettings {

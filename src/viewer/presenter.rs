@@ -145,12 +145,12 @@ impl Presenter {
             frame.filter(|frame| extras.counts && !readbacks.graph.is_still_good(frame.radiance, self.store.kept()));
         let counts = match &counting {
             Some(frame) => Some((
-                readbacks.buffer("read_counters", frame.counters, size_of::<Counters>() as u64)?,
-                readbacks.buffer("read_lookups", frame.lookups, size_of::<u64>() as u64)?,
+                readbacks.buffer("counters", frame.counters, size_of::<Counters>() as u64)?,
+                readbacks.buffer("lookups", frame.lookups, size_of::<u64>() as u64)?,
             )),
             None => None,
         };
-        let screenshot = readbacks.image("read_window", shown, [width, height], 4, extras.screenshot)?;
+        let screenshot = readbacks.image("window", shown, [width, height], 4, extras.screenshot)?;
         let Readbacks { graph, mut imports, .. } = readbacks;
         imports.push((window.into(), DeviceResource::Image(turn.image.clone())));
         let executable = Executable::keeping(&self.device, graph, &imports, &mut self.store)?;

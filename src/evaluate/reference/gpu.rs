@@ -6,7 +6,6 @@ use glam::{DVec3, Vec4};
 
 use super::{Display, ReferenceImage, rms};
 use crate::Result;
-use crate::error::Error;
 use crate::memo::Round;
 use crate::method::Method;
 use crate::passes::Sampling;
@@ -38,9 +37,7 @@ pub fn reference_on_gpu(
     let mut sums: Vec<Sums> = Vec::new();
     let mut frame = 0;
     loop {
-        if observer.cancelled() {
-            return Err(Error::Cancelled);
-        }
+        observer.check()?;
         frame += 1;
         renderer.reseed(frame.into());
         let rendering = renderer.render(Wanted { radiance: true, ..Wanted::default() }, 1)?;

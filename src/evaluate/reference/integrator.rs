@@ -4,11 +4,11 @@ use glam::{DMat3, DVec3, dvec3};
 use super::cubature::Cubature;
 use super::light::{CellPlace, Light};
 use super::lobe::Lobe;
+use crate::Result;
 use crate::brdf::Brdf;
 use crate::environment::Environment;
 use crate::evaluate::metrics::Display;
 use crate::progress::Observer;
-use crate::{Error, Result};
 
 /// A pixel gives up at so many cells.
 const MOST_CELLS: usize = 1 << 18;
@@ -161,8 +161,8 @@ impl<'a> Integrator<'a> {
                 let evaluations = (cubature.evaluations() * points.len()) as u64;
                 return Ok(PixelEstimate { radiance, radiance_error, display_error, evaluations });
             }
-            if split % SPLITS_A_LOOK == 0 && observer.cancelled() {
-                return Err(Error::Cancelled);
+            if split % SPLITS_A_LOOK == 0 {
+                observer.check()?;
             }
         }
         unreachable!("there is no end to splits")

@@ -242,9 +242,7 @@ impl Integrator<'_> {
         tolerance: f64,
         observer: &dyn Observer,
     ) -> Result<Option<Texel>> {
-        if observer.cancelled() {
-            return Err(Error::Cancelled);
-        }
+        observer.check()?;
         let points = self.points(view, geometry, x, y);
         if points.is_empty() {
             return Ok(None);

@@ -7,7 +7,7 @@ use glam::{DVec3, dvec3};
 use super::answers::Answers;
 use super::kernel::{Kernel, WIDEST_LEVEL, all_between, scale_rad};
 use super::lights::TestLights;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::progress::Observer;
 
 /// Iterations and when to stop.
@@ -286,9 +286,7 @@ impl<'a> Fit<'a> {
             let (hessian, gradient) = self.normal_equations(kernels, &products);
             let before = rest.cost;
             loop {
-                if observer.cancelled() {
-                    return Err(Error::Cancelled);
-                }
+                observer.check()?;
                 tried += 1;
                 let next = step(kernels, &levels, &hessian, &gradient, damping);
                 let next_answers = Answers::new(&next, self.lights);
