@@ -20,16 +20,24 @@ impl MaterialSettings {
 }
 
 impl Scene {
+    /// The material of this name.
+    ///
+    /// # Errors
+    /// There is none.
+    pub fn material_mut(&mut self, name: &str) -> Result<&mut MaterialSettings> {
+        let names: Vec<_> = self.materials.iter().map(|material| material.name.clone()).collect();
+        self.materials.iter_mut().find(|material| material.name == name).ok_or_else(|| {
+            let remedy = format!("name one of {}", names.join(", "));
+            Error::input(format!("material \"{name}\""), "is not in the scene", remedy)
+        })
+    }
+
     /// Gives the parameter `key` of the material `name` this value. The material becomes a model with parameters of its own.
     ///
     /// # Errors
     /// No such material, a material without parameters, no such parameter, a value out of its range; then nothing is changed.
     pub fn set_parameter(&mut self, name: &str, key: &str, value: &toml::Value) -> Result<()> {
-        let names: Vec<_> = self.materials.iter().map(|material| material.name.clone()).collect();
-        let material = self.materials.iter_mut().find(|material| material.name == name).ok_or_else(|| {
-            let remedy = format!("name one of {}", names.join(", "));
-            Error::input(format!("material \"{name}\""), "is not in the scene", remedy)
-        })?;
+        let material = self.material_mut(name)?;
         let (model, mut parameters) = material.model()?;
         set_parameter(&mut parameters, key, value.clone());
         Brdf::from_parameters(&model, parameters.clone())

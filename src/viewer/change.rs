@@ -8,7 +8,7 @@ use crate::scene::{
     Background, Camera, EXPOSURE, GAMMA, INTENSITY, MAX_SAMPLES, MAX_SIZE_PX, MAX_SUBPIXELS, MaterialSource, Pattern,
     Scene, Source,
 };
-use std::fmt::Display;
+use std::fmt::Debug;
 use std::ops::RangeInclusive;
 use std::path::Path;
 
@@ -18,6 +18,13 @@ use std::path::Path;
 pub enum Change {
     /// The material of all objects.
     Material(MaterialSource),
+    /// What one of the scene's materials is. It keeps its name.
+    OneMaterial {
+        /// Name of the material in the scene.
+        material: String,
+        /// What it becomes.
+        source: MaterialSource,
+    },
     /// A parameter of one of the scene's materials, which becomes a model with parameters of its own if it is none yet. Measured
     /// tables have no parameters.
     Parameter {
@@ -63,9 +70,34 @@ impl Change {
     pub fn file(&self) -> Option<&Path> {
         match self {
             Self::Material(MaterialSource::File(path))
+            | Self::OneMaterial { source: MaterialSource::File(path), .. }
             | Self::Environment(Source::File(path))
             | Self::Mesh(Source::File(path)) => Some(path),
             _ => None,
+        }
+    }
+
+    /// Whether frames show it without anything being loaded or made.
+    pub fn is_seen_at_once(&self) -> bool {
+        matches!(
+            self,
+            Self::Rotation(_)
+                | Self::Intensity(_)
+                | Self::Size(..)
+                | Self::Exposure(_)
+                | Self::Gamma(_)
+                | Self::Camera(_)
+        )
+    }
+
+    /// Whether nothing is left of it once `later` is made.
+    pub fn is_undone_by(&self, later: &Self) -> bool {
+        match (self, later) {
+            (Self::Parameter { material, key, .. }, Self::Parameter { material: later, key: later_key, .. }) => {
+                (material, key) == (later, later_key)
+            }
+            (Self::OneMaterial { material, .. }, Self::OneMaterial { material: later, .. }) => material == later,
+            _ => std::mem::discriminant(self) == std::mem::discriminant(later),
         }
     }
 
@@ -86,6 +118,7 @@ impl Change {
                 };
                 changed.use_material(&name, source.clone());
             }
+            Self::OneMaterial { material, source } => changed.material_mut(material)?.source = source.clone(),
             Self::Parameter { material, key, value } => changed.set_parameter(material, key, value)?,
             Self::Environment(source) => environment.source = source.clone(),
             Self::Rotation(degrees) => {
@@ -128,12 +161,13 @@ impl Change {
 }
 
 /// `value` if it is in `range`: no range holds NaN.
-fn within<T: PartialOrd + Display + Copy>(name: &str, value: T, range: &RangeInclusive<T>) -> Result<T> {
+fn within<T: PartialOrd + Debug + Copy>(name: &str, value: T, range: &RangeInclusive<T>) -> Result<T> {
     if range.contains(&value) {
         return Ok(value);
     }
-    let remedy = format!("use a value from {} to {}", range.start(), range.end());
-    Err(Error::input(name, format!("{value} is out of range"), remedy))
+    // Debug's form of large and small numbers has an exponent.
+    let remedy = format!("use a value from {:?} to {:?}", range.start(), range.end());
+    Err(Error::input(name, format!("{value:?} is out of range"), remedy))
 }
 
 /// The method of `scene`, if there is one of that name, and its number of threads.
@@ -146,6 +180,7 @@ fn sampling(scene: &Scene) -> (Option<Method>, u32) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::MaterialSettings;
 
     #[test]
     fn a_parameter_turns_a_builtin_into_a_model() {
@@ -192,6 +227,22 @@ mod tests {
             assert!(error.contains(what) && !error.contains('\n'), "{error}");
             assert_eq!(scene, Scene::default());
         }
+    }
+
+    #[test]
+    fn one_material_of_several_is_another_and_keeps_its_name() {
+        let mut scene = Scene::default();
+        scene.materials.push(MaterialSettings { name: "other".into(), source: MaterialSource::Builtin("clay".into()) });
+        let before = scene.clone();
+        let change = |material: &str| Change::OneMaterial {
+            material: material.into(),
+            source: MaterialSource::Builtin("silver".into()),
+        };
+        change("other").apply(&mut scene).unwrap();
+        assert_eq!((&scene.materials[0], &scene.objects), (&before.materials[0], &before.objects));
+        let MaterialSettings { name, source } = &scene.materials[1];
+        assert_eq!((name.as_str(), source), ("other", &MaterialSource::Builtin("silver".into())));
+        assert!(change("absent").apply(&mut scene).unwrap_err().to_string().contains("absent"));
     }
 
     #[test]

@@ -72,7 +72,7 @@ impl Comparer {
         Ok(is_new)
     }
 
-    /// Begins anew if what is `shown` (all of which has been `loaded`) is not what was compared; not while it `is_moving`.
+    /// Begins anew if what is `shown` (all of which has been `loaded`) is not what was compared, but not while it `is_moving`.
     ///
     /// # Errors
     /// Objects that no camera can frame.
@@ -85,7 +85,7 @@ impl Comparer {
         is_moving: bool,
     ) -> Result<()> {
         let wanted = self.other.clone().map(|other| (loaded.key, shown.clone(), other));
-        if self.begun.is_some() && (self.begun != wanted || is_moving) {
+        if self.begun.is_some() && self.begun != wanted {
             self.jobs.cancel();
             (self.begun, self.compared) = (None, None);
         }

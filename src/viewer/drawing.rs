@@ -197,7 +197,7 @@ impl Viewer {
                 output::write_exr(path, width, height, &rendering.radiance, alpha, &header)?;
             }
         }
-        self.tell(format!("saved {}", path.display()));
+        self.tell_saved(path);
         Ok(())
     }
 }

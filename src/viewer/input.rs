@@ -23,7 +23,8 @@
 //! | `"quit"` | closes the window |
 //!
 //! Paths are relative to the folder of the replay file. A setting is named as in `{"set": {"material": {"builtin": "silver"}}}`,
-//! `{"set": {"material": {"file": "x.binary"}}}`, `{"set": {"parameter": {"material": "gold", "key": "alpha", "value": 0.3}}}`,
+//! `{"set": {"material": {"file": "x.binary"}}}`, `{"set": {"one_material": {"material": "left", "source": {"builtin": "silver"}}}}`,
+//! `{"set": {"parameter": {"material": "gold", "key": "alpha", "value": 0.3}}}`,
 //! `{"set": {"environment": {"builtin": "sun"}}}`, `{"set": {"mesh": {"file": "x.obj"}}}`, `{"set": {"method": "paper"}}`,
 //! `{"set": {"threads": 64}}`, `{"set": {"size": [320, 240]}}`, `{"set": {"rotation": 90}}`, `{"set": {"camera": null}}`.
 use std::path::{Path, PathBuf};
@@ -169,7 +170,7 @@ pub fn parse_replay(text: &str, path: &Path) -> Result<Vec<(usize, Input)>> {
             let cause = cause.to_string();
             let cause = cause.split(" at line ").next().unwrap_or(&cause);
             let problem = format!("line {number} (`{line}`): {cause}");
-            Error::in_file(path, problem, "see the documentation of --replay for what a line can be")
+            Error::in_file(path, problem, "the guide has all that a line can be, in src/viewer/input.rs")
         })?;
         Ok((number, input.relative_to(folder)))
     };
@@ -177,6 +178,11 @@ pub fn parse_replay(text: &str, path: &Path) -> Result<Vec<(usize, Input)>> {
 }
 
 impl Input {
+    /// Whether the picture is another one by it.
+    pub fn changes_picture(&self) -> bool {
+        matches!(self, Self::Drag(_) | Self::Scroll(_) | Self::Set(_))
+    }
+
     /// The same with paths that begin at `folder`.
     fn relative_to(mut self, folder: &Path) -> Self {
         match &mut self {
@@ -185,6 +191,7 @@ impl Input {
             | Self::SaveScene(path)
             | Self::Set(
                 Change::Material(MaterialSource::File(path))
+                | Change::OneMaterial { source: MaterialSource::File(path), .. }
                 | Change::Environment(Source::File(path))
                 | Change::Mesh(Source::File(path)),
             ) => *path = folder.join(&*path),

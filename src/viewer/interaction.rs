@@ -12,13 +12,15 @@ use super::orbit::{Bounds, Orbit, environment_turn_deg};
 use super::plots::Plotter;
 use super::session::Session;
 use crate::memo::{Key, Memo};
+use crate::method::Method;
 use crate::passes::Area;
 use crate::pipeline::DeviceScene;
 use crate::prepare::{Prepared, view_of};
-use crate::scene::{Background, Scene};
+use crate::scene::{Background, MAX_SAMPLES, Scene};
 use crate::vulkan::Device;
 use crate::{Error, Result};
 use glam::DVec2;
+use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -169,8 +171,8 @@ impl Viewer {
                     // The window stays as large as it is.
                     (scene.image.width, scene.image.height) = (self.area.width, self.area.height);
                     scene.files().iter().for_each(|path| self.memo.look_again(path));
-                    self.session.replace(scene);
                     self.changes += 1;
+                    self.session.replace(scene, self.changes);
                     self.request();
                     Ok(())
                 }
@@ -178,8 +180,9 @@ impl Viewer {
             Input::Set(change) => self.change(change),
             Input::SavePicture(path) => self.save_picture(path),
             Input::SaveScene(path) => {
+                Scene::FILES.format_of(path)?;
                 self.session.wanted().save(path)?;
-                self.tell(format!("saved {}", path.display()));
+                self.tell_saved(path);
                 Ok(())
             }
             Input::Move(at) => {
@@ -225,9 +228,10 @@ impl Viewer {
             "-" => self.change(&Change::Exposure(image.exposure * 0.5f64.powf(1.0 / 3.0))),
             "0" => self.change(&Change::Exposure(1.0)),
             "[" | "]" => {
-                let method = crate::method::Method::from_name(&shading.method)?;
+                let method = Method::from_name(&shading.method)?;
                 let count = shading.threads.unwrap_or(method.default_count());
-                let count = if key == "[" { (count / 2).max(1) } else { count.saturating_mul(2) };
+                let count = if key == "[" { count / 2 } else { count.saturating_mul(2) };
+                let count = count.clamp(1, method.max_count(image.subpixels).min(MAX_SAMPLES));
                 self.change(&Change::Threads(Some(count)))
             }
             "escape" => {
@@ -243,7 +247,7 @@ impl Viewer {
         if let Some(path) = change.file() {
             self.memo.look_again(path);
         }
-        self.session.change(change)?;
+        self.session.change(change, self.changes + 1)?;
         self.changes += 1;
         self.request();
         Ok(())
@@ -259,7 +263,13 @@ impl Viewer {
         self.change(&Change::Camera(Some(orbit.camera())))
     }
 
-    pub(super) fn tell(&mut self, text: String) {
+    /// Says where a file is now: in which folder the program runs, a window does not show.
+    pub(super) fn tell_saved(&mut self, path: &Path) {
+        let path = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+        self.tell(format!("saved {}", path.display()));
+    }
+
+    fn tell(&mut self, text: String) {
         tracing::info!("{text}");
         self.notice = Some(Notice { text, is_error: false });
     }

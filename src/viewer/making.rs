@@ -1,12 +1,15 @@
 //! What the session asks for, made in the background: by drafts first where a parameter is dragged.
+use super::change::Change;
 use super::interaction::Viewer;
 use super::latest_job::Progress;
 use super::loaded::Loaded;
-use crate::memo::Round;
+use super::session::Edit;
+use crate::memo::{Memo, Round};
 use crate::pipeline::{DeviceScene, Wanted};
 use crate::prepare::{Prepared, can_draft, key_of, may_be_drafted, prepare, prepare_draft};
 #[cfg(feature = "hot-reload")]
 use crate::progress::Observer;
+use crate::steps::{LoadEnvironment, LoadMaterial, LoadMesh};
 use crate::{Error, Result};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -15,6 +18,25 @@ use std::time::{Duration, Instant};
 const DRAFT_PATIENCE: Duration = Duration::from_millis(100);
 /// Threads are finished when nobody has asked for others for so long: what is dragged moves more often.
 const BEFORE_FINISHING: Duration = Duration::from_millis(100);
+
+/// Whether all files and names that `edit` brings in can be loaded. What could be is known by then.
+fn can_be_loaded(edit: &Edit, memo: &Memo) -> bool {
+    let round = memo.round(&());
+    let environment = |source| round.ask(&LoadEnvironment(source)).is_ok();
+    let material = |source| round.ask(&LoadMaterial(source)).is_ok();
+    let mesh = |source| round.ask(&LoadMesh(source)).is_ok();
+    match edit {
+        Edit::Change(Change::Environment(source)) => environment(source),
+        Edit::Change(Change::Material(source) | Change::OneMaterial { source, .. }) => material(source),
+        Edit::Change(Change::Mesh(source)) => mesh(source),
+        Edit::Change(_) => true,
+        Edit::Scene(scene) => {
+            environment(&scene.environment.source)
+                && scene.materials.iter().all(|settings| material(&settings.source))
+                && scene.objects.iter().all(|object| mesh(&object.mesh))
+        }
+    }
+}
 
 impl Viewer {
     /// How far the loading of what is wanted is.
@@ -140,7 +162,7 @@ impl Viewer {
             let was_drafting = self.drafting_since.take().is_some();
             match result {
                 Ok(loaded) => {
-                    self.session.loaded(loaded.prepared.scene.clone());
+                    self.session.loaded(loaded.prepared.scene.clone(), loaded.change);
                     let before = self.loaded.replace(loaded.clone());
                     self.is_compiled &= before.is_some_and(|before| before.renderer.shades_as(&loaded.renderer));
                     self.request_after_frame |= was_drafting;
@@ -149,9 +171,12 @@ impl Viewer {
                     }
                 }
                 Err(Error::Cancelled) => {}
-                Err(error) if self.loaded.is_none() => return Err(error),
                 Err(error) => {
-                    self.session.failed();
+                    let memo = self.memo.clone();
+                    let was_edited = self.session.failed(|edit| !can_be_loaded(edit, &memo));
+                    if self.loaded.is_none() && !was_edited {
+                        return Err(error);
+                    }
                     self.latency.failed();
                     // A draft is still to be finished.
                     let loaded = self.loaded.as_ref().filter(|loaded| !loaded.is_draft());

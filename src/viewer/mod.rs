@@ -119,7 +119,9 @@ fn keep(scene: &Scene, path: &std::path::Path) {
     }
 }
 
-/// What the window system refuses.
+/// What the window system refuses. Errors of winit begin with the place in its source.
 fn failed(cause: impl std::fmt::Display) -> Error {
-    Error::Window { cause: cause.to_string() }
+    let cause = cause.to_string();
+    let reason = cause.strip_prefix("os error at ").and_then(|rest| rest.split_once(": ")).map(|(_, reason)| reason);
+    Error::Window { cause: reason.unwrap_or(&cause).to_owned() }
 }

@@ -2,7 +2,7 @@
 //!
 //! A frame is a function of a [`Scene`] and nothing else, so changes are changes of a scene. Camera, turn of the light, size and display
 //! are given to each frame anew, and seen at once; all else is asked of the memo first, in the background. What cannot be loaded changes
-//! nothing.
+//! nothing, and leaves other changes as they are.
 use super::change::Change;
 use crate::error::Result;
 use crate::scene::{ImageSettings, Scene};
@@ -12,12 +12,23 @@ use crate::scene::{ImageSettings, Scene};
 pub struct Session {
     wanted: Scene,
     shown: Scene,
+    /// What was asked for and is not shown yet, with its numbers, which grow.
+    pending: Vec<(u64, Edit)>,
+}
+
+/// What was asked for.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Edit {
+    /// A change of the scene.
+    Change(Change),
+    /// Another scene.
+    Scene(Box<Scene>),
 }
 
 impl Session {
     /// Both are `scene`.
     pub fn new(scene: Scene) -> Self {
-        Self { shown: scene.clone(), wanted: scene }
+        Self { shown: scene.clone(), wanted: scene, pending: Vec::new() }
     }
 
     /// What is asked for: what the panel shows and what is saved.
@@ -30,24 +41,41 @@ impl Session {
         &self.shown
     }
 
-    /// Makes a change.
+    /// Makes a change, whose number is above that of all before.
     ///
     /// # Errors
     /// Those of [`Change::apply`]; nothing is changed then.
-    pub fn change(&mut self, change: &Change) -> Result<()> {
+    pub fn change(&mut self, change: &Change, number: u64) -> Result<()> {
         change.apply(&mut self.wanted)?;
-        self.loaded(self.shown.clone());
+        if !change.is_seen_at_once() {
+            // Of a slider that is dragged only the last value counts.
+            if self
+                .pending
+                .last()
+                .is_some_and(|(_, last)| matches!(last, Edit::Change(last) if last.is_undone_by(change)))
+            {
+                self.pending.pop();
+            }
+            self.pending.push((number, Edit::Change(change.clone())));
+        }
+        self.show(self.shown.clone());
         Ok(())
     }
 
     /// The same for a whole other scene, such as one from a file.
-    pub fn replace(&mut self, scene: Scene) {
+    pub fn replace(&mut self, scene: Scene, number: u64) {
+        self.pending.push((number, Edit::Scene(Box::new(scene.clone()))));
         self.wanted = scene;
-        self.loaded(self.shown.clone());
+        self.show(self.shown.clone());
     }
 
-    /// All that `scene` needs is there: it is shown, in the way that is wanted by now.
-    pub fn loaded(&mut self, scene: Scene) {
+    /// All that `scene` needs is there, which has all changes up to this number: it is shown, in the way that is wanted by now.
+    pub fn loaded(&mut self, scene: Scene, number: u64) {
+        self.pending.retain(|(pending, _)| *pending > number);
+        self.show(scene);
+    }
+
+    fn show(&mut self, scene: Scene) {
         let Scene { image, camera, environment, .. } = &self.wanted;
         // Sub-pixels and background are compiled and uploaded.
         let ImageSettings { subpixels, background, .. } = scene.image;
@@ -57,9 +85,24 @@ impl Session {
         self.shown.environment.intensity = environment.intensity;
     }
 
-    /// What was wanted cannot be: what is seen is wanted again.
-    pub fn failed(&mut self) {
+    /// What was wanted cannot be: what is seen is wanted again, with the changes but those that `cannot_be`, or without any if none of them is
+    /// at fault. Whether there was something to take back.
+    pub fn failed(&mut self, cannot_be: impl Fn(&Edit) -> bool) -> bool {
+        let before = self.pending.len();
+        self.pending.retain(|(_, edit)| !cannot_be(edit));
+        if self.pending.len() == before {
+            self.pending.clear();
+        }
         self.wanted = self.shown.clone();
+        let wanted = &mut self.wanted;
+        self.pending.retain(|(_, edit)| match edit {
+            Edit::Change(change) => change.apply(wanted).is_ok(),
+            Edit::Scene(scene) => {
+                wanted.clone_from(scene);
+                true
+            }
+        });
+        before > 0
     }
 }
 
@@ -75,33 +118,66 @@ mod tests {
     #[test]
     fn what_has_to_be_made_waits_and_all_else_is_shown_at_once() {
         let mut session = Session::new(Scene::default());
-        session.change(&material("silver")).unwrap();
+        session.change(&material("silver"), 1).unwrap();
         assert_eq!(session.shown().materials[0].name, "gold");
         let preparing = session.wanted().clone();
         for change in [Change::Exposure(2.0), Change::Rotation(20.0), Change::Size(100, 50), Change::Subpixels(1)] {
-            session.change(&change).unwrap();
+            session.change(&change, 2).unwrap();
         }
-        session.change(&Change::Background(Background::None)).unwrap();
+        session.change(&Change::Background(Background::None), 3).unwrap();
         let Scene { image, environment, .. } = session.shown();
         assert_eq!((image.exposure, image.width, environment.rotation_deg), (2.0, 100, 20.0));
         assert_eq!((image.subpixels, image.background), (2, Background::Environment));
         // What comes back has the exposure of before.
-        session.loaded(preparing);
+        session.loaded(preparing, 1);
         assert_eq!((session.shown().materials[0].name.as_str(), session.shown().image.exposure), ("silver", 2.0));
-        session.loaded(session.wanted().clone());
+        session.loaded(session.wanted().clone(), 3);
         assert_eq!(session.shown(), session.wanted());
+    }
+
+    /// Whether it names a file that is broken.
+    fn is_broken(edit: &Edit) -> bool {
+        let name = |scene: &Scene| scene.objects[0].mesh.to_string();
+        match edit {
+            Edit::Change(Change::Mesh(mesh)) => mesh.to_string().contains("broken"),
+            Edit::Change(_) => false,
+            Edit::Scene(scene) => name(scene).contains("broken"),
+        }
     }
 
     #[test]
     fn what_cannot_be_loaded_changes_nothing() {
         let mut session = Session::new(Scene::default());
-        session.change(&Change::Mesh(Source::File("broken.obj".into()))).unwrap();
-        session.change(&Change::Gamma(1.5)).unwrap();
-        session.failed();
+        session.change(&Change::Mesh(Source::File("broken.obj".into())), 1).unwrap();
+        session.change(&Change::Gamma(1.5), 2).unwrap();
+        assert!(session.failed(is_broken));
         let mut expected = Scene::default();
         expected.image.gamma = 1.5;
         assert_eq!((session.shown(), session.wanted()), (&expected, &expected));
-        assert!(session.change(&Change::Exposure(f64::NAN)).is_err());
+        assert!(session.change(&Change::Exposure(f64::NAN), 3).is_err());
         assert_eq!((session.shown(), session.wanted()), (&expected, &expected));
+        assert!(!session.failed(is_broken), "there is nothing to take back");
+    }
+
+    #[test]
+    fn what_cannot_be_loaded_leaves_other_changes_as_they_are() {
+        let mut session = Session::new(Scene::default());
+        session.change(&material("copper"), 1).unwrap();
+        session.change(&Change::Environment(Source::Builtin("sky".into())), 2).unwrap();
+        let mut expected = session.wanted().clone();
+        session.change(&Change::Mesh(Source::File("broken.obj".into())), 3).unwrap();
+        session.change(&Change::Method("paper".into()), 4).unwrap();
+        expected.shading.method = "paper".into();
+        assert!(session.failed(is_broken));
+        assert_eq!(session.wanted(), &expected);
+        // Nor those before another scene, which is broken.
+        let mut broken = Scene::default();
+        broken.objects[0].mesh = Source::File("broken.obj".into());
+        session.replace(broken, 5);
+        assert!(session.failed(is_broken));
+        assert_eq!(session.wanted(), &expected);
+        // Where none of them is at fault, what is shown is wanted.
+        assert!(session.failed(|_| false));
+        assert_eq!(session.wanted(), session.shown());
     }
 }

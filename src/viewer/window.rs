@@ -66,8 +66,17 @@ struct Open {
     cursor: [f64; 2],
     modifiers: ModifiersState,
     /// What is held down, and from where.
-    held: Option<(Button, [f64; 2])>,
+    held: Option<Held>,
     script: Script,
+}
+
+/// A button that is held down over the picture.
+struct Held {
+    button: Button,
+    /// Where it was pressed.
+    from: [f64; 2],
+    /// Whether the cursor has moved since.
+    has_moved: bool,
 }
 
 /// What a script asks for: inputs to play, frames to count, a picture to take.
@@ -110,6 +119,8 @@ impl App {
         let device = Device::for_surface(&instance, device.as_deref(), &surface)?;
         let stage = Presenter::new(&device, surface, *present_mode)?;
         let context = egui::Context::default();
+        // The panel has one width, and + and - are the exposure's.
+        context.options_mut(|options| options.zoom_with_keyboard = false);
         let egui = egui_winit::State::new(
             context.clone(),
             ViewportId::ROOT,
@@ -195,7 +206,8 @@ impl Open {
         };
         let PhysicalSize { width, height } = self.window.inner_size();
         let size = if self.is_minimised { [0, 0] } else { [width, height] };
-        let is_held = self.held.is_some() || (self.context.is_using_pointer() && !inputs.is_empty());
+        let drags_slider = self.context.is_using_pointer() && inputs.iter().any(Input::changes_picture);
+        let is_held = drags_slider || self.held.as_ref().is_some_and(|held| held.has_moved);
         let counts = self.viewer.loaded().is_some() && !self.viewer.is_busy() && self.script.replay.is_empty();
         let last = counts && self.script.frames_left.is_some_and(|left| left <= 1);
         let screenshot = last && settings.screenshot.is_some();
@@ -295,11 +307,13 @@ impl Open {
     fn drag(&mut self, to: [f64; 2]) {
         let from = std::mem::replace(&mut self.cursor, to);
         self.viewer.cursor = Some(to);
-        if let Some((button, start)) = self.held {
-            let by = [to[0] - from[0], to[1] - from[1]];
+        let by = [to[0] - from[0], to[1] - from[1]];
+        if let Some(held) = self.held.as_mut().filter(|_| by != [0.0; 2]) {
+            held.has_moved = true;
+            let Held { button, from, .. } = *held;
             let (shift, control) =
                 (self.modifiers.shift_key(), self.modifiers.control_key() || self.modifiers.super_key());
-            self.viewer.handle(&Input::Drag(Drag { button, from: start, by, shift, control }));
+            self.viewer.handle(&Input::Drag(Drag { button, from, by, shift, control }));
             self.redraw();
         }
     }
@@ -343,7 +357,7 @@ impl Open {
                     _ => return false,
                 };
                 if self.over_picture() {
-                    self.held = Some((button, self.cursor));
+                    self.held = Some(Held { button, from: self.cursor, has_moved: false });
                 }
             }
             WindowEvent::MouseWheel { delta, .. } if !response.consumed && self.over_picture() => {
@@ -360,7 +374,9 @@ impl Open {
                 self.redraw();
             }
             WindowEvent::KeyboardInput { event, .. }
-                if event.state == ElementState::Pressed && !self.context.wants_keyboard_input() =>
+                if event.state == ElementState::Pressed
+                    && !self.context.wants_keyboard_input()
+                    && (self.modifiers - ModifiersState::SHIFT).is_empty() =>
             {
                 if let Some(key) = name_of(&event.logical_key) {
                     self.viewer.handle(&Input::Key(key));

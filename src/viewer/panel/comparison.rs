@@ -1,8 +1,9 @@
 //! With what the picture is compared, by how much the two differ, and the other one right of a line that can be dragged.
 use super::group;
+use super::shading::what_is_counted;
 use crate::method::Method;
 use crate::passes::Area;
-use crate::scene::{MAX_SAMPLES, ShadingSettings};
+use crate::scene::{MAX_SAMPLES, Scene, ShadingSettings};
 use crate::viewer::comparison::{Compared, Other, Wipe};
 use crate::viewer::input::Input;
 use crate::viewer::interaction::Viewer;
@@ -26,7 +27,7 @@ impl State {
     pub fn show(&self, ui: &mut Ui, viewer: &Viewer, inputs: &mut Vec<Input>) {
         group(ui, "Comparison", |ui| {
             let comparer = &viewer.comparer;
-            ui.horizontal(|ui| choose(ui, comparer.other.as_ref(), viewer.session.wanted().shading.seed, inputs));
+            ui.horizontal(|ui| choose(ui, comparer.other.as_ref(), viewer.session.wanted(), inputs));
             if comparer.other.is_none() {
                 return;
             }
@@ -39,6 +40,7 @@ impl State {
             }
             match comparer.compared() {
                 Some(compared) => metrics(ui, compared),
+                None if comparer.is_busy() => drop(ui.weak("the other picture is being made")),
                 None => drop(ui.weak("waits until the picture stands still")),
             }
             if let Some(progress) = comparer.progress().filter(|progress| progress.total > 0) {
@@ -75,7 +77,8 @@ impl State {
             }
         };
         label(&compared.own_name, Align2::RIGHT_TOP, -8.0);
-        label(&compared.name, Align2::LEFT_TOP, 8.0);
+        let name = if viewer.comparer.shows_heat_map { "difference" } else { &compared.name };
+        label(name, Align2::LEFT_TOP, 8.0);
         inputs.extend(dragged_line(context, picture, x).map(Input::Wipe));
     }
 }
@@ -98,7 +101,7 @@ pub fn on_screen(context: &Context, area: Area) -> Rect {
     Rect::from_min_size(pos2(left, top), vec2(width, height))
 }
 
-fn choose(ui: &mut Ui, other: Option<&Other>, seed: u64, inputs: &mut Vec<Input>) {
+fn choose(ui: &mut Ui, other: Option<&Other>, scene: &Scene, inputs: &mut Vec<Input>) {
     let name = match other {
         None => "nothing",
         Some(Other::Reference) => Method::Reference.name(),
@@ -114,7 +117,7 @@ fn choose(ui: &mut Ui, other: Option<&Other>, seed: u64, inputs: &mut Vec<Input>
                     Method::Reference => Other::Reference,
                     _ => Other::Shading(ShadingSettings {
                         method: method.name().into(),
-                        seed,
+                        seed: scene.shading.seed,
                         ..ShadingSettings::default()
                     }),
                 })));
@@ -122,10 +125,15 @@ fn choose(ui: &mut Ui, other: Option<&Other>, seed: u64, inputs: &mut Vec<Input>
         }
     });
     list.response.on_hover_text("What is right of the line: the same view by another method or number of threads, or the reference, which goes on while the picture stands still.");
-    if let Some(Other::Shading(shading)) = other {
-        let usual = Method::from_name(&shading.method).map_or(1, Method::default_count);
-        let mut count = shading.threads.unwrap_or(usual);
-        let drag = DragValue::new(&mut count).range(1..=MAX_SAMPLES).suffix(" threads");
+    if let Some(Other::Shading(shading)) = other
+        && let Ok(method) = Method::from_name(&shading.method)
+    {
+        let most = method.max_count(scene.image.subpixels).min(MAX_SAMPLES);
+        let mut count = shading.threads.unwrap_or(method.default_count());
+        if most == 1 {
+            return;
+        }
+        let drag = DragValue::new(&mut count).range(1..=most).suffix(format!(" {}", what_is_counted(method)));
         if ui.add(drag).on_hover_text("Threads or samples a pixel of the other picture.").changed() {
             inputs.push(Input::Compare(Some(Other::Shading(ShadingSettings {
                 threads: Some(count),

@@ -16,12 +16,16 @@ pub fn show(ui: &mut Ui, viewer: &Viewer, inputs: &mut Vec<Input>) {
             .clamping(SliderClamping::Never)
             .suffix(" EV")
             .fixed_decimals(2)
+            .update_while_editing(false)
             .text("exposure");
         let tooltip = "Factor on radiance before display, in stops: display value = clamp(2^EV L, 0, 1)^(1/gamma). + and - are thirds of a stop, 0 is none.";
         on_change(&ui.add(slider).on_hover_text(tooltip), inputs, || Change::Exposure(stops.exp2()));
         let mut gamma = image.gamma;
-        let slider =
-            egui::Slider::new(&mut gamma, 1.0..=3.0).clamping(SliderClamping::Never).fixed_decimals(2).text("gamma");
+        let slider = egui::Slider::new(&mut gamma, 1.0..=3.0)
+            .clamping(SliderClamping::Never)
+            .fixed_decimals(2)
+            .update_while_editing(false)
+            .text("gamma");
         let tooltip = "Display values are radiance to the power of 1/gamma; 2.2 is that of most displays.";
         on_change(&ui.add(slider).on_hover_text(tooltip), inputs, || Change::Gamma(gamma));
         let mut shown = image.background == Background::Environment;

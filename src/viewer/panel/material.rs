@@ -1,30 +1,54 @@
 //! Which material, and the parameters of a model.
 use super::{group, on_change, source};
 use crate::brdf::{self, Brdf, Domain, Parameter, Spacing, as_number, channels};
-use crate::scene::{MaterialSettings, MaterialSource};
+use crate::scene::{MaterialSettings, MaterialSource, Scene};
 use crate::viewer::change::Change;
 use crate::viewer::input::Input;
 use crate::viewer::interaction::Viewer;
-use egui::{RichText, SliderClamping, Ui};
+use egui::{Label, RichText, SliderClamping, Ui};
+
+/// Width of the names of parameters, in points.
+const NAME_WIDTH: f32 = 88.0;
+/// Names of more letters are small.
+const LONG_NAME: usize = 11;
 
 #[derive(Default)]
 pub struct State {
     path: String,
+    /// Which of the scene's materials is edited, by its name; the first object's if there is no such.
+    chosen: String,
     /// The material whose parameters were looked up last, since that may read a file, and these.
     known: Option<(MaterialSettings, Vec<(Parameter, toml::Value)>)>,
 }
 
 impl State {
+    /// The name of the material of `scene` that is edited; none if there are no objects.
+    pub fn edited<'s>(&self, scene: &'s Scene) -> Option<&'s str> {
+        let used = scene.used_materials();
+        used.iter().find(|name| **name == self.chosen).or(used.first()).copied()
+    }
+
     pub fn show(&mut self, ui: &mut Ui, viewer: &Viewer, inputs: &mut Vec<Input>) {
         let scene = viewer.session.wanted();
-        let Some(settings) = scene
-            .objects
-            .first()
-            .and_then(|object| scene.materials.iter().find(|material| material.name == object.material))
-        else {
+        let is_edited = |name| move |material: &&MaterialSettings| material.name == name;
+        let Some(settings) = self.edited(scene).and_then(|name| scene.materials.iter().find(is_edited(name))) else {
             return;
         };
+        let used = scene.used_materials();
         group(ui, "Material", |ui| {
+            if used.len() > 1 {
+                let list = egui::ComboBox::from_id_salt("which material")
+                    .width(ui.available_width() - 8.0)
+                    .selected_text(&settings.name)
+                    .show_ui(ui, |ui| {
+                        for name in &used {
+                            if ui.selectable_label(*name == settings.name, *name).clicked() {
+                                self.chosen = (*name).to_owned();
+                            }
+                        }
+                    });
+                list.response.on_hover_text("Which of the scene's materials is edited.");
+            }
             let names: Vec<_> = Brdf::builtin_names().collect();
             let current = match &settings.source {
                 MaterialSource::Builtin(name) => name.clone(),
@@ -33,16 +57,22 @@ impl State {
                 MaterialSource::Custom(custom) => custom.name().to_owned(),
             };
             let files = &Brdf::FILES;
-            let tooltip = format!("The BRDF of all objects: built in, or {}.", files.names());
+            let whose = if used.len() > 1 { "this material" } else { "all objects" };
+            let tooltip = format!("The BRDF of {whose}: built in, or {}.", files.names());
             let hint = format!("file: {}", files.extensions());
             let chosen = source(ui, "material", &current, &names, &mut self.path, &tooltip, &hint);
             if let Some(name) = chosen {
-                inputs.push(Input::Set(Change::Material(MaterialSource::named(&name))));
+                let source = MaterialSource::named(&name);
+                inputs.push(Input::Set(match used.len() {
+                    1 => Change::Material(source),
+                    _ => Change::OneMaterial { material: settings.name.clone(), source },
+                }));
             }
             if self.known.as_ref().is_none_or(|(known, _)| known != settings) {
                 self.known = Some((settings.clone(), parameters_of(settings).unwrap_or_default()));
             }
             if let Some((_, parameters)) = &self.known {
+                ui.spacing_mut().slider_width = 108.0;
                 egui::Grid::new("parameters").num_columns(2).show(ui, |ui| {
                     for (parameter, value) in parameters {
                         row(ui, &settings.name, parameter, value, inputs);
@@ -69,9 +99,13 @@ fn parameters_of(settings: &MaterialSettings) -> Option<Vec<(Parameter, toml::Va
 fn row(ui: &mut Ui, material: &str, parameter: &Parameter, value: &toml::Value, inputs: &mut Vec<Input>) {
     let Parameter { key, help, domain, .. } = parameter;
     let set = |value: toml::Value| Change::Parameter { material: material.to_owned(), key: key.to_owned(), value };
-    // Names of inner tables are long, and rows that are wider than the panel would cut all groups off.
-    let name = RichText::new(key);
-    ui.label(if key.contains('.') { name.small() } else { name }).on_hover_text(*help);
+    ui.scope(|ui| {
+        // Rows that are wider than the panel would cut all groups off.
+        ui.set_width(NAME_WIDTH);
+        let name = RichText::new(key);
+        let name = if key.len() > LONG_NAME { name.small() } else { name };
+        ui.add(Label::new(name).truncate()).on_hover_text(format!("{key}: {help}"));
+    });
     match domain {
         Domain::Number(range, spacing) => {
             let mut number = as_number(value);
@@ -92,7 +126,7 @@ fn row(ui: &mut Ui, material: &str, parameter: &Parameter, value: &toml::Value, 
                 for channel in 0..3 {
                     let drag =
                         egui::DragValue::new(&mut rgb[channel]).range(range.clone()).speed(0.005).max_decimals(3);
-                    let response = ui.add_sized([40.0, 18.0], drag).on_hover_text(*help);
+                    let response = ui.add_sized([36.0, 18.0], drag).on_hover_text(*help);
                     on_change(&response, inputs, || set(array(rgb)));
                 }
                 if *range == (0.0..=1.0) {

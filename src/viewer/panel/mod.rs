@@ -40,7 +40,8 @@ impl Panel {
             ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
                 ui.spacing_mut().slider_width = 120.0;
                 self.material.show(ui, viewer, &mut inputs);
-                self.plots.show(ui, viewer);
+                let edited = self.material.edited(viewer.session.wanted()).map(str::to_owned);
+                self.plots.show(ui, viewer, edited.as_deref());
                 self.light.show(ui, viewer, &mut inputs);
                 self.object.show(ui, viewer, &mut inputs);
                 shading::show(ui, viewer, &mut inputs);
@@ -125,7 +126,7 @@ fn source(
     let field = egui::TextEdit::singleline(path).hint_text(hint).desired_width(ui.available_width() - 8.0);
     let response = ui.add(field).on_hover_text("Name of a file, then Enter. Or drop the file on the window.");
     if response.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter)) && !path.is_empty() {
-        chosen = Some(std::mem::take(path));
+        chosen = Some(path.clone());
     }
     chosen
 }

@@ -19,10 +19,10 @@ pub struct State {
 }
 
 impl State {
-    /// The group of the panel; while it is closed nothing is plotted.
-    pub fn show(&mut self, ui: &mut Ui, viewer: &mut Viewer) {
+    /// The group of the panel, of the material of this name; while it is closed nothing is plotted.
+    pub fn show(&mut self, ui: &mut Ui, viewer: &mut Viewer, material: Option<&str>) {
         CollapsingHeader::new(RichText::new("Plots").strong()).default_open(false).show(ui, |ui| {
-            let Some(material) = first_material(viewer) else { return };
+            let Some(material) = material.and_then(|name| shown_material(viewer, name)) else { return };
             let Some(plots) = viewer.plotter.of(&material).cloned() else {
                 ui.weak("are being made");
                 return;
@@ -61,11 +61,11 @@ impl State {
     }
 }
 
-/// The material of the first object, which the panel edits, as it is shown.
-fn first_material(viewer: &Viewer) -> Option<Keyed<Brdf>> {
-    let prepared = &viewer.loaded()?.prepared;
-    let material = prepared.objects.first()?.material as usize;
-    Some(prepared.materials.get(material)?.turned_brdf.clone())
+/// The material of this name as it is shown; until it is, that of the first object.
+fn shown_material(viewer: &Viewer, name: &str) -> Option<Keyed<Brdf>> {
+    let materials = &viewer.loaded()?.prepared.materials;
+    let shown = materials.iter().find(|material| material.name == name).or(materials.first())?;
+    Some(shown.turned_brdf.clone())
 }
 
 /// Lobes above the surface, with their lights.

@@ -13,6 +13,11 @@ const PATTERN_TOOLTIPS: [&str; 2] = [
     "Samples at one set of points for all pixels: no noise, but bias.",
 ];
 
+/// What the number of a method is of.
+pub fn what_is_counted(method: Method) -> &'static str {
+    if method.threads().is_some() { "threads" } else { "samples" }
+}
+
 pub fn show(ui: &mut Ui, viewer: &Viewer, inputs: &mut Vec<Input>) {
     let scene = viewer.session.wanted();
     let Ok(method) = Method::from_name(&scene.shading.method) else { return };
@@ -41,18 +46,20 @@ pub fn show(ui: &mut Ui, viewer: &Viewer, inputs: &mut Vec<Input>) {
                 }
             });
         }
-        let (what, most, tooltip) = match method.threads() {
-            Some(kind) => (
-                "threads",
-                kind.max_count() as u32,
-                "Sample threads: lookups in the filtered environment for each pixel. Other numbers are made in the background.",
-            ),
-            None => ("samples", MAX_SAMPLES, "Samples of the Monte Carlo estimate for each pixel."),
+        let tooltip = match method.threads() {
+            Some(_) => {
+                "Sample threads: lookups in the filtered environment for each pixel. Other numbers are made in the background."
+            }
+            None => "Samples of the Monte Carlo estimate for each pixel.",
         };
+        let most = method.max_count(scene.image.subpixels).min(MAX_SAMPLES);
         let mut count = scene.shading.threads.unwrap_or(method.default_count());
-        let slider = egui::Slider::new(&mut count, 1..=most).logarithmic(true).text(what);
-        let tooltip = format!("{tooltip} [ and ] halve and double.");
-        on_change(&ui.add(slider).on_hover_text(tooltip), inputs, || Change::Threads(Some(count)));
+        // The split sum has no choice.
+        if most > 1 {
+            let slider = egui::Slider::new(&mut count, 1..=most).logarithmic(true).text(what_is_counted(method));
+            let tooltip = format!("{tooltip} [ and ] halve and double.");
+            on_change(&ui.add(slider).on_hover_text(tooltip), inputs, || Change::Threads(Some(count)));
+        }
         let mut subpixels = scene.image.subpixels;
         let slider = egui::Slider::new(&mut subpixels, 1..=MAX_SUBPIXELS).text("sub-pixels");
         let tooltip =
