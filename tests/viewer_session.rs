@@ -68,6 +68,27 @@ fn an_edited_file_that_is_dropped_again_is_seen_as_it_is_now() {
 }
 
 #[test]
+fn what_cannot_be_loaded_takes_nothing_else_with_it_not_even_before_the_first_picture() {
+    let gpu = Validated::new();
+    let scene = sphere(MaterialSource::Builtin("clay".into()), "white", 2, (32, 24));
+    let mut viewer = Viewer::new(scene, &gpu.device, Memo::default(), || ());
+    let absent = Change::Mesh(Source::File("absent.obj".into()));
+    viewer.handle(&Input::Set(absent.clone()));
+    wait(&mut viewer);
+    assert!(viewer.notice.as_ref().is_some_and(|notice| notice.text.contains("absent.obj")));
+    assert!(viewer.loaded().is_some(), "the scene that it was started with");
+    for change in [Change::Environment(Source::Builtin("sky".into())), absent, Change::Threads(Some(3))] {
+        viewer.handle(&Input::Set(change));
+    }
+    wait(&mut viewer);
+    let shown = viewer.session.shown();
+    assert_eq!((&shown.environment.source, shown.shading.threads), (&Source::Builtin("sky".into()), Some(3)));
+    assert_eq!(shown, viewer.session.wanted());
+    drop(viewer);
+    gpu.finish();
+}
+
+#[test]
 fn of_two_materials_that_are_edited_in_turn_each_keeps_its_threads() {
     let gpu = Validated::new();
     let scene = |color: f64, alpha: f64| {

@@ -123,5 +123,5 @@ fn keep(scene: &Scene, path: &std::path::Path) {
 fn failed(cause: impl std::fmt::Display) -> Error {
     let cause = cause.to_string();
     let reason = cause.strip_prefix("os error at ").and_then(|rest| rest.split_once(": ")).map(|(_, reason)| reason);
-    Error::Window { cause: reason.unwrap_or(&cause).to_owned() }
+    Error::Window { cause: reason.unwrap_or(&cause).trim_end_matches('.').to_owned() }
 }

@@ -10,7 +10,7 @@ use egui::{Label, RichText, SliderClamping, Ui};
 /// Width of the names of parameters, in points.
 const NAME_WIDTH: f32 = 88.0;
 /// Names of more letters are small.
-const LONG_NAME: usize = 11;
+const LONG_NAME: usize = 12;
 
 #[derive(Default)]
 pub struct State {
@@ -123,10 +123,12 @@ fn row(ui: &mut Ui, material: &str, parameter: &Parameter, value: &toml::Value, 
             let mut rgb = channels(value).unwrap_or_default();
             let array = |rgb: [f64; 3]| toml::Value::Array(rgb.map(Into::into).to_vec());
             ui.horizontal(|ui| {
+                // That of buttons is wider.
+                ui.spacing_mut().interact_size.x = 32.0;
                 for channel in 0..3 {
                     let drag =
                         egui::DragValue::new(&mut rgb[channel]).range(range.clone()).speed(0.005).max_decimals(3);
-                    let response = ui.add_sized([36.0, 18.0], drag).on_hover_text(*help);
+                    let response = ui.add_sized([34.0, 18.0], drag).on_hover_text(*help);
                     on_change(&response, inputs, || set(array(rgb)));
                 }
                 if *range == (0.0..=1.0) {
