@@ -41,7 +41,7 @@ pub struct TimedFit {
 /// Fits and measures; `found` has what was measured until an error or an interruption.
 ///
 /// # Errors
-/// Materials that cannot be read, counts that cannot be fitted, [`Error::Cancelled`].
+/// Materials that cannot be read, counts that cannot be fitted, [`crate::Error::Cancelled`].
 pub fn run(fits: &Fits, memo: &Memo, observer: &dyn Observer, found: &mut Vec<TimedFit>) -> Result<()> {
     let total = fits.materials.len() * fits.counts.len() * fits.repeat.max(1) as usize;
     let mut done = 0;
