@@ -43,8 +43,24 @@ float clearance(float away, float source_width, float lobe_width) {
     return (away + 4.0 * 2.6 * lobe_width) / (2.0 * source_width);
 }
 
-// Above this clearance 2 x 2 points of a source do.
+// Above this clearance 2 x 2 points of a source do. It is above the bounds of share_of_brdf, for which all above them is alike.
 const float FAR = 4.0;
+
+// Above this one its middle does: tails of Gaussian lobes go on falling steeply.
+const float VERY_FAR = 40.0;
+
+// A source is opened within so many of its standard deviations from the mirrored view. So many widths of a lobe count as part of the way,
+// since f changes little within them. Measured: opened later, sources cost less, and err more in lobes with steep flanks.
+const float OPENED_WITHIN = 12.0;
+const float WIDTHS_ON_THE_WAY = 4.2;
+
+// Of a source that is wider, in radians, the shape matters.
+const float WIDEST_WHOLE_RAD = 0.1;
+
+// Near the horizon f cos of measured materials bends within a few degrees of theta_i: light is low below this cosine, and a source of
+// which the middle alone would be looked at within so many of its standard deviations.
+const float LOW_COSINE = 0.3;
+const float LOW_DEVIATIONS = 20.0;
 
 // The clearance of a source that counts as no narrower than `least_width`.
 float clearance_of(Source source, Lobe lobe, Surface surface, Material material, float least_width) {
@@ -58,7 +74,8 @@ float clearance_of(Source source, Lobe lobe, Surface surface, Material material,
 bool opens(Source source, Lobe lobe, Surface surface, Material material, float least_width) {
     float width = source.direction.w;
     float away = away_from(lobe, surface, material, source.direction.xyz);
-    return width > least_width && (away + 4.2 * lobe.width < 12.0 * width || width > 0.1);
+    bool is_near = away + WIDTHS_ON_THE_WAY * lobe.width < OPENED_WITHIN * width;
+    return width > least_width && (is_near || width > WIDEST_WHOLE_RAD);
 }
 
 // Source s, or the first of its parts that is not to be taken part by part. Nothing but s leaves the loop: of other values, lavapipe
@@ -168,10 +185,9 @@ void add_source(inout AtSources sum, Source source, float clear, Surface surface
         return;
     }
     float lowest = z - half_side;
-    // Tails of Gaussian lobes go on falling steeply, so only from very far does the middle alone do. Near the horizon f cos of measured
-    // materials bends within a few degrees of theta_i: four steps up there, for wide light also higher up.
-    int side = clear > 40.0 ? 1 : clear > FAR ? 2 : 3;
-    bool is_low = clear > FAR && lowest < (side == 1 ? 20.0 * deviation : 0.3);
+    int side = clear > VERY_FAR ? 1 : clear > FAR ? 2 : 3;
+    // Four steps up.
+    bool is_low = clear > FAR && lowest < (side == 1 ? LOW_DEVIATIONS * deviation : LOW_COSINE);
     // Light sets by the angle of normals, not by twice as much.
     if (!is_low && lowest > 0.0) {
         x = within_pixel(x, surface);

@@ -328,10 +328,13 @@ fn model_of(text: &str) -> Result<(String, toml::Table)> {
     Ok((parameters::take_model(&mut table)?, table))
 }
 
+/// What the channels of linear Rec. 709 add to luminance.
+pub const LUMINANCE: DVec3 = dvec3(0.2126, 0.7152, 0.0722);
+
 /// Luminance of a linear Rec. 709 colour.
 #[inline]
 pub fn luminance(rgb: DVec3) -> f64 {
-    rgb.dot(dvec3(0.2126, 0.7152, 0.0722))
+    rgb.dot(LUMINANCE)
 }
 
 /// Warns where `most`, that `what` is, exceeds 1 in some channel: such a surface reflects more light than it receives.

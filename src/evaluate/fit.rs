@@ -1,7 +1,7 @@
 //! What threads cost to make, beside what they are worth: `threadlight bench fit`.
 use std::time::Instant;
 
-use super::tables::{Section, Table};
+use super::tables::{Section, Table, mean};
 use crate::error::Result;
 use crate::memo::Memo;
 use crate::pipeline::median;
@@ -95,11 +95,14 @@ pub fn tables(found: &[TimedFit]) -> Section {
                 cells(value(|fit| fit.fit_ms), value(|fit| fit.fitted_error), value(|fit| fit.validation_error));
             (name.to_owned(), cells)
         };
-        let mean = |values: Vec<f64>| values.iter().sum::<f64>() / values.len() as f64;
         let worst = |values: Vec<f64>| values.into_iter().fold(0.0, f64::max);
         let mut rows: Vec<_> = fits.iter().map(row).collect();
         if fits.len() > 1 {
-            rows.extend([over_all("median", median), over_all("mean", mean), over_all("worst", worst)]);
+            rows.extend([
+                over_all("median", median),
+                over_all("mean", |values| mean(&values)),
+                over_all("worst", worst),
+            ]);
         }
         let head = ["ms", "its lights", "others"].map(str::to_owned).to_vec();
         Table { title: format!("{count} threads"), head, rows }

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::cases::{Cases, Place};
-use super::tables::{Section, Table};
+use super::tables::{Section, Table, mean};
 use crate::environment::FractionBits;
 use crate::error::Result;
 use crate::memo::{Key, Keyed, Memo};
@@ -251,7 +251,7 @@ pub fn tables(found: &[Rounded]) -> Section {
                 (row.method, row.count, row.environment.as_str(), &row.rounding) == (method, count, environment, &name)
             };
             let rows: Vec<_> = found.iter().filter(is_of).collect();
-            let mean = rows.iter().map(|row| row.rms).sum::<f64>() / rows.len() as f64;
+            let mean = mean(&rows.iter().map(|row| row.rms).collect::<Vec<_>>());
             let largest = |of: fn(&Rounded) -> f64| rows.iter().map(|row| of(row)).fold(0.0, f64::max);
             let worst = largest(|row| row.rms);
             let of_worst = &rows.iter().find(|row| row.rms == worst)?.material;

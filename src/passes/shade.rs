@@ -42,6 +42,10 @@ pub struct ShadedMaterial<'a> {
     pub threads: Option<&'a Threads>,
     /// Its table, if it [has one](Brdf::has_table) and shaders evaluate it.
     pub table: Option<&'a Brdf>,
+    /// Its CDFs, for methods that draw by them.
+    pub slices: Option<&'a SliceTable>,
+    /// Its split sum, for the method of this name.
+    pub split_sum: Option<&'a SplitSum>,
 }
 
 impl DeviceMaterials {
@@ -67,7 +71,7 @@ impl DeviceMaterials {
         let [phi_d, theta_d, _] = merl::DEVICE_TABLE_SIZE;
         let mut measured = BrdfAtlas::new([phi_d, theta_d]);
         let mut made = BrdfAtlas::new(MADE_TABLE_SIZE);
-        for ShadedMaterial { brdf, lobe, threads: own_threads, table } in materials {
+        for ShadedMaterial { brdf, lobe, threads: own_threads, table, slices: own_slices, split_sum } in materials {
             let mut record = MaterialRecord::new(brdf, lobe);
             if evaluates_brdf && brdf.has_table() {
                 let table = table.expect("a table of a BRDF that shaders look up");
@@ -85,13 +89,11 @@ impl DeviceMaterials {
                 record.shared_deviation = own_threads.shared_deviation(lobe) as f32;
             }
             record.first_slice = slices.len() as u32;
-            if lookups.slices {
-                let table = SliceTable::new(brdf);
+            if let Some(table) = own_slices {
                 record.threads.azimuth_count = table.azimuths as u32;
-                slices.extend(table.cdfs);
-            } else if lookups.split_sum {
-                slices.extend(SplitSum::new(brdf).device_floats());
+                slices.extend(&table.cdfs);
             }
+            slices.extend(split_sum.into_iter().flat_map(SplitSum::device_floats));
             records.push(record);
         }
         let storage =
@@ -107,9 +109,7 @@ impl DeviceMaterials {
             table_sampler: Sampler::new(device, "brdf tables", SamplerKind::WrappedLinear)?,
         })
     }
-}
 
-impl DeviceMaterials {
     /// All of it, by name in the shader; the last two as the method declares them.
     fn bindings(&self) -> Vec<(&'static str, Bound<'_>)> {
         let tables = [("brdf_tables", &self.measured_tables), ("made_brdf_tables", &self.made_tables)];

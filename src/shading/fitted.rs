@@ -56,8 +56,14 @@ fn blurred_radiance(twin: &CpuShader, direction: Vec3, level: f32, sources: f32)
     radiance
 }
 
-/// Twin of `FAR`.
+/// Twins of the shader's.
 const FAR: f32 = 4.0;
+const VERY_FAR: f32 = 40.0;
+const OPENED_WITHIN: f32 = 12.0;
+const WIDTHS_ON_THE_WAY: f32 = 4.2;
+const WIDEST_WHOLE_RAD: f32 = 0.1;
+const LOW_COSINE: f32 = 0.3;
+const LOW_DEVIATIONS: f32 = 20.0;
 
 /// A lobe, seen from w_o in the shading frame. Twin of `Lobe`.
 struct Lobe<'a> {
@@ -98,7 +104,8 @@ impl<'a> Lobe<'a> {
     fn opens(&self, source: &SourceRecord, least_width: f32) -> bool {
         let width = source.direction.w;
         let away = self.away(source.direction.truncate());
-        width > least_width && (away + 4.2 * self.width < 12.0 * width || width > 0.1)
+        let is_near = away + WIDTHS_ON_THE_WAY * self.width < OPENED_WITHIN * width;
+        width > least_width && (is_near || width > WIDEST_WHOLE_RAD)
     }
 
     /// Twin of `descend`.
@@ -193,7 +200,7 @@ impl AtSources {
         if z + half_side <= 0.0 {
             return;
         }
-        let side = if clear > 40.0 {
+        let side = if clear > VERY_FAR {
             1
         } else if clear > FAR {
             2
@@ -201,7 +208,7 @@ impl AtSources {
             3
         };
         let lowest = z - half_side;
-        let is_low = clear > FAR && lowest < if side == 1 { 20.0 * deviation } else { 0.3 };
+        let is_low = clear > FAR && lowest < if side == 1 { LOW_DEVIATIONS * deviation } else { LOW_COSINE };
         if !is_low && lowest > 0.0 {
             [x, y] = [x, y].map(|axis| within_pixel(axis, &point.surface));
         }

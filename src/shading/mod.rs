@@ -7,12 +7,12 @@ use crate::brdf::{Brdf, MaterialRecord};
 use crate::environment::{Alias, FractionBits, LightMap, SourceRecord};
 use crate::geometry_texel::GeometryTexel;
 use crate::light::Light;
-use crate::memo::Round;
+use crate::memo::{Keyed, Round};
 use crate::method::{Lookups, Method};
 use crate::passes::{SMOOTH_DEG, SmoothVariance, View};
 use crate::prepare::{Prepared, PreparedMaterial};
 use crate::scene::Pattern;
-use crate::steps::{Tabulate, light};
+use crate::steps::{FitSplitSum, Tabulate, TabulateSlices, light};
 use crate::tangent::any_tangent;
 use crate::threads::{FittedTable, SliceTable, SplitSum, Threads};
 use glam::{Mat3, UVec2, Vec2, Vec3, Vec4};
@@ -145,9 +145,9 @@ pub struct CpuShader<'a> {
     map: Option<LightMap>,
     aliases: Vec<Alias>,
     /// One for each material, for methods that draw by them.
-    slices: Vec<SliceTable>,
+    slices: Vec<Keyed<SliceTable>>,
     /// One for each material, for the method that looks them up.
-    split_sums: Vec<SplitSum>,
+    split_sums: Vec<Keyed<SplitSum>>,
     /// One for each material.
     records: Vec<MaterialRecord>,
     /// The table of each material that shaders look up in one.
@@ -173,7 +173,10 @@ impl<'a> CpuShader<'a> {
             Lookups { map: true, .. } => Some(LightMap::new(environment)),
             _ => None,
         };
-        let slices = lookups.slices.then(|| materials.iter().map(|material| SliceTable::new(&material.brdf)).collect());
+        let slices = lookups
+            .slices
+            .then(|| materials.iter().map(|material| round.ask(&TabulateSlices(&material.brdf))).collect())
+            .transpose()?;
         let table = |material: &PreparedMaterial| match evaluates_brdf && material.brdf.has_table() {
             false => Ok(None),
             true => Ok(Some((*round.ask(&Tabulate(&material.brdf))?).clone())),
@@ -182,8 +185,10 @@ impl<'a> CpuShader<'a> {
             shared_deviation: material.shared_deviation() as f32,
             ..MaterialRecord::new(&material.brdf, &material.lobe)
         };
-        let split_sums =
-            lookups.split_sum.then(|| materials.iter().map(|material| SplitSum::new(&material.brdf)).collect());
+        let split_sums = lookups
+            .split_sum
+            .then(|| materials.iter().map(|material| round.ask(&FitSplitSum(&material.brdf))).collect())
+            .transpose()?;
         Ok(Self {
             prepared,
             light,

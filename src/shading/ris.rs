@@ -2,6 +2,7 @@
 use glam::Vec3;
 
 use super::{Point, importance_sampling::SliceRows, light_sampling::light_pdf, random::to_unit};
+use crate::brdf::LUMINANCE;
 
 const CANDIDATES: u32 = 8;
 
@@ -25,7 +26,7 @@ pub(super) fn estimate(point: &Point) -> Vec3 {
             let direction = frame * w_i;
             let texel = point.environment_texel(direction);
             let value = point.brdf(w_i, w_o) * texel.truncate() * w_i.z;
-            let q = value.dot(Vec3::new(0.2126, 0.7152, 0.0722));
+            let q = value.dot(LUMINANCE.as_vec3());
             let p = 0.5 * (rows.brdf_pdf(w_i, w_o, (w_i + w_o).normalize()) + light_pdf(texel, direction));
             let weight = q / p;
             weight_sum += weight;

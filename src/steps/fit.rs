@@ -1,10 +1,10 @@
-//! Makes the threads of a BRDF, and drafts of them.
+//! Makes the threads of a BRDF, drafts of them, and the split sum.
 use crate::Result;
 use crate::brdf::Brdf;
 use crate::error::Error;
 use crate::memo::{Key, Keyed, Memo, Round, Step, Stored};
 use crate::threads::fitted::draft;
-use crate::threads::{FORMAT_VERSION, ThreadSettings, Threads, generate, read, write};
+use crate::threads::{FORMAT_VERSION, SplitSum, ThreadSettings, Threads, generate, read, write};
 
 /// Makes the threads of `brdf`. They are kept on disk as the `.threads` files that users write.
 pub struct FitThreads<'a> {
@@ -63,6 +63,22 @@ impl Step for DraftThreads<'_> {
             Threads::Fitted(before) => Ok(Threads::Fitted(draft(self.brdf, before, round.observer())?)),
             _ => Err(Error::input("threads", "of this kind are not drafted", "make them")),
         }
+    }
+}
+
+/// Fits the split sum to a BRDF.
+pub struct FitSplitSum<'a>(pub &'a Keyed<Brdf>);
+
+impl Step for FitSplitSum<'_> {
+    type Output = SplitSum;
+    const NAME: &'static str = "split sum";
+
+    fn key(&self, _: &Memo) -> Result<Key> {
+        Ok(self.0.key)
+    }
+
+    fn make(&self, _: &Round) -> Result<SplitSum> {
+        Ok(SplitSum::new(self.0))
     }
 }
 

@@ -6,6 +6,7 @@ use crate::error::Error;
 use crate::file_format::FileKind;
 use crate::memo::{Key, Keyed, Memo, Round, Step};
 use crate::scene::{MaterialSource, Mesh, Source, TexturedMesh};
+use crate::threads::SliceTable;
 use std::path::{Path, PathBuf};
 
 /// The key of what `source` names, in a file of one of the formats `files`.
@@ -167,6 +168,22 @@ impl Step for Tabulate<'_> {
 
     fn make(&self, _: &Round) -> Result<Brdf> {
         Ok(tabulate(self.0).0)
+    }
+}
+
+/// Makes the table of CDFs by which samples are drawn in proportion to a BRDF.
+pub struct TabulateSlices<'a>(pub &'a Keyed<Brdf>);
+
+impl Step for TabulateSlices<'_> {
+    type Output = SliceTable;
+    const NAME: &'static str = "CDFs of a BRDF";
+
+    fn key(&self, _: &Memo) -> Result<Key> {
+        Ok(self.0.key)
+    }
+
+    fn make(&self, _: &Round) -> Result<SliceTable> {
+        Ok(SliceTable::new(self.0))
     }
 }
 

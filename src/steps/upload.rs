@@ -1,6 +1,7 @@
 //! Uploads to the device what passes read.
 use super::compile::on;
-use super::load::{FindLobe, Tabulate};
+use super::fit::FitSplitSum;
+use super::load::{FindLobe, Tabulate, TabulateSlices};
 use crate::Result;
 use crate::brdf::Brdf;
 use crate::environment::Environment;
@@ -55,6 +56,17 @@ pub struct UploadMaterials<'a> {
     pub finest_level: Option<f32>,
 }
 
+impl UploadMaterials<'_> {
+    /// What is asked for of each material, where it is needed.
+    fn of_each<T>(
+        &self,
+        needs_it: impl Fn(&Brdf) -> bool,
+        ask: impl Fn(&Keyed<Brdf>) -> Result<Keyed<T>>,
+    ) -> Result<Vec<Option<Keyed<T>>>> {
+        self.materials.iter().map(|(brdf, _)| needs_it(brdf).then(|| ask(brdf)).transpose()).collect()
+    }
+}
+
 impl Step for UploadMaterials<'_> {
     type Output = DeviceMaterials;
     const NAME: &'static str = "upload of materials";
@@ -79,17 +91,18 @@ impl Step for UploadMaterials<'_> {
     }
 
     fn make(&self, round: &Round) -> Result<DeviceMaterials> {
-        let has_table = |brdf: &Brdf| self.evaluates_brdf && brdf.has_table();
-        let tables =
-            self.materials.iter().map(|(brdf, _)| has_table(brdf).then(|| round.ask(&Tabulate(brdf))).transpose());
-        let tables = tables.collect::<Result<Vec<_>>>()?;
+        let lookups = self.method.lookups();
+        let tables = self.of_each(|brdf| self.evaluates_brdf && brdf.has_table(), |brdf| round.ask(&Tabulate(brdf)))?;
+        let slices = self.of_each(|_| lookups.slices, |brdf| round.ask(&TabulateSlices(brdf)))?;
+        let split_sums = self.of_each(|_| lookups.split_sum, |brdf| round.ask(&FitSplitSum(brdf)))?;
         let lobes = self.materials.iter().map(|(brdf, _)| round.ask(&FindLobe(brdf))).collect::<Result<Vec<_>>>()?;
-        let found = lobes.iter().zip(&tables);
-        let materials = self.materials.iter().zip(found).map(|((brdf, threads), (lobe, table))| ShadedMaterial {
+        let materials = self.materials.iter().enumerate().map(|(i, (brdf, threads))| ShadedMaterial {
             brdf,
-            lobe,
+            lobe: &lobes[i],
             threads: threads.map(|threads| &**threads),
-            table: table.as_deref(),
+            table: tables[i].as_deref(),
+            slices: slices[i].as_deref(),
+            split_sum: split_sums[i].as_deref(),
         });
         DeviceMaterials::new(self.device, self.method, materials, self.evaluates_brdf, self.finest_level)
     }

@@ -1,5 +1,5 @@
 //! The pdf of incident directions for one view angle, equation (4), with its integral, its CDF and the CDF's inverse.
-use std::f64::consts::{FRAC_1_PI, FRAC_PI_2, PI};
+use std::f64::consts::{FRAC_1_PI, FRAC_PI_2, PI, TAU};
 
 use glam::{DVec2, DVec3, dvec3};
 
@@ -56,7 +56,7 @@ struct Cell {
 }
 
 /// The direction that the facet `h` mirrors `w_o` into.
-fn reflect(w_o: DVec3, h: DVec3) -> DVec3 {
+pub fn reflect(w_o: DVec3, h: DVec3) -> DVec3 {
     (2.0 * w_o.dot(h) * h - w_o).normalize()
 }
 
@@ -277,6 +277,12 @@ impl<'a> Slice<'a> {
 pub fn fibonacci_lattice(count: usize) -> impl Iterator<Item = DVec2> {
     const GOLDEN_RATIO_CONJUGATE: f64 = 0.618_033_988_749_894_9;
     (0..count).map(move |i| DVec2::new((i as f64 + 0.5) / count as f64, (i as f64 * GOLDEN_RATIO_CONJUGATE).fract()))
+}
+
+/// The direction at a place of the unit square, which covers the sphere evenly.
+pub fn on_sphere(uv: DVec2) -> DVec3 {
+    let z = 1.0 - 2.0 * uv.x;
+    (DVec2::from_angle(TAU * uv.y) * (1.0 - z * z).sqrt()).extend(z)
 }
 
 /// Scales a cumulative sum to end at 1; one without mass becomes uniform.

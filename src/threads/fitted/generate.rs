@@ -14,7 +14,7 @@ use crate::brdf::{Brdf, SeenBrdf, luminance};
 use crate::error::Result;
 use crate::progress::Observer;
 use crate::threads::azimuths::{View, azimuth_count};
-use crate::threads::slice::{Resolution, Slice};
+use crate::threads::slice::{Resolution, Slice, reflect};
 use crate::threads::{ThreadKind, ThreadSettings};
 
 /// Steps of the first row, which starts from cells, and of the others.
@@ -247,7 +247,7 @@ pub(super) fn carried(kernels: &[Kernel], from: View, to: View) -> Vec<Kernel> {
     let carry = |kernel: &Kernel| {
         let h = (kernel.direction + w_from).normalize();
         let h = turn.rotate(h.truncate()).extend(h.z);
-        let mirrored = (2.0 * w_to.dot(h) * h - w_to).normalize();
+        let mirrored = reflect(w_to, h);
         let width = scale_rad(kernel.level);
         // Lobes turn with the surface as a whole.
         let follows = (width < FOLLOWS_BELOW_RAD || from.phi_o != to.phi_o) && mirrored.z > -width;

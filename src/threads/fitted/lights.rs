@@ -7,7 +7,7 @@ use glam::{DVec2, DVec3, Vec3, dvec2};
 
 use super::kernel::{SHARPEST_LEVEL, kappa_of_level, vmf_direction, vmf_peak};
 use crate::brdf::luminance;
-use crate::threads::slice::{Slice, fibonacci_lattice};
+use crate::threads::slice::{Slice, fibonacci_lattice, on_sphere};
 use crate::vector_math::exp;
 
 /// Widths of the lights: so many, evenly spaced in their logarithm from a third of a degree, a pixel of a map of 1024 columns, to
@@ -85,11 +85,7 @@ impl TestLights {
             let shift = |x: f64, by: usize| (x + 0.381_966 * by as f64).fract();
             let turn = scale + SCALES * seed;
             let near = |uv: DVec2| lobes.direction(dvec2(shift(uv.x, 3 * turn + 1), shift(uv.y, turn)));
-            let anywhere = |uv: DVec2| {
-                let z = 1.0 - 2.0 * shift(uv.x, 3 * turn + 2);
-                let sin = (1.0 - z * z).sqrt();
-                (DVec2::from_angle(TAU * shift(uv.y, turn)) * sin).extend(z)
-            };
+            let anywhere = |uv: DVec2| on_sphere(dvec2(shift(uv.x, 3 * turn + 2), shift(uv.y, turn)));
             directions.extend(fibonacci_lattice(per_scale).map(near));
             directions.extend(fibonacci_lattice(per_scale).map(anywhere));
         }

@@ -19,8 +19,18 @@ pub struct Effort {
     pub least_gain: f64,
 }
 
+/// The damping of the first step of a row, and by how much it changes where a step is good and where it is not: the usual ones. Beyond the most
+/// steps are so short that none is good.
+const FIRST_DAMPING: f32 = 1e-3;
+const DAMPING_FALLS: f32 = 0.2;
+const DAMPING_RISES: f32 = 5.0;
+const MOST_DAMPING: f32 = 1e6;
 /// Less would be lost in the rounding of the products.
 const LEAST_DAMPING: f32 = 1e-6;
+
+/// Of the largest element of the diagonal, added to those of weights: there Cholesky's factor exists even if a kernel answers as the cosine
+/// does, so that its own element is 0. Elsewhere it is less than rounding.
+const LEAST_DIAGONAL: f32 = 1e-12;
 
 /// Steps to the best weights: the first is exact but for weights that would be negative and for what rounding makes of kernels that are alike.
 const WEIGHT_STEPS: usize = 4;
@@ -219,7 +229,7 @@ impl<'a> Fit<'a> {
             let is_frozen = |k: usize| kernels[k].weight[c] <= 0.0 && gradient(k) > 0.0;
             let matrix = Mat::from_fn(m, m, |k, l| match k == l {
                 true if is_frozen(k) => 1.0,
-                true => (1.0 + damping) * self.coupling(k, l) * products[(k, l)] + 1e-12 * largest,
+                true => (1.0 + damping) * self.coupling(k, l) * products[(k, l)] + LEAST_DIAGONAL * largest,
                 false if k < l || is_frozen(k) || is_frozen(l) => 0.0,
                 false => self.coupling(k, l) * products[(k, l)],
             });
@@ -276,7 +286,7 @@ impl<'a> Fit<'a> {
     /// # Errors
     /// Cancelled by `observer` (noticed within a step: a tenth of a second for the most threads that there can be).
     pub fn solve(&self, kernels: &mut Vec<Kernel>, effort: Effort, observer: &dyn Observer) -> Result<()> {
-        let mut damping = 1e-3;
+        let mut damping = FIRST_DAMPING;
         let mut tried = 0;
         let mut answers = Answers::new(kernels, self.lights);
         let mut rest = self.rest(kernels, &answers);
@@ -293,11 +303,11 @@ impl<'a> Fit<'a> {
                 let next_rest = self.rest(&next, &next_answers);
                 if next_rest.cost < rest.cost {
                     (*kernels, answers, rest) = (next, next_answers, next_rest);
-                    damping = (damping * 0.2).max(LEAST_DAMPING);
+                    damping = (DAMPING_FALLS * damping).max(LEAST_DAMPING);
                     break;
                 }
-                damping *= 5.0;
-                if tried >= effort.steps || damping > 1e6 {
+                damping *= DAMPING_RISES;
+                if tried >= effort.steps || damping > MOST_DAMPING {
                     return Ok(());
                 }
             }
@@ -403,7 +413,8 @@ fn step(kernels: &[Kernel], levels: &[[f64; 2]], hessian: &Mat<f32>, gradient: &
         1e-10 * largest / (scale_rad(kernels[k].level) as f32).powi(2)
     };
     for i in 0..6 * m {
-        matrix[(i, i)] += damping * hessian[(i, i)] + if i < 3 * m { 1e-12 * largest } else { floor((i - 3 * m) / 3) };
+        matrix[(i, i)] +=
+            damping * hessian[(i, i)] + if i < 3 * m { LEAST_DIAGONAL * largest } else { floor((i - 3 * m) / 3) };
         if frozen(i) {
             (0..i).for_each(|j| matrix[(i, j)] = 0.0);
             matrix.col_as_slice_mut(i)[i..].fill(0.0);
