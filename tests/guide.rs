@@ -91,6 +91,20 @@ fn equation(word: &str) -> Option<usize> {
     word.strip_prefix("(F")?.strip_suffix(')')?.parse().ok()
 }
 
+/// The numbers of the equations of the chapter on the method, in its order: each is at the end of a line of a block.
+fn equations_of(chapter: &str) -> Vec<usize> {
+    let mut in_block = false;
+    let mut numbers = Vec::new();
+    for line in chapter.lines() {
+        if line.trim_start().starts_with("```") {
+            in_block = !in_block;
+        } else if in_block {
+            numbers.extend(line.split_whitespace().next_back().and_then(equation));
+        }
+    }
+    numbers
+}
+
 /// The numbers of equations that a text cites in brackets.
 fn cited_equations(text: &str) -> impl Iterator<Item = usize> {
     text.split(['(', ')']).filter_map(|part| equation(&format!("({part})")))
@@ -113,8 +127,7 @@ fn files_below(folder: &Path, extensions: &[&str]) -> Vec<PathBuf> {
 #[test]
 fn files_that_cite_an_equation_are_named_by_the_chapter_that_has_it() {
     let chapter = fs::read_to_string(root().join("src/guide/method.md")).expect("the chapter");
-    let in_chapter: Vec<_> =
-        chapter.lines().filter_map(|line| equation(line.split_whitespace().next_back()?)).collect();
+    let in_chapter = equations_of(&chapter);
     let sources =
         ["src", "glsl"].map(|folder| files_below(&root().join(folder), &["rs", "glsl", "comp", "frag", "vert"]));
     let mut citations = 0;
@@ -133,15 +146,7 @@ fn files_that_cite_an_equation_are_named_by_the_chapter_that_has_it() {
 #[test]
 fn equations_are_numbered_in_order() {
     let text = fs::read_to_string(root().join("src/guide/method.md")).expect("the chapter");
-    let mut in_block = false;
-    let mut numbers = Vec::new();
-    for line in text.lines() {
-        if line.trim_start().starts_with("```") {
-            in_block = !in_block;
-        } else if in_block {
-            numbers.extend(line.split_whitespace().next_back().and_then(equation));
-        }
-    }
+    let numbers = equations_of(&text);
     assert!(numbers.len() > 20 && numbers.iter().copied().eq(1..=numbers.len()), "{numbers:?}");
     assert!(cited_equations(&text).all(|cited| (1..=numbers.len()).contains(&cited)));
 }

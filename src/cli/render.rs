@@ -105,7 +105,8 @@ impl Render {
         }
         output::check_all_writable(self.output.iter().chain(&self.stats))?;
         let scene = self.scene.scene()?;
-        let is_reference = scene.shading.method == Method::Reference.name();
+        let method = Method::from_name(&scene.shading.method)?;
+        let is_reference = method == Method::Reference;
         let useless = [
             ("--tolerance", self.tolerance.is_some() && !is_reference),
             ("--reference-on", self.reference_on.is_some() && !is_reference),
@@ -113,7 +114,7 @@ impl Render {
             ("--error", self.error.is_some() && is_reference),
         ];
         if let Some((flag, _)) = useless.into_iter().find(|(_, useless)| *useless) {
-            let problem = format!("is of no use to method \"{}\"", scene.shading.method);
+            let problem = format!("is of no use to method \"{}\"", method.name());
             return Err(Error::input(flag, problem, "leave it out, or choose another --method"));
         }
         // A script may go through all methods with these.
@@ -121,10 +122,10 @@ impl Render {
             ("--threads", self.scene.threads.is_some() && is_reference),
             ("--seed", self.scene.seed.is_some() && is_reference),
             ("--repeat", self.repeat > 1 && is_reference),
-            ("--pattern", self.scene.pattern.is_some() && !Method::from_name(&scene.shading.method)?.has_pattern()),
+            ("--pattern", self.scene.pattern.is_some() && !method.has_pattern()),
         ];
         for (flag, _) in ignored.into_iter().filter(|(_, is_ignored)| *is_ignored) {
-            tracing::warn!("{flag} is ignored: method \"{}\" knows nothing of it", scene.shading.method);
+            tracing::warn!("{flag} is ignored: method \"{}\" knows nothing of it", method.name());
         }
         Ok(scene)
     }

@@ -173,10 +173,8 @@ impl<'a> CpuShader<'a> {
             Lookups { map: true, .. } => Some(LightMap::new(environment)),
             _ => None,
         };
-        let slices = lookups
-            .slices
-            .then(|| materials.iter().map(|material| round.ask(&TabulateSlices(&material.brdf))).collect())
-            .transpose()?;
+        let where_needed = |needs_it: bool| materials.iter().filter(move |_| needs_it);
+        let slices = where_needed(lookups.slices).map(|material| round.ask(&TabulateSlices(&material.brdf)));
         let table = |material: &PreparedMaterial| match evaluates_brdf && material.brdf.has_table() {
             false => Ok(None),
             true => Ok(Some((*round.ask(&Tabulate(&material.brdf))?).clone())),
@@ -185,17 +183,14 @@ impl<'a> CpuShader<'a> {
             shared_deviation: material.shared_deviation() as f32,
             ..MaterialRecord::new(&material.brdf, &material.lobe)
         };
-        let split_sums = lookups
-            .split_sum
-            .then(|| materials.iter().map(|material| round.ask(&FitSplitSum(&material.brdf))).collect())
-            .transpose()?;
+        let split_sums = where_needed(lookups.split_sum).map(|material| round.ask(&FitSplitSum(&material.brdf)));
         Ok(Self {
             prepared,
             light,
             aliases: map.as_ref().filter(|_| lookups.aliases).map(LightMap::aliases).unwrap_or_default(),
             map,
-            slices: slices.unwrap_or_default(),
-            split_sums: split_sums.unwrap_or_default(),
+            slices: slices.collect::<Result<_>>()?,
+            split_sums: split_sums.collect::<Result<_>>()?,
             records: materials.iter().map(record).collect(),
             tables: materials.iter().map(table).collect::<Result<_>>()?,
             sources: environment.small_sources().records(1.0),

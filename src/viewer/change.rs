@@ -160,6 +160,11 @@ impl Change {
     }
 }
 
+/// The largest number of threads or samples that `method` can have in `scene`.
+pub fn most_count(method: Method, scene: &Scene) -> u32 {
+    method.max_count(scene.image.subpixels).min(MAX_SAMPLES)
+}
+
 /// `value` if it is in `range`: no range holds NaN.
 fn within<T: PartialOrd + Debug + Copy>(name: &str, value: T, range: &RangeInclusive<T>) -> Result<T> {
     if range.contains(&value) {

@@ -1,5 +1,5 @@
 //! The viewer: what inputs do to the session. What follows is in `making.rs` and `drawing.rs`. Knows nothing of the window system.
-use super::change::Change;
+use super::change::{Change, most_count};
 use super::comparer::Comparer;
 use super::comparison::Wipe;
 use super::dynamic_resolution::DynamicResolution;
@@ -16,7 +16,7 @@ use crate::method::Method;
 use crate::passes::Area;
 use crate::pipeline::DeviceScene;
 use crate::prepare::{Prepared, view_of};
-use crate::scene::{Background, MAX_SAMPLES, Scene};
+use crate::scene::{Background, Scene};
 use crate::vulkan::Device;
 use crate::{Error, Result};
 use glam::DVec2;
@@ -231,7 +231,7 @@ impl Viewer {
                 let method = Method::from_name(&shading.method)?;
                 let count = shading.threads.unwrap_or(method.default_count());
                 let count = if key == "[" { count / 2 } else { count.saturating_mul(2) };
-                let count = count.clamp(1, method.max_count(image.subpixels).min(MAX_SAMPLES));
+                let count = count.clamp(1, most_count(method, self.session.wanted()));
                 self.change(&Change::Threads(Some(count)))
             }
             "escape" => {

@@ -49,10 +49,8 @@ impl Session {
         change.apply(&mut self.wanted)?;
         if !change.is_seen_at_once() {
             // Of a slider that is dragged only the last value counts.
-            if self
-                .pending
-                .last()
-                .is_some_and(|(_, last)| matches!(last, Edit::Change(last) if last.is_undone_by(change)))
+            if let Some((_, Edit::Change(last))) = self.pending.last()
+                && last.is_undone_by(change)
             {
                 self.pending.pop();
             }
@@ -69,12 +67,13 @@ impl Session {
         self.show(self.shown.clone());
     }
 
-    /// All that `scene` needs is there, which has all changes up to this number: it is shown, in the way that is wanted by now.
+    /// All that `scene` needs is there, which has all changes up to this number: it is shown.
     pub fn loaded(&mut self, scene: Scene, number: u64) {
         self.pending.retain(|(pending, _)| *pending > number);
         self.show(scene);
     }
 
+    /// Shows `scene`, in the way that is wanted by now.
     fn show(&mut self, scene: Scene) {
         let Scene { image, camera, environment, .. } = &self.wanted;
         // Sub-pixels and background are compiled and uploaded.

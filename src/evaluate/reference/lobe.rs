@@ -70,12 +70,15 @@ impl SeenLobe<'_> {
         let holds_it = middle.z + NEARLY * up_spread > 0.0
             && sum.dot(across).abs() < NEARLY * across_spread
             && nearest <= most_slope * highest;
+        if !holds_it {
+            return false;
+        }
         // Reflection doubles angles, but across the plane of incidence shrinks them by the cosine. Beyond its bound cells are small enough to
         // find part of a lobe, and what is found is split like all else.
         let cos_theta_d = (0.5 * sum.length()).max(MIN_COS_THETA_D);
         // Tails of an anisotropic lobe widen as they fall: GGX's are as wide as contours of 1 + (h_x / alpha_x)^2 + (h_y / alpha_y)^2.
         let radius = self.radius.max(narrowness * nearest / highest);
         let widest = if most_slope > 0.0 { across_spread } else { across_spread.max(along_spread) };
-        holds_it && widest > radius * cos_theta_d
+        widest > radius * cos_theta_d
     }
 }

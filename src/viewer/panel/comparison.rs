@@ -3,7 +3,8 @@ use super::group;
 use super::shading::what_is_counted;
 use crate::method::Method;
 use crate::passes::Area;
-use crate::scene::{MAX_SAMPLES, Scene, ShadingSettings};
+use crate::scene::{Scene, ShadingSettings};
+use crate::viewer::change::most_count;
 use crate::viewer::comparison::{Compared, Other, Wipe};
 use crate::viewer::input::Input;
 use crate::viewer::interaction::Viewer;
@@ -128,7 +129,7 @@ fn choose(ui: &mut Ui, other: Option<&Other>, scene: &Scene, inputs: &mut Vec<In
     if let Some(Other::Shading(shading)) = other
         && let Ok(method) = Method::from_name(&shading.method)
     {
-        let most = method.max_count(scene.image.subpixels).min(MAX_SAMPLES);
+        let most = most_count(method, scene);
         let mut count = shading.threads.unwrap_or(method.default_count());
         if most == 1 {
             return;

@@ -1,8 +1,8 @@
 //! Which method, how many threads, how many sub-pixels.
 use super::{group, on_change};
 use crate::method::Method;
-use crate::scene::{MAX_SAMPLES, MAX_SUBPIXELS, Pattern};
-use crate::viewer::change::Change;
+use crate::scene::{MAX_SUBPIXELS, Pattern};
+use crate::viewer::change::{Change, most_count};
 use crate::viewer::input::Input;
 use crate::viewer::interaction::Viewer;
 use egui::Ui;
@@ -52,7 +52,7 @@ pub fn show(ui: &mut Ui, viewer: &Viewer, inputs: &mut Vec<Input>) {
             }
             None => "Samples of the Monte Carlo estimate for each pixel.",
         };
-        let most = method.max_count(scene.image.subpixels).min(MAX_SAMPLES);
+        let most = most_count(method, scene);
         let mut count = scene.shading.threads.unwrap_or(method.default_count());
         // The split sum has no choice.
         if most > 1 {
