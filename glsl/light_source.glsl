@@ -10,5 +10,5 @@ struct Source {
 // Uniform, which some drivers read faster than storage. Depth first; the number: twice MAX_SOURCES.
 layout(set = 0, binding = 14, std140) uniform Sources {
     uint source_count;
-    Source sources[64];
+    Source sources[96];
 };

@@ -20,6 +20,7 @@ struct Material {
     ThreadTable threads;          // of a pixel whose sub-pixels share one sum
     ThreadTable subpixel_threads; // of each sub-pixel of another pixel
     float shared_deviation; // of normals, up to which sub-pixels share one sum where the view is along them: src/threads/fitted/sets.rs
+    float flank;       // flank_rad in src/brdf/lobe.rs
 };
 
 layout(set = 0, binding = 5, std430) readonly buffer Materials {

@@ -5,13 +5,16 @@ use common::{EVERYTHING, Validated, analytic_materials, model, pixels, ready, sp
 use glam::{DVec3, UVec2, Vec3, Vec4};
 use rayon::prelude::*;
 use threadlight::low_level::brdf::{Brdf, Custom, CustomBrdf};
+use threadlight::low_level::evaluate::reference::{ReferenceSettings, reference};
 use threadlight::low_level::evaluate::{Comparable, Display, compare};
 use threadlight::low_level::geometry_texel::GeometryTexel;
 use threadlight::low_level::memo::{Key, Keyed, Memo};
 use threadlight::low_level::passes::Counters;
 use threadlight::low_level::pipeline::Rendering;
 use threadlight::low_level::prepare::Prepared;
-use threadlight::low_level::scene::{Camera, MaterialSettings, MaterialSource, ObjectSettings, Scene, Source};
+use threadlight::low_level::scene::{
+    Background, Camera, MaterialSettings, MaterialSource, ObjectSettings, Scene, Source,
+};
 use threadlight::low_level::shading;
 use threadlight::low_level::steps::LoadMaterial;
 use threadlight::low_level::threads::SplitSum;
@@ -74,7 +77,12 @@ fn the_shader_agrees_with_its_cpu_twin() {
     // Small, as a pyramid of kernels is made from it for each material.
     let write = |name: &str, lamp: [f32; 4]| {
         let path = folder.path().join(name);
-        let texel = |i: usize| if i == 64 * 9 + 20 { lamp } else { [(i % 7) as f32, (i / 64) as f32 / 8.0, 0.5, 1.0] };
+        // Of two pixels, so that it has parts.
+        let texel = |i: usize| match i.checked_sub(64 * 9 + 20) {
+            Some(0) => lamp,
+            Some(1) => lamp.map(|channel| 0.5 * channel + 0.5),
+            _ => [(i % 7) as f32, (i / 64) as f32 / 8.0, 0.5, 1.0],
+        };
         let texels: Vec<_> = (0..64 * 32).map(texel).collect();
         threadlight::low_level::output::write_exr(&path, 64, 32, &texels, false, &Default::default()).unwrap();
         Source::File(path)
@@ -352,6 +360,39 @@ fn a_wide_lobe_has_one_sum_where_a_surface_is_too_curved_for_that_of_a_narrow_on
     // A sun may be above the horizon of one sub-pixel and below that of another.
     let [(_, narrow_interior), (_, wide_interior)] = of_both("sun");
     assert_eq!(wide_interior, narrow_interior);
+    gpu.finish();
+}
+
+#[test]
+fn a_narrow_lobe_shows_a_lamp_with_dim_edges_as_the_reference_does() {
+    let gpu = Validated::new();
+    let folder = tempfile::tempdir().unwrap();
+    let map = folder.path().join("lamp.exr");
+    // Both white on a display, one a hundred times as bright as the other. Without parts that follow that, a dark ring of 0.5 is around it.
+    let texel = |(x, y): (i32, i32)| match f64::from((x - 150).pow(2) + (y - 50).pow(2)).sqrt() {
+        0.0..5.0 => [3000.0, 3000.0, 3000.0, 1.0],
+        5.0..10.0 => [20.0, 40.0, 60.0, 1.0],
+        _ => [0.05, 0.05, 0.05, 1.0],
+    };
+    let texels: Vec<_> = (0..128).flat_map(|y| (0..256).map(move |x| texel((x, y)))).collect();
+    threadlight::low_level::output::write_exr(&map, 256, 128, &texels, false, &Default::default()).unwrap();
+    for (name, parameters, most) in [
+        ("Beckmann", "model = 'conductor'\ndistribution = 'beckmann'\nalpha = 0.02\nmetal = 'Cr'", 0.01),
+        ("Torrance-Sparrow", "model = 'torrance_sparrow'\ndiffuse = 0\nspread_deg = 3\nmetal = 'Au'", 0.007),
+    ] {
+        let mut scene = sphere(model(parameters), "white", 16, (80, 60));
+        scene.environment.source = Source::File(map.clone());
+        scene.image.background = Background::None;
+        let prepared = ready(&scene);
+        let rendering = gpu.render(&prepared, EVERYTHING);
+        let settings = ReferenceSettings { tolerance: 1e-3, ..Default::default() };
+        let truth = reference(&prepared, &gpu.device, &settings, &gpu.round()).unwrap();
+        let [found, expected] = [&rendering.radiance, &truth.radiance]
+            .map(|radiance| Comparable::from_radiance(80, 60, radiance, true, Display::default()));
+        let rms = compare(&found, &expected, true).unwrap().rms;
+        println!("{name}: RMS {rms:.4}");
+        assert!(rms < most, "{name}: {rms}");
+    }
     gpu.finish();
 }
 

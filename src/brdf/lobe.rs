@@ -51,6 +51,9 @@ pub struct LobeShape {
     pub narrowness: f64,
     /// The direction of the long axis in the tangent plane, a unit vector. Any for an isotropic BRDF.
     pub long_axis: DVec2,
+    /// The angle of the half vector to the normal, in radians, at which a Gaussian that falls to a thousandth where f does has fallen by e.
+    /// Across the long axis. 0 if flanks are not as steep as a Gaussian's, or wider than 0.1.
+    pub flank_rad: f64,
 }
 
 impl LobeShape {
@@ -60,8 +63,27 @@ impl LobeShape {
         let width = |azimuth| first_angle(|angle| is_off_peak(brdf, azimuth, angle));
         let width_rad = azimuths(is_isotropic).map(width).fold(FRAC_PI_2, f64::min);
         let (narrowness, long_axis) = if is_isotropic { (1.0, DVec2::X) } else { lobe_axes(brdf) };
-        Self { is_isotropic, width_rad, narrowness, long_axis }
+        let flank_rad = flank(brdf, long_axis.perp(), width_rad);
+        Self { is_isotropic, width_rad, narrowness, long_axis, flank_rad }
     }
+}
+
+/// Flanks end where f has fallen to this part of its peak.
+const FOOT: f64 = 1e-3;
+
+/// They are steep if they end within so many widths of the lobe. A Gaussian's do within 4.9, GGX's within 14.
+const STEEP_WITHIN: f64 = 8.0;
+
+/// Wider ones are slight slopes to any part of a lamp: these are no wider than `WIDEST_WHOLE_RAD` in glsl/methods/fitted.glsl.
+const WIDEST_FLANK_RAD: f64 = 0.1;
+
+/// [`LobeShape::flank_rad`] of a lobe of this width, towards `azimuth`.
+fn flank(brdf: &Brdf, azimuth: DVec2, width_rad: f64) -> f64 {
+    let peak = profile(brdf, 0.0, azimuth, 0.0);
+    let foot = first_angle(|angle| profile(brdf, 0.0, azimuth, angle) < FOOT * peak);
+    // e^-(foot/flank)^2 = FOOT
+    let flank = foot / (-FOOT.ln()).sqrt();
+    if foot < STEEP_WITHIN * width_rad && flank < WIDEST_FLANK_RAD { flank } else { 0.0 }
 }
 
 /// Narrowness and long axis of an anisotropic lobe: exact for an ellipse, 1 / width^2 = A + B cos(2 (azimuth - that of the narrow axis)).
@@ -129,6 +151,18 @@ mod tests {
             for width in [half_vector_width(&brdf), lobe_radius(&brdf, 0.0), lobe_radius(&brdf, 1.5)] {
                 assert!((0.3..1.0).contains(&(width / alpha)), "{distribution} {alpha}: {width}");
             }
+        }
+        // A Gaussian of slopes falls by e at its roughness; GGX has no such flanks, and beside scattered light no lobe has.
+        for (parameters, expected) in [
+            ("distribution = 'beckmann'\nalpha = 0.02\neta = 0.2\nk = 3.9", 0.02),
+            ("distribution = 'beckmann'\nalpha_x = 0.3\nalpha_y = 0.01\neta = 0.2\nk = 3.9", 0.01),
+            ("distribution = 'beckmann'\nalpha = 0.2\neta = 0.2\nk = 3.9", 0.0),
+            ("distribution = 'ggx'\nalpha = 0.02\neta = 0.2\nk = 3.9", 0.0),
+        ] {
+            let flank =
+                LobeShape::of(&Brdf::from_parameters("conductor", parameters.parse().unwrap()).unwrap()).flank_rad;
+            // One step of the angles that are tried.
+            assert!((expected..=1.26 * expected).contains(&flank), "{parameters}: {flank}");
         }
         // A lobe is found however much light is scattered beside it.
         let parameters = "distribution = 'ggx'\nalpha = 0.05\nior = 1.5\ndiffuse = 0.9";

@@ -46,8 +46,8 @@ pub struct MaterialRecord {
     pub subpixel_threads: ThreadTableRecord,
     /// Deviation of normals up to which sub-pixels share one sum, seen along them, in radians.
     pub shared_deviation: f32,
-    /// The size of a structure in the buffer is a multiple of 16 bytes.
-    pub padding: u32,
+    /// [`LobeShape::flank_rad`].
+    pub flank: f32,
 }
 
 impl MaterialRecord {
@@ -63,7 +63,7 @@ impl MaterialRecord {
             threads: ThreadTableRecord::NONE,
             subpixel_threads: ThreadTableRecord::NONE,
             shared_deviation: 0.0,
-            padding: 0,
+            flank: lobe.flank_rad as f32,
         }
     }
 

@@ -4,13 +4,13 @@
 //! and shaded by the BRDF itself.
 use std::ops::Range;
 
-use glam::{DMat2, DVec2, DVec3, Vec4, dvec2};
+use glam::{DMat2, DVec2, DVec3, Vec4, dvec2, dvec3};
 
 use super::Environment;
 use crate::brdf::luminance;
 
 /// Most sources of an environment, and most bright regions that it has them of.
-pub const MAX_SOURCES: usize = 32;
+pub const MAX_SOURCES: usize = 48;
 const MAX_REGIONS: usize = 12;
 
 /// Pixels so many times brighter than the mean of all that are not are of a source.
@@ -93,15 +93,15 @@ impl SmallSources {
         found.retain(|part| luminance(part.source.power) >= LEAST_SHARE * total);
         found.sort_by(by_power);
         found.truncate(MAX_REGIONS);
-        // The one whose extent matters most goes first.
-        let extent = |part: &Part| luminance(part.source.power) * part.source.width_rad().powi(2);
+        // The one whose shape matters most goes first.
+        let spread = |part: &Part| spread(luminance(part.source.power), part.source.width_rad().powi(2));
         let is_wide = |part: &Part| part.source.width_rad() > WIDEST_RAD && part.pixels.len() > 1;
         let lamp_count = found.len();
         let mut halves: Vec<Range<usize>> = vec![0..0; lamp_count];
         let mut leaf_count = lamp_count;
         while leaf_count < MAX_SOURCES {
             let wide = (0..found.len()).filter(|&i| halves[i].is_empty() && is_wide(&found[i]));
-            let Some(widest) = wide.max_by(|&a, &b| extent(&found[a]).total_cmp(&extent(&found[b]))) else { break };
+            let Some(widest) = wide.max_by(|&a, &b| spread(&found[a]).total_cmp(&spread(&found[b]))) else { break };
             let first = found.len();
             found.extend(found[widest].halves(environment));
             halves[widest] = first..found.len();
@@ -222,13 +222,39 @@ impl Part {
         Some(Self { source: LightSource { direction: centre, axes, power }, pixels })
     }
 
-    /// Both sides of the middle of its longer axis.
+    /// Both sides of the cut across its longer axis that leaves the least spread.
     fn halves(&self, environment: &Environment) -> Vec<Self> {
         let LightSource { direction: centre, axes: [longer, _], .. } = self.source;
-        let beyond = |&pixel: &usize| (light(environment, pixel).0 - centre).dot(longer) > 0.0;
-        let (one, other): (Vec<_>, Vec<_>) = self.pixels.iter().partition(|pixel| beyond(pixel));
-        [one, other].into_iter().filter_map(|pixels| Self::new(environment, pixels)).collect()
+        let pixel = |&pixel: &usize| {
+            let (direction, power) = light(environment, pixel);
+            ((direction - centre).dot(longer), luminance(power), pixel)
+        };
+        let mut along: Vec<_> = self.pixels.iter().map(pixel).collect();
+        along.sort_by(|(a, ..), (b, ..)| a.total_cmp(b));
+        // Power and its moments along the axis, up to each pixel.
+        let moments = along.iter().scan(DVec3::ZERO, |sum, &(place, power, _)| {
+            *sum += power * dvec3(1.0, place, place * place);
+            Some(*sum)
+        });
+        let moments: Vec<_> = moments.collect();
+        let all = moments[moments.len() - 1];
+        let side = |moments: DVec3| {
+            let [power, first, second] = moments.to_array();
+            // Beside the brightest pixels the rest may be lost in rounding.
+            if power > 0.0 { spread(power, (second / power - (first / power).powi(2)).max(0.0)) } else { 0.0 }
+        };
+        let spreads = moments[..moments.len() - 1].iter().map(|&one| side(one) + side(all - one));
+        let cut = spreads.enumerate().min_by(|(_, a), (_, b)| a.total_cmp(b)).map_or(0, |(last, _)| last + 1);
+        let (one, other) = along.split_at(cut);
+        let part = |side: &[(f64, f64, usize)]| Self::new(environment, side.iter().map(|&(.., pixel)| pixel).collect());
+        [one, other].into_iter().filter_map(part).collect()
     }
+}
+
+/// How much is lost where light of this power and variance counts as one source. Not in proportion to its power: beside a narrow lobe dim edges
+/// of a lamp are as bright on a display as its core, which is cut off at white.
+fn spread(power: f64, variance: f64) -> f64 {
+    power.sqrt() * variance
 }
 
 /// Direction and power of a pixel.
@@ -268,11 +294,34 @@ mod tests {
     }
 
     #[test]
+    fn a_lamp_is_divided_where_the_halves_have_the_least_spread() {
+        // Along the horizon, brightest at its left end: the middle of its light is not the best cut.
+        let radiance = |x: usize| if x < 63 { 3e4 } else { 3e3 / (x - 60) as f32 };
+        let map = environment(256, 128, |x, y| [if y == 64 && (60..76).contains(&x) { radiance(x) } else { 0.1 }; 3]);
+        let SmallSources { nodes, .. } = SmallSources::of(&map);
+        let power = |columns: Range<usize>| columns.map(|x| f64::from(radiance(x))).sum::<f64>();
+        let spread_of = |columns: Range<usize>| {
+            let mean = |of: &dyn Fn(f64) -> f64| {
+                columns.clone().map(|x| f64::from(radiance(x)) * of(x as f64)).sum::<f64>() / power(columns.clone())
+            };
+            let middle = mean(&|x| x);
+            spread(power(columns.clone()), mean(&|x| (x - middle).powi(2)))
+        };
+        let spread_at = |cut: usize| spread_of(60..cut) + spread_of(cut..76);
+        let best = (61..76).min_by(|&a, &b| spread_at(a).total_cmp(&spread_at(b))).unwrap();
+        let halves = [1, 1 + nodes[1].size].map(|node| nodes[node].source.power.x / map.weight_solid_angle(64));
+        for expected in [power(60..best), power(best..76)] {
+            assert!(halves.iter().any(|half| (half / expected - 1.0).abs() < 1e-6), "{halves:?}, not {expected}");
+        }
+        assert!(spread_at(best) < 0.9 * spread_at(62), "the middle of the light would do as well");
+    }
+
+    #[test]
     fn soft_light_has_no_sources_and_a_bright_strip_has_several() {
         assert!(SmallSources::of(&environment(64, 32, |x, y| [(x % 5 + y % 7) as f32; 3])).nodes.is_empty());
         assert!(SmallSources::of(&environment(8, 4, |_, _| [0.0; 3])).nodes.is_empty());
         // More pixels than there may be sources: some are of two, side by side along the horizon.
-        let strip = environment(256, 128, |x, y| [if y == 64 && (100..140).contains(&x) { 5e3 } else { 0.1 }; 3]);
+        let strip = environment(256, 128, |x, y| [if y == 64 && (100..160).contains(&x) { 5e3 } else { 0.1 }; 3]);
         let sources = SmallSources::of(&strip);
         let found: Vec<_> = sources.leaves().collect();
         assert_eq!((sources.nodes.len(), found.len()), (2 * MAX_SOURCES - 1, MAX_SOURCES));
@@ -290,6 +339,6 @@ mod tests {
         }
         assert!(found.iter().any(|source| source.width_rad() > 1.1 * pixel));
         let power: f64 = found.iter().map(|source| source.power.x).sum();
-        assert!((power / (40.0 * 5e3 * strip.weight_solid_angle(64)) - 1.0).abs() < 1e-9);
+        assert!((power / (60.0 * 5e3 * strip.weight_solid_angle(64)) - 1.0).abs() < 1e-9);
     }
 }

@@ -61,6 +61,8 @@ const FAR: f32 = 4.0;
 const VERY_FAR: f32 = 40.0;
 const OPENED_WITHIN: f32 = 12.0;
 const WIDTHS_ON_THE_WAY: f32 = 4.2;
+const STEEP: f32 = 1.4;
+const END: f32 = 8.0;
 const WIDEST_WHOLE_RAD: f32 = 0.1;
 const LOW_COSINE: f32 = 0.3;
 const LOW_DEVIATIONS: f32 = 20.0;
@@ -71,6 +73,7 @@ struct Lobe<'a> {
     w_o: Vec3,
     mirror: Vec3,
     width: f32,
+    flank: f32,
 }
 
 impl<'a> Lobe<'a> {
@@ -78,7 +81,8 @@ impl<'a> Lobe<'a> {
     fn of(point: &'a Point) -> Self {
         let w_o = point.surface.view_direction();
         let mirror = point.surface.frame * Vec3::new(-w_o.x, -w_o.y, w_o.z);
-        Self { point, w_o, mirror, width: point.record().lobe_width * w_o.z.max(MIN_COS_THETA_D as f32) }
+        let (record, narrower) = (point.record(), w_o.z.max(MIN_COS_THETA_D as f32));
+        Self { point, w_o, mirror, width: narrower * record.lobe_width, flank: narrower * record.flank }
     }
 
     /// Twin of `away_from`.
@@ -105,7 +109,8 @@ impl<'a> Lobe<'a> {
         let width = source.direction.w;
         let away = self.away(source.direction.truncate());
         let is_near = away + WIDTHS_ON_THE_WAY * self.width < OPENED_WITHIN * width;
-        width > least_width && (is_near || width > WIDEST_WHOLE_RAD)
+        let is_on_flank = away * width > STEEP * self.flank * self.flank && away < END * self.flank;
+        width > least_width && (is_near || is_on_flank || width > WIDEST_WHOLE_RAD)
     }
 
     /// Twin of `descend`.
