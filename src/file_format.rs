@@ -75,6 +75,14 @@ impl<T> FileKind<T> {
         })
     }
 
+    /// Whether the file at `path` is of one of the formats, by its extension and its bytes.
+    ///
+    /// # Errors
+    /// What [`read`] says.
+    pub fn knows(&self, path: &Path) -> Result<bool> {
+        self.format_of(path).map_or(Ok(false), |format| Ok((format.is_of_format)(&read(path)?)))
+    }
+
     /// `a Radiance .hdr or an OpenEXR .exr`.
     pub fn names(&self) -> String {
         alternatives(self.formats.iter().map(|format| format.name.to_owned()))

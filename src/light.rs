@@ -1,6 +1,6 @@
 //! What shading looks up of an environment, in memory: its filtered forms, and which of them the kernels of threads need.
 use crate::brdf::{LobeShape, MIN_COS_THETA_D};
-use crate::environment::sources::{CLEAR, clearance};
+use crate::environment::sources::{clear_of, clearance};
 use crate::environment::{Environment, Pyramid, VmfPyramid};
 use crate::memo::Keyed;
 use crate::threads::fitted::kernel::FINEST_WIDTH_RAD;
@@ -116,7 +116,8 @@ impl KernelNeeds {
         let sources = environment.small_sources();
         let mirrors = |lobe: &LobeShape| {
             let lobe_width = (MIN_COS_THETA_D * lobe.width_rad) as f32;
-            sources.leaves().any(|source| clearance(0.0, source.width_rad() as f32, lobe_width) < CLEAR[1])
+            let clear = clear_of(lobe.flank_rad as f32)[1];
+            sources.leaves().any(|source| clearance(0.0, source.width_rad() as f32, lobe_width) < clear)
         };
         let is_sharp = |threads: Option<&Threads>| {
             let mut tables = threads.and_then(Threads::fitted).into_iter().flat_map(FittedTable::tables);

@@ -39,12 +39,12 @@ float away_from(Lobe lobe, Surface surface, Material material, vec3 direction) {
 
 // How far a source is from where the BRDF cannot be taken at a few points of it, because it is mirrored towards the eye and wider than
 // the lobe; in units of two standard deviations of the source (F28). Within a half vector of lobe_width f loses a quarter, as a Gaussian does
-// at 0.76 of its width; reflection doubles that. Twin: src/environment/sources.rs, with CLEAR for the bounds of its use below.
+// at 0.76 of its width; reflection doubles that. Twin: src/environment/sources.rs.
 float clearance(float away, float source_width, float lobe_width) {
     return (away + 4.0 * 2.6 * lobe_width) / (2.0 * source_width);
 }
 
-// Above this clearance 2 x 2 points of a source do. It is above the bounds of share_of_brdf, for which all above them is alike.
+// Above this clearance 2 x 2 points of a source do. It is no less than what clear_of has, above which all are alike to share_of_brdf.
 const float FAR = 4.0;
 
 // Above this one its middle does: tails of Gaussian lobes go on falling steeply.
@@ -97,10 +97,16 @@ uint descend(uint s, Lobe lobe, Surface surface, Material material, float least_
     return s;
 }
 
+// Between which clearances kernels give way to the BRDF. Twin, which says why: src/environment/sources.rs.
+vec2 clear_of(float flank) {
+    return flank > 0.0 ? vec2(2.5, 4.0) : vec2(1.0, 2.0);
+}
+
 // How much of the answer to sources is the BRDF's, where this is the least clearance of one: the rest is the kernels', which fit best
 // where the mirrored view is (F29).
-float share_of_brdf(float least_clearance) {
-    return smoothstep(1.25, 2.5, least_clearance);
+float share_of_brdf(float least_clearance, Lobe lobe) {
+    vec2 clear = clear_of(lobe.flank);
+    return smoothstep(clear.x, clear.y, least_clearance);
 }
 
 // The least clearance of all sources, of which there is at least one.
@@ -134,7 +140,7 @@ bool needs_subpixels(Surface surface, Material material) {
     Lobe lobe = lobe_of(surface, material);
     // Normals mirrored turn twice as far; three standard deviations of that.
     return deviation > max(min(material.lobe_width, NEARLY_FLAT_RAD), material.shared_deviation * lobe.w_o.z)
-        || HAS_SOURCES != 0 && share_of_brdf(least_clearance(lobe, surface, material, 3.0 * 2.0 * deviation)) < 1.0;
+        || HAS_SOURCES != 0 && share_of_brdf(least_clearance(lobe, surface, material, 3.0 * 2.0 * deviation), lobe) < 1.0;
 }
 
 // What all sources are to a surface.
@@ -322,9 +328,10 @@ vec3 estimate(Surface surface, Material material, uint first, uint stride) {
     AtSources at = AtSources(vec3(0.0), vec3(0.0), FAR);
     float of_kernels = 0.0;
     if (HAS_SOURCES != 0) {
-        at = at_sources(surface, material, lobe_of(surface, material));
+        Lobe lobe = lobe_of(surface, material);
+        at = at_sources(surface, material, lobe);
         if (HAS_MIRRORED_SOURCES != 0) {
-            of_kernels = 1.0 - share_of_brdf(at.least_clearance);
+            of_kernels = 1.0 - share_of_brdf(at.least_clearance, lobe);
         }
     }
     k = first;

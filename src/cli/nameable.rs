@@ -9,6 +9,11 @@ pub fn material(what: &str) -> String {
     format!("{what}: a built-in name, {}", Brdf::FILES.names())
 }
 
+/// How several materials are named: one by one, or all those of a scene file.
+pub fn materials() -> String {
+    format!("{}; or {}, for all of its materials", material("Materials, each"), Scene::FILES.names())
+}
+
 /// `what` and how an environment is named.
 pub fn environment(what: &str) -> String {
     format!("{what}: a built-in name, {}, latitude-longitude", Environment::FILES.names())

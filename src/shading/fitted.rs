@@ -5,7 +5,7 @@ use glam::{IVec2, Vec2, Vec3, Vec4};
 
 use super::{CpuShader, Point, Surface, smoothstep, turned};
 use crate::brdf::MIN_COS_THETA_D;
-use crate::environment::sources::{CLEAR, clearance};
+use crate::environment::sources::{clear_of, clearance};
 use crate::environment::{LightMap, SourceRecord};
 use crate::light::{BlurredLight, finest_level};
 use crate::packing::stereographic_decode;
@@ -137,8 +137,8 @@ impl<'a> Lobe<'a> {
 }
 
 /// Twin of `share_of_brdf`.
-fn share_of_brdf(least_clearance: f32) -> f32 {
-    smoothstep(CLEAR, least_clearance)
+fn share_of_brdf(least_clearance: f32, lobe: &Lobe) -> f32 {
+    smoothstep(clear_of(lobe.flank), least_clearance)
 }
 
 /// Twin of `needs_subpixels`.
@@ -149,7 +149,7 @@ pub(super) fn needs_subpixels(point: &Point) -> bool {
     let (sources, record, lobe) = (&point.twin.sources, point.record(), Lobe::of(point));
     let deviation = point.surface.normal_variance.sqrt();
     deviation > record.lobe_width.min(NEARLY_FLAT_RAD as f32).max(record.shared_deviation * lobe.w_o.z)
-        || share_of_brdf(lobe.least_clearance(sources, 3.0 * 2.0 * deviation)) < 1.0
+        || share_of_brdf(lobe.least_clearance(sources, 3.0 * 2.0 * deviation), &lobe) < 1.0
 }
 
 /// Twin of `risen`.
@@ -296,8 +296,9 @@ pub(super) fn estimate(point: &Point) -> Vec3 {
     let light = blurred_light(point.twin);
     let sources = &point.twin.sources;
     let rows = Rows::at(surface, threads);
-    let at = at_sources(&Lobe::of(point), sources);
-    let of_kernels = 1.0 - share_of_brdf(at.least_clearance);
+    let lobe = Lobe::of(point);
+    let at = at_sources(&lobe, sources);
+    let of_kernels = 1.0 - share_of_brdf(at.least_clearance, &lobe);
     let (mut weights, mut sum) = (Vec3::ZERO, Vec3::ZERO);
     for k in (point.first as usize..threads.count).step_by(point.stride) {
         let kernel = rows.kernel(threads, k);

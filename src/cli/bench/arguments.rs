@@ -6,6 +6,7 @@ use anyhow::Context;
 use clap::value_parser;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use threadlight::low_level::brdf::Brdf;
 use threadlight::low_level::environment;
 use threadlight::low_level::evaluate::reference::{Processor, ReferenceSettings};
 use threadlight::low_level::evaluate::sweep::Measured;
@@ -14,14 +15,16 @@ use threadlight::low_level::memo::{Memo, Round};
 use threadlight::low_level::method::{Method, Variant};
 use threadlight::low_level::output;
 use threadlight::low_level::progress::Observer;
-use threadlight::low_level::scene::{MAX_SAMPLES, MAX_SUBPIXELS, MaterialSource, ObjectSettings, Scene, Source, mesh};
+use threadlight::low_level::scene::{
+    MAX_SAMPLES, MAX_SUBPIXELS, MaterialSettings, MaterialSource, ObjectSettings, Scene, Source, mesh,
+};
 use threadlight::low_level::vulkan::{Device, Instance};
 use threadlight::{Error, Result};
 
 /// What to measure. Where a flag is left out, the command says what is taken: see [`Defaults`].
 #[derive(clap::Args)]
 pub struct CasesArguments {
-    #[arg(long, help = nameable::material("Materials, each"), value_name = "LIST", value_delimiter = ',')]
+    #[arg(long, help = nameable::materials(), value_name = "LIST", value_delimiter = ',')]
     materials: Vec<String>,
     #[arg(long, help = nameable::environment("Environments, each"), value_name = "LIST", value_delimiter = ',', default_value = "studio")]
     environments: Vec<String>,
@@ -134,9 +137,20 @@ pub fn named<'a>(flag: &str, texts: &'a [String]) -> Result<Vec<(String, &'a str
     Ok(names.into_iter().zip(texts.iter().map(String::as_str)).collect())
 }
 
-/// The materials that `texts` name, with their names.
+/// The materials that `texts` name, with their names: a scene file stands for all of its materials.
 pub fn named_materials(flag: &str, texts: &[String]) -> Result<Vec<(String, MaterialSource)>> {
-    Ok(named(flag, texts)?.into_iter().map(|(name, text)| (name, MaterialSource::named(text))).collect())
+    let mut materials = Vec::new();
+    for text in texts {
+        match MaterialSource::named(text) {
+            MaterialSource::File(path) if Scene::FILES.format_of(&path).is_ok() && !Brdf::FILES.knows(&path)? => {
+                let of_scene = Scene::load(&path)?.materials;
+                materials.extend(of_scene.into_iter().map(|MaterialSettings { name, source }| (name, source)));
+            }
+            source => materials.push((stem(Path::new(text)), source)),
+        }
+    }
+    once(flag, materials.iter().map(|(name, _)| name).collect())?;
+    Ok(materials)
 }
 
 /// The environments that `texts` name, with their names.

@@ -31,7 +31,7 @@ The JSON is a list of rows with these fields, in this order:
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES, allow_negative_numbers = true)]
 pub struct BenchFit {
-    #[arg(long, help = nameable::material("Materials, each"), value_name = "LIST", value_delimiter = ',', default_value = "gold")]
+    #[arg(long, help = nameable::materials(), value_name = "LIST", value_delimiter = ',', default_value = "gold")]
     materials: Vec<String>,
     /// Numbers of threads, each 1 to 128.
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_values_t = [16, 64], value_parser = value_parser!(u32).range(1..=MAX_COUNT as i64))]

@@ -35,7 +35,7 @@ The JSON is a list of rows with these fields, in this order:
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES, allow_negative_numbers = true)]
 pub struct BenchTogether {
-    #[arg(long, help = nameable::material("Materials, each"), value_name = "LIST", value_delimiter = ',')]
+    #[arg(long, help = nameable::materials(), value_name = "LIST", value_delimiter = ',')]
     materials: Vec<String>,
     #[arg(long, help = nameable::environment("Environments, each"), value_name = "LIST", value_delimiter = ',', default_value = "studio")]
     environments: Vec<String>,
