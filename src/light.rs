@@ -115,9 +115,9 @@ impl KernelNeeds {
         let finest_level = finest_level(rest);
         let sources = environment.small_sources();
         let mirrors = |lobe: &LobeShape| {
-            let lobe_width = (MIN_COS_THETA_D * lobe.width_rad) as f32;
+            let lobe_radius = (MIN_COS_THETA_D * lobe.radius_rad) as f32;
             let clear = clear_of(lobe.flank_rad as f32)[1];
-            sources.leaves().any(|source| clearance(0.0, source.width_rad() as f32, lobe_width) < clear)
+            sources.leaves().any(|source| clearance(0.0, source.width_rad() as f32, lobe_radius) < clear)
         };
         let is_sharp = |threads: Option<&Threads>| {
             let mut tables = threads.and_then(Threads::fitted).into_iter().flat_map(FittedTable::tables);

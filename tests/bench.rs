@@ -233,12 +233,15 @@ fn together_compares_a_picture_of_all_materials_with_each_alone() {
 #[test]
 fn fit_prints_time_beside_error_and_writes_json() {
     let folder = tempfile::tempdir().unwrap();
+    // A scene file stands for its materials.
+    let scene = "[[material]]\nname = 'mud'\nmodel = 'lambert'\nreflectance = 0.2\n[[material]]\nname = 'gold'\n";
+    std::fs::write(folder.path().join("two.toml"), scene).unwrap();
     let mut command = Command::new(env!("CARGO_BIN_EXE_threadlight"));
-    command.current_dir(&folder).args("bench fit --materials clay,gold --counts 1,16 --json fit.json".split(' '));
+    command.current_dir(&folder).args("bench fit --materials two.toml --counts 1,16 --json fit.json".split(' '));
     let output = command.output().unwrap();
     let said = String::from_utf8(output.stdout).unwrap();
     assert!(output.status.success(), "{said}");
-    for text in ["1 threads", "16 threads", "clay", "gold", "median", "worst", "others"] {
+    for text in ["1 threads", "16 threads", "mud", "gold", "median", "worst", "others"] {
         assert!(said.contains(text), "{said}");
     }
     let fits = json(&folder, "fit.json");

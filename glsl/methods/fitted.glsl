@@ -20,7 +20,8 @@ struct Lobe {
     vec3 w_o;
     vec3 mirror;  // the mirrored view, in the environment's coordinates
     float width;  // lobe_width of what is seen from w_o
-    float flank;  // and its flank
+    float flank;  // its flank
+    float radius; // and its lobe_radius
 };
 
 // How far `direction` is from the middle of the lobe, in radians: of a long one measured across it, with what is along it shortened by as
@@ -38,10 +39,10 @@ float away_from(Lobe lobe, Surface surface, Material material, vec3 direction) {
 }
 
 // How far a source is from where the BRDF cannot be taken at a few points of it, because it is mirrored towards the eye and wider than
-// the lobe; in units of two standard deviations of the source (F28). Within a half vector of lobe_width f loses a quarter, as a Gaussian does
-// at 0.76 of its width; reflection doubles that. Twin: src/environment/sources.rs.
-float clearance(float away, float source_width, float lobe_width) {
-    return (away + 4.0 * 2.6 * lobe_width) / (2.0 * source_width);
+// the lobe; in units of two standard deviations of the source (F28). At the radius of the half vector f has lost a quarter or more, as a
+// Gaussian has at 0.76 of its width; reflection doubles that. Twin: src/environment/sources.rs.
+float clearance(float away, float source_width, float lobe_radius) {
+    return (away + 4.0 * 2.6 * lobe_radius) / (2.0 * source_width);
 }
 
 // Above this clearance 2 x 2 points of a source do. It is no less than what clear_of has, above which all are alike to share_of_brdf.
@@ -72,7 +73,7 @@ const float LOW_DEVIATIONS = 20.0;
 // The clearance of a source that counts as no narrower than `least_width`.
 float clearance_of(Source source, Lobe lobe, Surface surface, Material material, float least_width) {
     float away = away_from(lobe, surface, material, source.direction.xyz);
-    return clearance(away, max(source.direction.w, least_width), lobe.width);
+    return clearance(away, max(source.direction.w, least_width), lobe.radius);
 }
 
 // Whether a source is to be taken part by part, if it has any: where few points of it do not do beside the lobe or on its flank, or it is so
@@ -99,7 +100,7 @@ uint descend(uint s, Lobe lobe, Surface surface, Material material, float least_
 
 // Between which clearances kernels give way to the BRDF. Twin, which says why: src/environment/sources.rs.
 vec2 clear_of(float flank) {
-    return flank > 0.0 ? vec2(2.5, 4.0) : vec2(1.0, 2.0);
+    return flank > 0.0 ? vec2(2.5, 4.0) : vec2(1.25, 2.5);
 }
 
 // How much of the answer to sources is the BRDF's, where this is the least clearance of one: the rest is the kernels', which fit best
@@ -127,7 +128,7 @@ Lobe lobe_of(Surface surface, Material material) {
     vec3 w_o = view_direction(surface);
     float narrower = max(w_o.z, 0.05);
     vec3 mirror = surface.frame * vec3(-w_o.x, -w_o.y, w_o.z);
-    return Lobe(w_o, mirror, narrower * material.lobe_width, narrower * material.flank);
+    return Lobe(w_o, mirror, narrower * material.lobe_width, narrower * material.flank, narrower * material.lobe_radius);
 }
 
 // Up to this deviation of their normals, in radians, sub-pixels are one surface to any lobe that is not narrower: src/threads/fitted/sets.rs.

@@ -48,6 +48,10 @@ pub struct MaterialRecord {
     pub shared_deviation: f32,
     /// [`LobeShape::flank_rad`].
     pub flank: f32,
+    /// [`LobeShape::radius_rad`].
+    pub lobe_radius: f32,
+    /// The size of a structure in the buffer is a multiple of 16 bytes.
+    pub padding: [u32; 3],
 }
 
 impl MaterialRecord {
@@ -64,6 +68,8 @@ impl MaterialRecord {
             subpixel_threads: ThreadTableRecord::NONE,
             shared_deviation: 0.0,
             flank: lobe.flank_rad as f32,
+            lobe_radius: lobe.radius_rad as f32,
+            padding: [0; 3],
         }
     }
 

@@ -29,14 +29,14 @@ const WIDEST_RAD: f64 = 0.006;
 /// Measured: earlier, rims of mirrored lamps are off in mirrors; later, lamps are in glossy plastics, of which few kernels know less. Steep
 /// flanks show the edges of lamps, which kernels know better than squares in the place of parts.
 pub fn clear_of(flank: f32) -> [f32; 2] {
-    if flank > 0.0 { [2.5, 4.0] } else { [1.0, 2.0] }
+    if flank > 0.0 { [2.5, 4.0] } else { [1.25, 2.5] }
 }
 
 /// How far a source `away` from the mirrored view is from where the BRDF cannot be taken at a few points of it, because it is mirrored
 /// towards the eye and wider than the lobe; in units of two standard deviations, `source_width`, of the source. All in radians.
 /// Twin of `clearance` in glsl/methods/fitted.glsl.
-pub fn clearance(away: f32, source_width: f32, lobe_width: f32) -> f32 {
-    (away + 4.0 * 2.6 * lobe_width) / (2.0 * source_width)
+pub fn clearance(away: f32, source_width: f32, lobe_radius: f32) -> f32 {
+    (away + 4.0 * 2.6 * lobe_radius) / (2.0 * source_width)
 }
 
 /// A source: light around a direction.

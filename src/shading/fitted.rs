@@ -74,6 +74,7 @@ struct Lobe<'a> {
     mirror: Vec3,
     width: f32,
     flank: f32,
+    radius: f32,
 }
 
 impl<'a> Lobe<'a> {
@@ -82,7 +83,14 @@ impl<'a> Lobe<'a> {
         let w_o = point.surface.view_direction();
         let mirror = point.surface.frame * Vec3::new(-w_o.x, -w_o.y, w_o.z);
         let (record, narrower) = (point.record(), w_o.z.max(MIN_COS_THETA_D as f32));
-        Self { point, w_o, mirror, width: narrower * record.lobe_width, flank: narrower * record.flank }
+        Self {
+            point,
+            w_o,
+            mirror,
+            width: narrower * record.lobe_width,
+            flank: narrower * record.flank,
+            radius: narrower * record.lobe_radius,
+        }
     }
 
     /// Twin of `away_from`.
@@ -101,7 +109,7 @@ impl<'a> Lobe<'a> {
     /// Twin of `clearance_of`.
     fn clearance(&self, source: &SourceRecord, least_width: f32) -> f32 {
         let away = self.away(source.direction.truncate());
-        clearance(away, source.direction.w.max(least_width), self.width)
+        clearance(away, source.direction.w.max(least_width), self.radius)
     }
 
     /// Twin of `opens`.
