@@ -51,7 +51,7 @@ pub struct LobeShape {
     pub narrowness: f64,
     /// The direction of the long axis in the tangent plane, a unit vector. Any for an isotropic BRDF.
     pub long_axis: DVec2,
-    /// [`lobe_radius`] seen along the normal: other than the width, no cusp of little energy counts.
+    /// The width, or where that is so small that it may be of a cusp, [`lobe_radius`] seen along the normal.
     pub radius_rad: f64,
     /// The angle of the half vector to the normal, in radians, at which a Gaussian that falls to a thousandth where f does has fallen by e.
     /// Across the long axis. 0 if flanks are not as steep as a Gaussian's, or wider than 0.1.
@@ -66,10 +66,13 @@ impl LobeShape {
         let width_rad = azimuths(is_isotropic).map(width).fold(FRAC_PI_2, f64::min);
         let (narrowness, long_axis) = if is_isotropic { (1.0, DVec2::X) } else { lobe_axes(brdf) };
         let flank_rad = flank(brdf, long_axis.perp(), width_rad);
-        let radius_rad = lobe_radius(brdf, 0.0);
+        let radius_rad = if width_rad < WIDEST_CUSP_RAD { lobe_radius(brdf, 0.0) } else { width_rad };
         Self { is_isotropic, width_rad, narrowness, long_axis, radius_rad, flank_rad }
     }
 }
+
+/// Narrower lobes may be a cusp of little energy, as many measured tables have it, on the lobe itself.
+const WIDEST_CUSP_RAD: f64 = 0.004;
 
 /// Flanks end where f has fallen to this part of its peak.
 const FOOT: f64 = 1e-3;
