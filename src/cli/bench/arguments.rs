@@ -142,7 +142,10 @@ pub fn named_materials(flag: &str, texts: &[String]) -> Result<Vec<(String, Mate
     let mut materials = Vec::new();
     for text in texts {
         match MaterialSource::named(text) {
-            MaterialSource::File(path) if Scene::FILES.format_of(&path).is_ok() && !Brdf::FILES.knows(&path)? => {
+            // What cannot be read is told of by who needs it.
+            MaterialSource::File(path)
+                if Scene::FILES.format_of(&path).is_ok() && Brdf::FILES.knows(&path).is_ok_and(|known| !known) =>
+            {
                 let of_scene = Scene::load(&path)?.materials;
                 materials.extend(of_scene.into_iter().map(|MaterialSettings { name, source }| (name, source)));
             }
