@@ -46,6 +46,7 @@ pub use symmetry::Symmetry;
 pub use tabulate::tabulate;
 
 file_formats!(Brdf: merl_file, rgl_file, mit_file, utia_file, toml_file);
+pub(crate) use toml_file::has_model;
 
 /// What every model offers; [`Brdf`] dispatches to it.
 pub trait Model: Sized {

@@ -10,7 +10,7 @@ pub(super) const FORMAT: FileFormat<Brdf> =
     FileFormat { extension: "toml", name: "a .toml with a model and its parameters", is_of_format: has_model, parse };
 
 /// A material has a model at its top; a scene has nothing but sections there.
-fn has_model(bytes: &[u8]) -> bool {
+pub(crate) fn has_model(bytes: &[u8]) -> bool {
     let table = std::str::from_utf8(bytes).ok().and_then(|text| text.parse::<toml::Table>().ok());
     table.is_some_and(|table| table.contains_key("model"))
 }

@@ -97,15 +97,14 @@ impl SmallSources {
         found.retain(|part| luminance(part.source.power) >= LEAST_SHARE * total);
         found.sort_by(by_power);
         found.truncate(MAX_REGIONS);
-        // The one whose shape matters most goes first.
-        let spread = |part: &Part| spread(luminance(part.source.power), part.source.width_rad().powi(2));
         let is_wide = |part: &Part| part.source.width_rad() > WIDEST_RAD && part.pixels.len() > 1;
         let lamp_count = found.len();
         let mut halves: Vec<Range<usize>> = vec![0..0; lamp_count];
         let mut leaf_count = lamp_count;
         while leaf_count < MAX_SOURCES {
             let wide = (0..found.len()).filter(|&i| halves[i].is_empty() && is_wide(&found[i]));
-            let Some(widest) = wide.max_by(|&a, &b| spread(&found[a]).total_cmp(&spread(&found[b]))) else { break };
+            // The one whose shape matters most goes first.
+            let Some(widest) = wide.max_by(|&a, &b| found[a].spread().total_cmp(&found[b].spread())) else { break };
             let first = found.len();
             found.extend(found[widest].halves(environment));
             halves[widest] = first..found.len();
@@ -226,6 +225,11 @@ impl Part {
         Some(Self { source: LightSource { direction: centre, axes, power }, pixels })
     }
 
+    /// [`spread`] of its light along its longer axis.
+    fn spread(&self) -> f64 {
+        spread(luminance(self.source.power), self.source.width_rad().powi(2))
+    }
+
     /// Both sides of the cut across its longer axis that leaves the least spread.
     fn halves(&self, environment: &Environment) -> Vec<Self> {
         let LightSource { direction: centre, axes: [longer, _], .. } = self.source;
@@ -242,12 +246,12 @@ impl Part {
         });
         let moments: Vec<_> = moments.collect();
         let all = moments[moments.len() - 1];
-        let side = |moments: DVec3| {
+        let spread_of = |moments: DVec3| {
             let [power, first, second] = moments.to_array();
             // Beside the brightest pixels the rest may be lost in rounding.
             if power > 0.0 { spread(power, (second / power - (first / power).powi(2)).max(0.0)) } else { 0.0 }
         };
-        let spreads = moments[..moments.len() - 1].iter().map(|&one| side(one) + side(all - one));
+        let spreads = moments[..moments.len() - 1].iter().map(|&one| spread_of(one) + spread_of(all - one));
         let cut = spreads.enumerate().min_by(|(_, a), (_, b)| a.total_cmp(b)).map_or(0, |(last, _)| last + 1);
         let (one, other) = along.split_at(cut);
         let part = |side: &[(f64, f64, usize)]| Self::new(environment, side.iter().map(|&(.., pixel)| pixel).collect());

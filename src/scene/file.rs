@@ -12,7 +12,7 @@ use super::{
     MAX_SUBPIXELS, MaterialSettings, MaterialSource, ObjectSettings, Scene, ShadingSettings, Source, TangentRule,
     three_numbers,
 };
-use crate::brdf::{Brdf, change_base_files, resolve_base_files};
+use crate::brdf::{Brdf, change_base_files, has_model, resolve_base_files};
 use crate::error::{Error, Result};
 use crate::file_format::{self, FileFormat, FileKind, text};
 use crate::output::write_whole;
@@ -122,7 +122,7 @@ impl Scene {
 const REMEDY: &str = "the guide shows a scene file with every key, in src/guide/usage.md";
 
 const FORMAT: FileFormat<Scene> =
-    FileFormat { extension: "toml", name: "a scene .toml", is_of_format: |_| true, parse: parse_file };
+    FileFormat { extension: "toml", name: "a scene .toml", is_of_format: |bytes| !has_model(bytes), parse: parse_file };
 
 fn parse_file(path: &Path, bytes: &[u8]) -> Result<Scene> {
     parse(text(path, bytes)?, path.parent().unwrap_or(Path::new("")))

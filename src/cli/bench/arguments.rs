@@ -6,7 +6,6 @@ use anyhow::Context;
 use clap::value_parser;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use threadlight::low_level::brdf::Brdf;
 use threadlight::low_level::environment;
 use threadlight::low_level::evaluate::reference::{Processor, ReferenceSettings};
 use threadlight::low_level::evaluate::sweep::Measured;
@@ -143,9 +142,7 @@ pub fn named_materials(flag: &str, texts: &[String]) -> Result<Vec<(String, Mate
     for text in texts {
         match MaterialSource::named(text) {
             // What cannot be read is told of by who needs it.
-            MaterialSource::File(path)
-                if Scene::FILES.format_of(&path).is_ok() && Brdf::FILES.knows(&path).is_ok_and(|known| !known) =>
-            {
+            MaterialSource::File(path) if Scene::FILES.knows(&path).unwrap_or(false) => {
                 let of_scene = Scene::load(&path)?.materials;
                 materials.extend(of_scene.into_iter().map(|MaterialSettings { name, source }| (name, source)));
             }
