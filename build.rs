@@ -33,6 +33,18 @@ fn main() {
         &format!("/// The models that have a form in GLSL.\nconst TWINS: &[&str] = &{twins:?};\n"),
     );
 
+    let methods = files(&glsl.join("methods")).into_iter().map(|file| text(file.file_stem()));
+    let methods = methods.map(|method| (method.clone(), format!("#include \"methods/{method}.glsl\"\n")));
+    // Not a specialisation constant: lavapipe takes time for what is handed from stage to stage, though nothing reads it.
+    let tangents =
+        [("", 0), ("tangents", 1)].map(|(name, has)| (name.to_owned(), format!("#define HAS_TANGENTS {has}\n")));
+    let forms = [("method.glsl", methods.collect()), ("has_tangents.glsl", Vec::from(tangents))];
+    for (file, forms) in &forms {
+        for (form, contents) in forms {
+            write(&folder_of(&out, file, form).join(file), contents);
+        }
+    }
+
     let (mut table, mut recipes, mut names) = (String::new(), String::new(), Vec::new());
     for source in files(glsl) {
         let (stem, extension) = (text(source.file_stem()), text(source.extension()));
@@ -42,28 +54,32 @@ fn main() {
             "comp" => "Compute",
             _ => continue,
         };
-        if fs::read_to_string(&source).expect("a readable shader").contains("#include \"method.glsl\"") {
-            // One variant for each shading method: method.glsl stands for its file.
-            for method in files(&glsl.join("methods")) {
-                let method = text(method.file_stem());
-                let folder = out.join(format!("method_{method}"));
-                write(&folder.join("method.glsl"), &format!("#include \"methods/{method}.glsl\"\n"));
-                let name = format!("{stem}_{method}");
-                let includes = [glsl, &generated, &folder];
-                compile(&mut table, &source, &name, stage, &includes, &out);
-                recipe(&mut recipes, &source, &name, &includes);
-                names.push(name.to_uppercase());
-            }
-        } else {
-            let name = if stage == "Compute" { stem } else { format!("{stem}_{extension}") };
-            compile(&mut table, &source, &name, stage, &[glsl, &generated], &out);
-            recipe(&mut recipes, &source, &name, &[glsl, &generated]);
+        let name = if stage == "Compute" { stem } else { format!("{stem}_{extension}") };
+        let code = fs::read_to_string(&source).expect("a readable shader");
+        let mut add = |name: &str, includes: &[&Path]| {
+            compile(&mut table, &source, name, stage, includes, &out);
+            recipe(&mut recipes, &source, name, includes);
             names.push(name.to_uppercase());
+        };
+        // One variant of the shader for each form of a file that it includes.
+        match forms.iter().find(|(file, _)| code.contains(&format!("#include \"{file}\""))) {
+            None => add(&name, &[glsl, &generated]),
+            Some((file, forms)) => {
+                for (form, _) in forms {
+                    let variant = if form.is_empty() { name.clone() } else { format!("{name}_{form}") };
+                    add(&variant, &[glsl, &generated, &folder_of(&out, file, form)]);
+                }
+            }
         }
     }
     let _ = writeln!(table, "/// All of them.\npub const ALL: &[Shader] = &[{}];", names.join(", "));
     write(&out.join("shaders.rs"), &table);
     write(&out.join("recipes.rs"), &format!("const RECIPES: &[Recipe] = &[\n{recipes}];\n"));
+}
+
+/// Where a form of a generated file is.
+fn folder_of(out: &Path, file: &str, form: &str) -> PathBuf {
+    out.join(file).join(form)
 }
 
 /// Adds a line to what feature `hot-reload` compiles shaders by.

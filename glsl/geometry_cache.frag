@@ -2,11 +2,14 @@
 // Pass 1 of the paper (section 4.1): the normal and material of every sub-pixel, and the tangent where the material needs one.
 #extension GL_GOOGLE_include_directive : require
 #include "geometry_cache.glsl"
+#include "has_tangents.glsl" // whether a material of the scene needs them
 #include "geometry_texel.glsl"
 
 layout(location = 0) in vec3 eye_position;
 layout(location = 1) in vec3 world_normal;
+#if HAS_TANGENTS
 layout(location = 2) in vec3 world_tangent;
+#endif
 
 layout(location = 0) out uvec2 geometry;
 
@@ -28,8 +31,10 @@ void main() {
     }
     normal = normalize(normal);
     geometry = pack_geometry(normal, object.material);
+#if HAS_TANGENTS
     if (object.tangent_axis.w != NO_TANGENT) {
         vec3 tangent = tangent_along(world_tangent, normal);
         geometry = with_tangent(geometry, turned_tangent(tangent, normal, object.tangent_turn));
     }
+#endif
 }

@@ -2,6 +2,7 @@
 // Pass 1 of the paper (section 4.1): where the surface is.
 #extension GL_GOOGLE_include_directive : require
 #include "geometry_cache.glsl"
+#include "has_tangents.glsl" // whether a material of the scene needs them
 
 layout(location = 0) in vec3 position;
 layout(location = 1) in vec3 normal;
@@ -9,7 +10,9 @@ layout(location = 2) in vec3 tangent; // of texture coordinates; the normal of a
 
 layout(location = 0) out vec3 eye_position;
 layout(location = 1) out vec3 world_normal;
+#if HAS_TANGENTS
 layout(location = 2) out vec3 world_tangent; // of any length
+#endif
 
 void main() {
     vec4 at = vec4(position, 1.0);
@@ -22,9 +25,11 @@ void main() {
     mat3 cofactors = mat3(cross(linear_part[1], linear_part[2]), cross(linear_part[2], linear_part[0]),
                           cross(linear_part[0], linear_part[1]));
     world_normal = cofactors * normal;
+#if HAS_TANGENTS
     // Both are linear in the position, so what is interpolated is right within a triangle too.
     vec3 axis = object.tangent_axis.xyz;
     vec3 along = object.tangent_axis.w == TANGENT_AROUND ? cross(axis, position) : axis;
     world_tangent = linear_part * (object.tangent_axis.w == TANGENT_OF_MESH ? tangent : along);
+#endif
     gl_Position = project(from_eye);
 }

@@ -239,7 +239,7 @@ fn ask_geometry_cache(device: &Arc<Device>, prepared: &Prepared, round: &Round) 
     check_size(device, &prepared.view)?;
     let upload = |(name, mesh): &(String, Keyed<Mesh>)| round.ask(&UploadMesh { device, name, mesh });
     Ok(GeometryCache {
-        pipeline: round.ask(&CompileGeometryCache(device))?,
+        pipeline: round.ask(&CompileGeometryCache { device, has_tangents: prepared.has_tangents() })?,
         meshes: prepared.meshes.iter().map(upload).collect::<Result<_>>()?,
         objects: prepared.objects.clone(),
     })

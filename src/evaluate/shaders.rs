@@ -8,7 +8,7 @@ use super::tables::{Section, Table, in_order};
 use crate::error::Result;
 use crate::memo::{Memo, Round};
 use crate::method::Method;
-use crate::passes::GEOMETRY_STATE;
+use crate::passes::{GEOMETRY_STATE, geometry_shaders};
 use crate::prepare::{Prepared, prepare};
 use crate::progress::Observer;
 use crate::scene::{Background, Scene};
@@ -60,10 +60,12 @@ pub fn run(
     observer: &dyn Observer,
     costs: &mut Vec<ShaderCost>,
 ) -> Result<()> {
-    let (vertex, fragment) = (&compiled::GEOMETRY_CACHE_VERT, &compiled::GEOMETRY_CACHE_FRAG);
-    let made = device.compile_graphics(vertex, fragment, &GEOMETRY_STATE)?;
-    let of_cache = [vertex, fragment].into_iter().zip(made);
-    costs.extend(of_cache.map(|(shader, made)| ShaderCost::new(shader, "any", Vec::new(), made)));
+    for has_tangents in [false, true] {
+        let [vertex, fragment] = geometry_shaders(has_tangents);
+        let made = device.compile_graphics(vertex, fragment, &GEOMETRY_STATE)?;
+        let of_cache = [vertex, fragment].into_iter().zip(made);
+        costs.extend(of_cache.map(|(shader, made)| ShaderCost::new(shader, "any", Vec::new(), made)));
+    }
     let mut add = |shader, compiled_for, constants: Vec<_>| {
         let made = device.compile(shader, &constants)?;
         costs.push(ShaderCost::new(shader, compiled_for, constants, made));

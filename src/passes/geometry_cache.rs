@@ -4,7 +4,9 @@ use crate::Result;
 use crate::graph::{FrameGraph, ImageDesc, ImageHandle};
 use crate::memo::Keyed;
 use crate::scene::{Mesh, TangentRule};
-use crate::vulkan::{Device, GraphicsPipeline, GraphicsState, PipelineCache, Triangles, VertexAttribute, compiled};
+use crate::vulkan::{
+    Device, GraphicsPipeline, GraphicsState, PipelineCache, Shader, Triangles, VertexAttribute, compiled,
+};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 use glam::{DAffine3, DVec2, DVec3, Vec3};
@@ -124,12 +126,20 @@ pub(crate) const GEOMETRY_STATE: GraphicsState = GraphicsState {
     depth: DEPTH_FORMAT,
 };
 
+/// The vertex and the fragment shader, for objects with tangents or for those without.
+pub(crate) fn geometry_shaders(has_tangents: bool) -> [&'static Shader; 2] {
+    match has_tangents {
+        true => [&compiled::GEOMETRY_CACHE_VERT_TANGENTS, &compiled::GEOMETRY_CACHE_FRAG_TANGENTS],
+        false => [&compiled::GEOMETRY_CACHE_VERT, &compiled::GEOMETRY_CACHE_FRAG],
+    }
+}
+
 /// Compiles the shaders of the pass.
 ///
 /// # Errors
 /// A driver that cannot compile them.
-pub fn geometry_pipeline(device: &Arc<Device>, cache: &PipelineCache) -> Result<GraphicsPipeline> {
-    let (vertex, fragment) = (&compiled::GEOMETRY_CACHE_VERT, &compiled::GEOMETRY_CACHE_FRAG);
+pub fn geometry_pipeline(device: &Arc<Device>, cache: &PipelineCache, has_tangents: bool) -> Result<GraphicsPipeline> {
+    let [vertex, fragment] = geometry_shaders(has_tangents);
     Ok(GraphicsPipeline::new(device, cache, vertex, fragment, &GEOMETRY_STATE)?)
 }
 
@@ -219,11 +229,25 @@ pub fn geometry_cache<'a>(graph: &mut FrameGraph<'a>, cache: &'a GeometryCache, 
 mod tests {
     use super::*;
     use crate::scene::Camera;
+    use spirq::ReflectConfig;
+    use spirq::var::Variable;
 
     /// Number `i` of `count` directions all around.
     fn direction(i: usize, count: usize) -> DVec3 {
         let z = 1.0 - (2 * i + 1) as f64 / count as f64;
         (DVec2::from_angle(2.4 * i as f64) * (1.0 - z * z).sqrt()).extend(z)
+    }
+
+    /// What is handed from stage to stage costs a device time, whether or not it is read.
+    #[test]
+    fn objects_without_tangents_interpolate_none() {
+        let interpolated = |has_tangents| {
+            let [_, fragment] = geometry_shaders(has_tangents);
+            let entry_points = ReflectConfig::new().spv(fragment.words()).reflect().unwrap();
+            let inputs = entry_points[0].vars.iter().filter(|variable| matches!(variable, Variable::Input { .. }));
+            inputs.count()
+        };
+        assert_eq!([false, true].map(interpolated), [2, 3]);
     }
 
     /// Against points of the spheres, each on the picture or not.

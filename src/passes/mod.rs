@@ -25,8 +25,8 @@ pub use bare_lookups::{BareLookups, bare_lookups};
 pub use classify::{Classify, Counters, MAX_SHADERS, SMOOTH_DEG, SmoothVariance, Tiles, classify, upload_shaders};
 pub use cube_borders::WayAround;
 pub use device_check::{Answers, Questions, Volume, ask};
-pub(crate) use geometry_cache::GEOMETRY_STATE;
 pub use geometry_cache::{DeviceMesh, GeometryCache, PlacedMesh, PlacedTangent, geometry_cache, geometry_pipeline};
+pub(crate) use geometry_cache::{GEOMETRY_STATE, geometry_shaders};
 pub use light::DeviceLight;
 #[cfg(feature = "viewer")]
 pub use present::{Area, present};

@@ -1,8 +1,8 @@
 //! Compiles pipelines, by the driver's cache of them.
 use crate::Result;
 use crate::memo::{Key, KeyBuilder, Keyed, Memo, Round, Step};
-use crate::passes::geometry_pipeline;
-use crate::vulkan::{ComputePipeline, Device, GraphicsPipeline, PipelineCache, Shader, compiled};
+use crate::passes::{geometry_pipeline, geometry_shaders};
+use crate::vulkan::{ComputePipeline, Device, GraphicsPipeline, PipelineCache, Shader};
 use std::sync::Arc;
 
 /// Begins the key of what is on `device`. Whatever is there keeps it alive, so no other can have its address.
@@ -58,19 +58,24 @@ impl Step for CompileCompute<'_> {
 }
 
 /// Compiles the shaders of the geometry cache.
-pub struct CompileGeometryCache<'a>(pub &'a Arc<Device>);
+pub struct CompileGeometryCache<'a> {
+    /// For what.
+    pub device: &'a Arc<Device>,
+    /// Whether objects have tangents.
+    pub has_tangents: bool,
+}
 
 impl Step for CompileGeometryCache<'_> {
     type Output = GraphicsPipeline;
     const NAME: &'static str = "shaders";
 
     fn key(&self, _: &Memo) -> Result<Key> {
-        let shaders = [&compiled::GEOMETRY_CACHE_VERT, &compiled::GEOMETRY_CACHE_FRAG];
-        let key = on(self.0, "geometry cache");
+        let key = on(self.device, "geometry cache");
+        let shaders = geometry_shaders(self.has_tangents);
         Ok(shaders.iter().fold(key, |key, shader| key.bytes(bytemuck::cast_slice(&shader.words()))).build())
     }
 
     fn make(&self, round: &Round) -> Result<GraphicsPipeline> {
-        geometry_pipeline(self.0, &*pipelines(round, self.0)?)
+        geometry_pipeline(self.device, &*pipelines(round, self.device)?, self.has_tangents)
     }
 }
