@@ -123,8 +123,12 @@ fn the_shader_agrees_with_its_cpu_twin() {
             let twin = shading::CpuShader::new(&prepared, &round).unwrap();
             _held = Some(round.held());
             // SwiftShader: 0.015 in one pixel of the narrow lobe, 0.003 in 99 % of them. Fitted threads evaluate no BRDF.
-            let most =
-                if gpu.has_exact_functions() || method == "fitted" || method == "gaussian" { 1e-3 } else { 0.03 };
+            let most = match method {
+                "fitted" | "gaussian" if gpu.has_exact_lookups() => 1e-3,
+                "fitted" | "gaussian" => 0.01,
+                _ if gpu.has_exact_functions() => 1e-3,
+                _ => 0.03,
+            };
             let (interior, edge) = compare_with_twin(&prepared, &rendering, &twin, most, &name);
             assert!(interior > 300 && edge > 30, "{interior} interior and {edge} edge pixels are no test");
         }
@@ -140,13 +144,14 @@ fn compare_with_twin(
     most: f32,
     name: &str,
 ) -> (usize, usize) {
-    let (mut interior, mut edge, mut covered) = (0, 0, 0);
+    let (mut interior, mut edge, mut covered, mut worst) = (0, 0, 0, 0.0_f32);
     for pixel in pixels(prepared) {
         let texels = texels_of(prepared, rendering, pixel);
         let expected = twin.shade(pixel, &texels);
         let found = Vec4::from(rendering.radiance[(pixel.y * prepared.view.width + pixel.x) as usize]);
         assert_eq!(found.w, expected.w, "{name}: coverage at {pixel}");
         let difference = (found - expected).abs().max_element();
+        worst = worst.max(difference / expected.truncate().max_element().max(f32::MIN_POSITIVE));
         assert!(
             difference <= most * expected.truncate().max_element(),
             "{name}: {found} at {pixel}, the twin has {expected}"
@@ -158,6 +163,7 @@ fn compare_with_twin(
             false => edge += usize::from(here > 0),
         }
     }
+    println!("{name}: {worst:.1e} of a pixel at most");
     let counters = rendering.counters;
     assert_eq!((counters.interior_pixels as usize, counters.edge_pixels as usize), (interior, edge), "{name}");
     assert_eq!(counters.covered_subpixels as usize, covered, "{name}");
@@ -429,6 +435,10 @@ fn a_planted_nan_is_counted() {
             compare(&picture, &picture, false).expect("two pictures of one size").nan
         };
         assert_eq!(count(&prepared), 0, "{method}");
+        // What max and min make of NaN, GLSL leaves to the driver: others may show a number.
+        if !gpu.has_exact_functions() {
+            continue;
+        }
         // Above the sphere, where whoever looks up meets it; readers of files do not let it pass.
         let mut environment = (*prepared.environment).clone();
         let (width, height) = (environment.width, environment.height);

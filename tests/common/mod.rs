@@ -38,6 +38,12 @@ impl Validated {
         self.device.description().driver.starts_with("llvmpipe")
     }
 
+    /// Whether lookups weight texels by floats, as on the CPU. Vulkan promises as many bits as `subTexelPrecisionBits` and
+    /// `mipmapPrecisionBits` say; GPUs have 8.
+    pub fn has_exact_lookups(&self) -> bool {
+        ["llvmpipe", "SwiftShader"].iter().any(|name| self.device.description().driver.starts_with(name))
+    }
+
     pub fn render(&self, prepared: &Prepared, wanted: Wanted) -> Rendering {
         self.renderer(prepared).render(wanted, 1).expect("a rendering")
     }

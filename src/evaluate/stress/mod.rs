@@ -24,11 +24,10 @@ use crate::shading::{CpuShader, texels_of_pixel};
 use crate::vulkan::Device;
 
 /// What differences may be: RMS over the covered pixels, each relative to the largest of its radiance, the picture's mean, and a millionth
-/// of the light's maximum, in which all rounds.
-pub const MOST_RMS: f64 = 2e-3;
-/// The same of the methods that draw samples. Of their pixels the worst twentieth is left out: a sample on the other side of an edge, of a
-/// cell or of a choice makes another pixel.
-pub const MOST_RMS_DRAWN: f64 = 3e-3;
+/// of the light's maximum, in which all rounds. GPUs have the weights of a lookup in 8 bits: beside black, a step is 4e-3 of a texel. Of
+/// methods that draw samples the worst twentieth of the pixels is left out: a sample on the other side of an edge, of a cell or of a choice
+/// makes another pixel.
+pub const MOST_RMS: f64 = 5e-3;
 /// Light is made as bright as this where pyramids are to be in single precision: half floats, scaled, go to 4e6.
 const BRIGHT: f64 = 1e9;
 
@@ -56,7 +55,7 @@ pub struct Stressed {
     pub not_finite: usize,
     /// Pixels within a surface whose display value is off by more than a step of 8 bits.
     pub wrongly_shown: usize,
-    /// Of the finite ones, as [`MOST_RMS`] has it, or [`MOST_RMS_DRAWN`].
+    /// Of the finite ones, as [`MOST_RMS`] has it.
     pub rms: f64,
     /// The largest such difference of a pixel.
     pub most: f64,
@@ -65,8 +64,7 @@ pub struct Stressed {
 impl Stressed {
     /// Whether a bound is broken.
     pub fn is_broken(&self) -> bool {
-        let most = if draws(self.method) { MOST_RMS_DRAWN } else { MOST_RMS };
-        self.not_finite > 0 || self.wrongly_shown > 0 || self.rms.is_nan() || self.rms > most
+        self.not_finite > 0 || self.wrongly_shown > 0 || self.rms.is_nan() || self.rms > MOST_RMS
     }
 }
 
@@ -211,9 +209,7 @@ pub fn tables(found: &[Stressed]) -> Section {
         let title = if bright { format!("{method}, bright") } else { method.to_owned() };
         (!rows.is_empty()).then_some(Table { title, head, rows })
     };
-    let title = format!(
-        "Device and CPU, relative to radiance; {MOST_RMS:.0e} RMS is allowed, {MOST_RMS_DRAWN:.0e} where samples are drawn:"
-    );
+    let title = format!("Device and CPU, relative to radiance; {MOST_RMS:.0e} RMS is allowed:");
     let tables = Method::ALL.iter().flat_map(|method| [false, true].map(|bright| of_method(method.name(), bright)));
     Section { title, tables: tables.flatten().collect() }
 }
