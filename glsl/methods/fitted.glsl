@@ -163,24 +163,27 @@ vec2 risen(float z, float deviation) {
     return vec2(above * above / (4.0 * half_side), 0.5 * above);
 }
 
-// Point i of side x side on a square of light of variance 1, and its weight: Gauss and Legendre's; of a square that sets the middles of
-// equal parts, for what has risen of these adds up to what has risen of it.
-vec3 on_square(int i, int side, bool sets) {
-    vec2 place = vec2(i % side, i / side) - 0.5 * float(side - 1);
-    if (sets || side == 1) {
-        return vec3(sqrt(12.0) / float(side) * place, 1.0 / float(side * side));
+// Points on a square of light of variance 1, in columns and rows about its middle.
+struct Points {
+    vec2 last;     // column and row, counted from the middle
+    float between; // columns, and rows
+    vec2 weight;   // of one in the middle, and what one next to it has more
+    bool is_stairs;
+};
+
+// side x side of them, of Gauss and Legendre; of a square that sets the middles of equal parts, for what has risen of these adds up to what
+// has risen of it.
+Points points_on_square(int side, bool sets) {
+    vec2 last = vec2(0.5 * float(side - 1));
+    if (side == 3 && !sets) {
+        return Points(last, sqrt(3.0 * 0.6), vec2(4.0, -1.5) / 9.0, false);
     }
-    if (side == 2) {
-        return vec3(2.0 * place, 0.25);
-    }
-    vec2 weights = mix(vec2(4.0 / 9.0), vec2(2.5 / 9.0), notEqual(place, vec2(0.0)));
-    return vec3(sqrt(3.0 * 0.6) * place, weights.x * weights.y);
+    return Points(last, side == 2 && !sets ? 2.0 : sqrt(12.0) / float(side), vec2(1.0 / float(side), 0.0), false);
 }
 
-// Point i of four on the same square, a quarter of it each: equal steps up, by turns to both sides as far as its standard deviation.
-vec3 on_stairs(int i, vec2 up) {
-    float to_side = i == 0 || i == 3 ? 1.0 : -1.0;
-    return vec3(sqrt(12.0) / 4.0 * (float(i) - 1.5) * up + to_side * vec2(-up.y, up.x), 0.25);
+// Four of equal weight: equal steps up, by turns to both sides as far as its standard deviation.
+Points points_on_stairs() {
+    return Points(vec2(1.5, 0.0), sqrt(12.0) / 4.0, vec2(0.5, 0.0), true);
 }
 
 // An axis of a source, longer by what the normals of the pixel add to its variance: mirrored directions turn twice as far.
@@ -191,41 +194,59 @@ vec3 within_pixel(vec3 axis, Surface surface) {
 
 // Adds a source, as a square of its variance.
 void add_source(inout AtSources sum, Source source, float clear, Surface surface, Material material, vec3 w_o) {
-    vec3 n = surface.frame[2];
-    vec3 x = source.axis[0].xyz;
-    vec3 y = source.axis[1].xyz;
-    float z = dot(source.direction.xyz, n);
-    vec2 slope = vec2(dot(x, n), dot(y, n));
+    vec3 middle = source.direction.xyz * surface.frame;
+    vec3 x = source.axis[0].xyz * surface.frame;
+    vec3 y = source.axis[1].xyz * surface.frame;
+    vec2 slope = vec2(x.z, y.z);
     float deviation = length(slope);
     float half_side = sqrt(3.0) * deviation;
-    if (z + half_side <= 0.0) {
+    if (middle.z + half_side <= 0.0) {
         return;
     }
-    float lowest = z - half_side;
+    float lowest = middle.z - half_side;
     int side = clear > VERY_FAR ? 1 : clear > FAR ? 2 : 3;
     // Four steps up.
     bool is_low = clear > FAR && lowest < (side == 1 ? LOW_DEVIATIONS * deviation : LOW_COSINE);
-    // Light sets by the angle of normals, not by twice as much.
-    if (!is_low && lowest > 0.0) {
-        x = within_pixel(x, surface);
-        y = within_pixel(y, surface);
+    Points points;
+    float steps = float(side);
+    if (is_low) {
+        // Light straight above has no slope.
+        // Light straight above has no slope; 1e-6 is far below the deviation of any other.
+        vec2 up = slope / max(deviation, 1e-6);
+        vec3 to_side = up.x * y - up.y * x;
+        x = up.x * x + up.y * y;
+        y = to_side;
+        points = points_on_stairs();
+        steps = 4.0;
+    } else {
+        points = points_on_square(side, lowest < 0.0);
+        // Light sets by the angle of normals, not by twice as much.
+        if (lowest > 0.0) {
+            x = within_pixel(x, surface);
+            y = within_pixel(y, surface);
+        }
     }
-    // Light straight above has no slope.
-    vec2 up = slope / max(deviation, 1e-6);
-    int steps = is_low ? 4 : side;
-    int count = is_low ? 4 : side * side;
-    int i = 0;
+    float part_deviation = deviation / steps;
+    vec2 place = -points.last;
     do {
-        vec3 at = is_low ? on_stairs(i, up) : on_square(i, side, lowest < 0.0);
-        vec3 w_i = normalize((source.direction.xyz + at.x * x + at.y * y) * surface.frame);
-        vec2 above = risen(w_i.z, deviation / float(steps));
+        vec2 at = points.between * place;
+        if (points.is_stairs) {
+            at.y = place.x * place.x - 1.25;
+        }
+        vec2 weights = points.weight.x + points.weight.y * abs(place);
+        vec3 w_i = normalize(middle + at.x * x + at.y * y);
+        vec2 above = risen(w_i.z, part_deviation);
         if (above.x > 0.0) {
-            vec3 power = at.z * above.x * source.power.rgb;
+            vec3 power = weights.x * weights.y * above.x * source.power.rgb;
             w_i = normalize(vec3(w_i.xy, above.y));
             sum.f_cos += power * brdf_at(surface, material, w_i, w_o);
             sum.cosine += power;
         }
-    } while (++i < count);
+        place.x += 1.0;
+        if (place.x > points.last.x) {
+            place = vec2(-points.last.x, place.y + 1.0);
+        }
+    } while (place.y <= points.last.y);
 }
 
 AtSources at_sources(Surface surface, Material material, Lobe lobe) {

@@ -1,7 +1,7 @@
 //! Fitted threads. Twin of glsl/methods/fitted.glsl, by functions of the same names.
 use std::f32::consts::{FRAC_PI_2, PI};
 
-use glam::{IVec2, Vec2, Vec3, Vec4};
+use glam::{IVec2, Vec2, Vec3};
 
 use super::{CpuShader, Point, Surface, smoothstep, turned};
 use crate::brdf::MIN_COS_THETA_D;
@@ -170,23 +170,41 @@ fn risen(z: f32, deviation: f32) -> [f32; 2] {
     [above * above / (4.0 * half_side), 0.5 * above]
 }
 
-/// Twin of `on_square`: the point, and its weight.
-fn on_square(i: i32, side: i32, sets: bool) -> (Vec2, f32) {
-    let place = IVec2::new(i % side, i / side).as_vec2() - 0.5 * (side - 1) as f32;
-    if sets || side == 1 {
-        return (12.0_f32.sqrt() / side as f32 * place, 1.0 / (side * side) as f32);
-    }
-    if side == 2 {
-        return (2.0 * place, 0.25);
-    }
-    let weight = |place: f32| if place == 0.0 { 4.0 / 9.0 } else { 2.5 / 9.0 };
-    ((3.0 * 0.6_f32).sqrt() * place, weight(place.x) * weight(place.y))
+/// Twin of `Points`.
+struct Points {
+    last: Vec2,
+    between: f32,
+    weight: Vec2,
+    is_stairs: bool,
 }
 
-/// Twin of `on_stairs`: the point, and its weight.
-fn on_stairs(i: i32, up: Vec2) -> (Vec2, f32) {
-    let to_side = if i == 0 || i == 3 { 1.0 } else { -1.0 };
-    (12.0_f32.sqrt() / 4.0 * (i as f32 - 1.5) * up + to_side * up.perp(), 0.25)
+impl Points {
+    /// Twin of `points_on_square`.
+    fn on_square(side: i32, sets: bool) -> Self {
+        let last = Vec2::splat(0.5 * (side - 1) as f32);
+        if side == 3 && !sets {
+            return Self { last, between: (3.0 * 0.6_f32).sqrt(), weight: Vec2::new(4.0, -1.5) / 9.0, is_stairs: false };
+        }
+        let between = if side == 2 && !sets { 2.0 } else { 12.0_f32.sqrt() / side as f32 };
+        Self { last, between, weight: Vec2::new(1.0 / side as f32, 0.0), is_stairs: false }
+    }
+
+    /// Twin of `points_on_stairs`.
+    fn on_stairs() -> Self {
+        let between = 12.0_f32.sqrt() / 4.0;
+        Self { last: Vec2::new(1.5, 0.0), between, weight: Vec2::new(0.5, 0.0), is_stairs: true }
+    }
+
+    /// Each point, and its weight.
+    fn iter(&self) -> impl Iterator<Item = (Vec2, f32)> {
+        let [columns, rows] = (2.0 * self.last + 1.0).as_ivec2().to_array();
+        (0..columns * rows).map(move |i| {
+            let place = IVec2::new(i % columns, i / columns).as_vec2() - self.last;
+            let at = self.between * place;
+            let at = if self.is_stairs { at.with_y(place.x * place.x - 1.25) } else { at };
+            (at, (self.weight.x + self.weight.y * place.abs()).element_product())
+        })
+    }
 }
 
 /// What all sources are to a surface. Twin of `AtSources`.
@@ -205,12 +223,13 @@ impl AtSources {
     /// Twin of `add_source`.
     fn add(&mut self, source: &SourceRecord, clear: f32, lobe: &Lobe) {
         let point = lobe.point;
-        let n = point.surface.frame.z_axis;
-        let [mut x, mut y] = source.axes.map(Vec4::truncate);
-        let slope = Vec2::new(x.dot(n), y.dot(n));
-        let (z, deviation) = (source.direction.truncate().dot(n), slope.length());
+        let to_frame = point.surface.frame.transpose();
+        let middle = to_frame * source.direction.truncate();
+        let [mut x, mut y] = source.axes.map(|axis| to_frame * axis.truncate());
+        let slope = Vec2::new(x.z, y.z);
+        let deviation = slope.length();
         let half_side = 3.0_f32.sqrt() * deviation;
-        if z + half_side <= 0.0 {
+        if middle.z + half_side <= 0.0 {
             return;
         }
         let side = if clear > VERY_FAR {
@@ -220,22 +239,24 @@ impl AtSources {
         } else {
             3
         };
-        let lowest = z - half_side;
+        let lowest = middle.z - half_side;
         let is_low = clear > FAR && lowest < if side == 1 { LOW_DEVIATIONS * deviation } else { LOW_COSINE };
-        if !is_low && lowest > 0.0 {
-            [x, y] = [x, y].map(|axis| within_pixel(axis, &point.surface));
-        }
-        let up = slope / deviation.max(1e-6);
-        let (count, steps) = if is_low { (4, 4) } else { (side * side, side) };
-        for i in 0..count {
-            let (at, weight) = if is_low { on_stairs(i, up) } else { on_square(i, side, lowest < 0.0) };
-            let towards = source.direction.truncate() + at.x * x + at.y * y;
-            let w_i = (point.surface.frame.transpose() * towards).normalize();
-            let [cos, middle] = risen(w_i.z, deviation / steps as f32);
+        let (points, steps) = if is_low {
+            let up = slope / deviation.max(1e-6);
+            [x, y] = [up.x * x + up.y * y, up.x * y - up.y * x];
+            (Points::on_stairs(), 4)
+        } else {
+            if lowest > 0.0 {
+                [x, y] = [x, y].map(|axis| within_pixel(axis, &point.surface));
+            }
+            (Points::on_square(side, lowest < 0.0), side)
+        };
+        for (at, weight) in points.iter() {
+            let w_i = (middle + at.x * x + at.y * y).normalize();
+            let [cos, above] = risen(w_i.z, deviation / steps as f32);
             if cos > 0.0 {
                 let power = weight * cos * source.power.truncate();
-                let w_i = w_i.with_z(middle).normalize();
-                self.f_cos += power * point.brdf(w_i, lobe.w_o);
+                self.f_cos += power * point.brdf(w_i.with_z(above).normalize(), lobe.w_o);
                 self.cosine += power;
             }
         }
@@ -341,11 +362,10 @@ mod tests {
 
     #[test]
     fn points_of_a_source_have_its_mean_its_variance_and_what_has_risen_of_it() {
-        let up = Vec2::from_angle(0.7);
-        type Points = Vec<(Vec2, f32)>;
-        let square = |side: i32, sets| -> Points { (0..side * side).map(|i| on_square(i, side, sets)).collect() };
-        let stairs: Points = (0..4).map(|i| on_stairs(i, up)).collect();
-        let mean = |points: &Points, value: &dyn Fn(Vec2) -> f32| -> f32 {
+        type Weighted = Vec<(Vec2, f32)>;
+        let square = |side: i32, sets| -> Weighted { Points::on_square(side, sets).iter().collect() };
+        let stairs: Weighted = Points::on_stairs().iter().collect();
+        let mean = |points: &Weighted, value: &dyn Fn(Vec2) -> f32| -> f32 {
             points.iter().map(|&(at, weight)| weight * value(at)).sum()
         };
         for points in [square(1, false), square(2, false), square(3, false), square(3, true), stairs.clone()] {
@@ -359,14 +379,13 @@ mod tests {
                 assert!((value - variance).abs() < 1e-6, "{value} of {points:?}");
             }
         }
-        for (value, expected) in [(up, 1.0 - 1.0 / 16.0), (up.perp(), 1.0)] {
-            assert!((mean(&stairs, &|at| at.dot(value).powi(2)) - expected).abs() < 1e-6);
-        }
-        assert!(mean(&stairs, &|at| at.dot(up) * at.dot(up.perp())).abs() < 1e-6);
+        let stairs_variances = [mean(&stairs, &|at| at.x * at.x), mean(&stairs, &|at| at.y * at.y)];
+        assert!(Vec2::from(stairs_variances).abs_diff_eq(Vec2::new(1.0 - 1.0 / 16.0, 1.0), 1e-6));
+        assert!(mean(&stairs, &|at| at.x * at.y).abs() < 1e-6);
         // Along the way up, 1 of which is a standard deviation: parts against the whole.
         for z in [-2.0_f32, -1.7, -1.0, -0.3, 0.0, 0.4, 1.1, 1.7, 2.0] {
             let [whole, _] = risen(z, 1.0);
-            let of_stairs = mean(&stairs, &|at| risen(z + at.dot(up), 0.25)[0]);
+            let of_stairs = mean(&stairs, &|at| risen(z + at.x, 0.25)[0]);
             let of_square = mean(&square(3, true), &|at| risen(z + at.x, 1.0 / 3.0)[0]);
             assert!((of_stairs - whole).abs() < 1e-6 && (of_square - whole).abs() < 1e-6, "{z}");
         }
