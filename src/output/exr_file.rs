@@ -10,7 +10,7 @@ use exr::prelude::{
     ReadChannels, ReadLayers, Vec2, WritableImage,
 };
 
-use super::{Format, PictureFile, check_pixels, write_whole};
+use super::{Format, PictureFile, Primaries, check_pixels, write_whole};
 use crate::error::{Error, Result};
 
 /// Pixels of all channels to each byte of a file, at most: deflate makes 1032 bytes of one, most of it for one channel of half floats.
@@ -94,12 +94,10 @@ pub fn write_exr(
 
     let size = Vec2(width as usize, height as usize);
     let mut image = Image::from_layer(Layer::new(size, attributes, Encoding::SMALL_LOSSLESS, channels));
-    image.attributes.chromaticities = Some(Chromaticities {
-        red: Vec2(0.64, 0.33),
-        green: Vec2(0.30, 0.60),
-        blue: Vec2(0.15, 0.06),
-        white: Vec2(0.3127, 0.3290),
-    });
+    let at = |[x, y]: [f32; 2]| Vec2(x, y);
+    let Primaries { red, green, blue, white } = Primaries::REC_709;
+    image.attributes.chromaticities =
+        Some(Chromaticities { red: at(red), green: at(green), blue: at(blue), white: at(white) });
     let mut bytes = Cursor::new(Vec::new());
     image.write().to_buffered(&mut bytes).map_err(|cause| Error::unwritable(path, cause))?;
     let mut bytes = bytes.into_inner();
@@ -129,7 +127,8 @@ fn sort_attributes(bytes: &mut [u8]) {
 
 /// Reads an EXR: the first layer with channels R, G and B (perhaps with a common prefix, such as `beauty.R`), or with
 /// only Y, which then stands for all three. Half, float and integer samples, any compression that the crate knows. The picture is what
-/// the display window shows: black, and transparent if there is alpha, where the layer has no data.
+/// the display window shows: black, and transparent if there is alpha, where the layer has no data. Colours of other primaries become those
+/// of Rec. 709.
 pub fn parse_exr(path: &Path, bytes: &[u8]) -> Result<PictureFile> {
     let broken = |cause: exr::error::Error| {
         Error::in_file(
@@ -177,6 +176,13 @@ pub fn parse_exr(path: &Path, bytes: &[u8]) -> Result<PictureFile> {
         if let Some(channel) = find_channel(layer, &prefix, name) {
             rgba.iter_mut().zip(channel.sample_data.values_as_f32()).for_each(|(pixel, value)| pixel[index] = value);
         }
+    }
+    // Y alone has no colour.
+    if let Some(Chromaticities { red, green, blue, white }) =
+        image.attributes.chromaticities.filter(|_| names[0] == "R")
+    {
+        let at = |of: Vec2<f32>| [of.0, of.1];
+        Primaries { red: at(red), green: at(green), blue: at(blue), white: at(white) }.convert(path, &mut rgba);
     }
     let window = image.attributes.display_window;
     let alpha = find_channel(layer, &prefix, "A").is_some();

@@ -7,12 +7,14 @@ use crate::file_format;
 mod cache_file;
 mod exr_file;
 mod png_file;
+mod primaries;
 mod whole_file;
 
 pub(crate) use cache_file::keep_file;
 pub(crate) use exr_file::parse_exr;
 pub use exr_file::{ExrHeader, write_exr};
 pub use png_file::write_png;
+pub(crate) use primaries::Primaries;
 pub use whole_file::{check_all_writable, check_writable, write_whole};
 
 /// The file formats of a picture, told apart by the extension of the file's name.
