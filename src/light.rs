@@ -1,5 +1,5 @@
 //! What shading looks up of an environment, in memory: its filtered forms, and which of them the kernels of threads need.
-use crate::brdf::{LobeShape, MIN_COS_THETA_D};
+use crate::brdf::MIN_COS_THETA_D;
 use crate::environment::sources::{clear_of, clearance};
 use crate::environment::{Environment, Pyramid, VmfPyramid};
 use crate::memo::Keyed;
@@ -114,8 +114,9 @@ impl KernelNeeds {
     pub fn of(environment: &Environment, materials: &[WithThreads], rest: &VmfPyramid) -> Self {
         let finest_level = finest_level(rest);
         let sources = environment.small_sources();
-        let mirrors = |lobe: &LobeShape| {
-            let lobe_radius = (MIN_COS_THETA_D * lobe.radius_rad) as f32;
+        let mirrors = |(lobe, threads): &WithThreads| {
+            let radius = threads.map_or(lobe.radius_rad, |threads| threads.lobe_radius(lobe));
+            let lobe_radius = (MIN_COS_THETA_D * radius) as f32;
             let clear = clear_of(lobe.flank_rad as f32)[1];
             sources.leaves().any(|source| clearance(0.0, source.width_rad() as f32, lobe_radius) < clear)
         };
@@ -126,7 +127,7 @@ impl KernelNeeds {
         Self {
             map: materials.iter().any(|(_, threads)| is_sharp(*threads)),
             sources: environment.has_small_sources(),
-            mirrored_sources: materials.iter().any(|(lobe, _)| mirrors(lobe)),
+            mirrored_sources: materials.iter().any(mirrors),
         }
     }
 

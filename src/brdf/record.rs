@@ -48,7 +48,7 @@ pub struct MaterialRecord {
     pub shared_deviation: f32,
     /// [`LobeShape::flank_rad`].
     pub flank: f32,
-    /// [`LobeShape::radius_rad`].
+    /// [`LobeShape::radius_by`] its threads.
     pub lobe_radius: f32,
     /// The size of a structure in the buffer is a multiple of 16 bytes.
     pub padding: [u32; 3],

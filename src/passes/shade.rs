@@ -85,8 +85,8 @@ impl DeviceMaterials {
                 assert_eq!(own_threads.map(Threads::kind), Some(kind), "threads of method {}", method.name());
             }
             if let Some(own_threads) = own_threads {
+                record = own_threads.in_record(record, lobe);
                 [record.threads, record.subpixel_threads] = threads.add(own_threads);
-                record.shared_deviation = own_threads.shared_deviation(lobe) as f32;
             }
             record.first_slice = slices.len() as u32;
             if let Some(table) = own_slices {

@@ -179,9 +179,9 @@ impl<'a> CpuShader<'a> {
             false => Ok(None),
             true => Ok(Some((*round.ask(&Tabulate(&material.brdf))?).clone())),
         };
-        let record = |material: &PreparedMaterial| MaterialRecord {
-            shared_deviation: material.shared_deviation() as f32,
-            ..MaterialRecord::new(&material.brdf, &material.lobe)
+        let record = |material: &PreparedMaterial| {
+            let record = MaterialRecord::new(&material.brdf, &material.lobe);
+            material.threads.as_deref().map_or(record, |threads| threads.in_record(record, &material.lobe))
         };
         let split_sums = where_needed(lookups.split_sum).map(|material| round.ask(&FitSplitSum(&material.brdf)));
         Ok(Self {

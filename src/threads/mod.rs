@@ -16,7 +16,7 @@ use std::f64::consts::FRAC_PI_2;
 
 use glam::DVec3;
 
-use crate::brdf::{Brdf, LobeShape, luminance};
+use crate::brdf::{Brdf, LobeShape, MaterialRecord, luminance};
 use crate::error::{Error, Result};
 use crate::progress::Observer;
 
@@ -126,6 +126,18 @@ impl Threads {
     /// one and the view is along the normals: 0 if they do so only where they are nearly flat.
     pub fn shared_deviation(&self, lobe: &LobeShape) -> f64 {
         self.fitted().map_or(0.0, |table| fitted::shared_deviation(lobe, table))
+    }
+
+    /// [`LobeShape::radius_by`] these threads.
+    pub fn lobe_radius(&self, lobe: &LobeShape) -> f64 {
+        self.fitted().map_or(lobe.radius_rad, |table| lobe.radius_by(table.count))
+    }
+
+    /// The record of a BRDF of this lobe, with what shading by these threads goes by.
+    pub fn in_record(&self, record: MaterialRecord, lobe: &LobeShape) -> MaterialRecord {
+        let [shared_deviation, lobe_radius] =
+            [self.shared_deviation(lobe), self.lobe_radius(lobe)].map(|value| value as f32);
+        MaterialRecord { shared_deviation, lobe_radius, ..record }
     }
 
     /// These, if they are kernels: fitted, or Gaussians.
