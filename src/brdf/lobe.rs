@@ -195,8 +195,7 @@ mod tests {
     /// Those of two-layer-gold and of chrome of the MERL database.
     #[test]
     fn many_kernels_go_by_the_cusp_on_a_wide_lobe_and_few_by_the_lobe() {
-        let plain =
-            LobeShape::of(&Brdf::from_parameters("lambert", &"reflectance = [1, 1, 1]".parse().unwrap()).unwrap());
+        let plain = LobeShape::of(&Brdf::from_parameters("lambert", "reflectance = 0.5".parse().unwrap()).unwrap());
         let gold = LobeShape { width_rad: 0.0003, radius_rad: 0.0646, ..plain };
         assert_eq!([16, 64].map(|count| gold.radius_by(count)), [0.0646, 0.0003]);
         let chrome = LobeShape { width_rad: 0.0005, radius_rad: 0.0028, ..plain };
