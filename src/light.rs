@@ -1,10 +1,10 @@
 //! What shading looks up of an environment, in memory: its filtered forms, and which of them the kernels of threads need.
 use crate::brdf::MIN_COS_THETA_D;
-use crate::environment::sources::{clear_of, clearance};
+use crate::environment::sources::clearance;
 use crate::environment::{Environment, Pyramid, VmfPyramid};
 use crate::memo::Keyed;
 use crate::threads::fitted::kernel::FINEST_WIDTH_RAD;
-use crate::threads::{FittedTable, Threads, WithThreads};
+use crate::threads::{FittedTable, GivingWay, Threads, WithThreads};
 
 /// What a method looks up of an environment, as far as it has to be filtered.
 #[derive(Clone, Default)]
@@ -115,10 +115,11 @@ impl KernelNeeds {
         let finest_level = finest_level(rest);
         let sources = environment.small_sources();
         let mirrors = |(lobe, threads): &WithThreads| {
-            let radius = threads.map_or(lobe.radius_rad, |threads| threads.lobe_radius(lobe));
-            let lobe_radius = (MIN_COS_THETA_D * radius) as f32;
-            let clear = clear_of(lobe.flank_rad as f32)[1];
-            sources.leaves().any(|source| clearance(0.0, source.width_rad() as f32, lobe_radius) < clear)
+            let giving_way = threads.and_then(|threads| threads.giving_way(lobe));
+            giving_way.is_some_and(|GivingWay { lobe_radius_rad, clear: [_, clear] }| {
+                let lobe_radius = (MIN_COS_THETA_D * lobe_radius_rad) as f32;
+                sources.leaves().any(|source| clearance(0.0, source.width_rad() as f32, lobe_radius) < clear)
+            })
         };
         let is_sharp = |threads: Option<&Threads>| {
             let mut tables = threads.and_then(Threads::fitted).into_iter().flat_map(FittedTable::tables);

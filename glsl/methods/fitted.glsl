@@ -45,7 +45,7 @@ float clearance(float away, float source_width, float lobe_radius) {
     return (away + 4.0 * 2.6 * lobe_radius) / (2.0 * source_width);
 }
 
-// Above this clearance 2 x 2 points of a source do. It is no less than what clear_of has, above which all are alike to share_of_brdf.
+// Above this clearance 2 x 2 points of a source do. No material has a larger one in `clear`, above which all are alike to share_of_brdf.
 const float FAR = 4.0;
 
 // Above this one its middle does: tails of Gaussian lobes go on falling steeply.
@@ -98,16 +98,10 @@ uint descend(uint s, Lobe lobe, Surface surface, Material material, float least_
     return s;
 }
 
-// Between which clearances kernels give way to the BRDF. Twin, which says why: src/environment/sources.rs.
-vec2 clear_of(float flank) {
-    return flank > 0.0 ? vec2(2.5, 4.0) : vec2(1.25, 2.5);
-}
-
 // How much of the answer to sources is the BRDF's, where this is the least clearance of one: the rest is the kernels', which fit best
 // where the mirrored view is (F29).
-float share_of_brdf(float least_clearance, Lobe lobe) {
-    vec2 clear = clear_of(lobe.flank);
-    return smoothstep(clear.x, clear.y, least_clearance);
+float share_of_brdf(float least_clearance, Material material) {
+    return smoothstep(material.clear.x, material.clear.y, least_clearance);
 }
 
 // The least clearance of all sources, of which there is at least one.
@@ -141,7 +135,7 @@ bool needs_subpixels(Surface surface, Material material) {
     Lobe lobe = lobe_of(surface, material);
     // Normals mirrored turn twice as far; three standard deviations of that.
     return deviation > max(min(material.lobe_width, NEARLY_FLAT_RAD), material.shared_deviation * lobe.w_o.z)
-        || HAS_SOURCES != 0 && share_of_brdf(least_clearance(lobe, surface, material, 3.0 * 2.0 * deviation), lobe) < 1.0;
+        || HAS_SOURCES != 0 && share_of_brdf(least_clearance(lobe, surface, material, 3.0 * 2.0 * deviation), material) < 1.0;
 }
 
 // What all sources are to a surface.
@@ -353,7 +347,7 @@ vec3 estimate(Surface surface, Material material, uint first, uint stride) {
         Lobe lobe = lobe_of(surface, material);
         at = at_sources(surface, material, lobe);
         if (HAS_MIRRORED_SOURCES != 0) {
-            of_kernels = 1.0 - share_of_brdf(at.least_clearance, lobe);
+            of_kernels = 1.0 - share_of_brdf(at.least_clearance, material);
         }
     }
     k = first;

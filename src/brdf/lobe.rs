@@ -69,21 +69,7 @@ impl LobeShape {
         let radius_rad = if width_rad < WIDEST_CUSP_RAD { lobe_radius(brdf, 0.0) } else { width_rad };
         Self { is_isotropic, width_rad, narrowness, long_axis, radius_rad, flank_rad }
     }
-
-    /// The radius that shading by so many kernels goes by: few have none for a cusp on a wide lobe, and many do.
-    pub fn radius_by(&self, kernel_count: usize) -> f64 {
-        if kernel_count >= MANY_KERNELS && self.radius_rad > WIDE_UNDER_CUSP_RAD {
-            self.width_rad
-        } else {
-            self.radius_rad
-        }
-    }
 }
-
-/// Measured on all tables of MERL with a cusp: with 24 kernels the cusps of the three wide lobes are fitted, with 16 they are not.
-const MANY_KERNELS: usize = 24;
-/// Cusps on narrower lobes are so much like the lobe that points of a lamp do for both: with 64 kernels, too, these err less by its radius.
-const WIDE_UNDER_CUSP_RAD: f64 = 0.005;
 
 /// Narrower lobes may be a cusp of little energy, as many measured tables have it, on the lobe itself.
 const WIDEST_CUSP_RAD: f64 = 0.004;
@@ -190,16 +176,6 @@ mod tests {
         assert!((0.3..1.0).contains(&(plastic / 0.05)), "{plastic}");
         let lambert = Brdf::from_parameters("lambert", "reflectance = 0.5".parse().unwrap()).unwrap();
         assert_eq!((half_vector_width(&lambert), lobe_radius(&lambert, 0.0)), (FRAC_PI_2, FRAC_PI_2));
-    }
-
-    /// Those of two-layer-gold and of chrome of the MERL database.
-    #[test]
-    fn many_kernels_go_by_the_cusp_on_a_wide_lobe_and_few_by_the_lobe() {
-        let plain = LobeShape::of(&Brdf::from_parameters("lambert", "reflectance = 0.5".parse().unwrap()).unwrap());
-        let gold = LobeShape { width_rad: 0.0003, radius_rad: 0.0646, ..plain };
-        assert_eq!([16, 64].map(|count| gold.radius_by(count)), [0.0646, 0.0003]);
-        let chrome = LobeShape { width_rad: 0.0005, radius_rad: 0.0028, ..plain };
-        assert_eq!([16, 64].map(|count| chrome.radius_by(count)), [0.0028; 2]);
     }
 
     #[test]

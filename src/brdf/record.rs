@@ -48,10 +48,12 @@ pub struct MaterialRecord {
     pub shared_deviation: f32,
     /// [`LobeShape::flank_rad`].
     pub flank: f32,
-    /// [`LobeShape::radius_by`] its threads.
+    /// [`GivingWay::clear`](crate::threads::GivingWay::clear) of its threads.
+    pub clear: [f32; 2],
+    /// [`GivingWay::lobe_radius_rad`](crate::threads::GivingWay::lobe_radius_rad) of its threads.
     pub lobe_radius: f32,
     /// The size of a structure in the buffer is a multiple of 16 bytes.
-    pub padding: [u32; 3],
+    pub padding: u32,
 }
 
 impl MaterialRecord {
@@ -68,8 +70,9 @@ impl MaterialRecord {
             subpixel_threads: ThreadTableRecord::NONE,
             shared_deviation: 0.0,
             flank: lobe.flank_rad as f32,
-            lobe_radius: lobe.radius_rad as f32,
-            padding: [0; 3],
+            clear: [0.0; 2],
+            lobe_radius: 0.0,
+            padding: 0,
         }
     }
 

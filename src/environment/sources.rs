@@ -23,15 +23,6 @@ const LEAST_SHARE: f64 = 0.001;
 /// a measured table, of a degree and more, is left out.
 const WIDEST_RAD: f64 = 0.006;
 
-/// Between which values of [`clearance`] what kernels make of a source gives way to the BRDF, of a lobe with this
-/// [`LobeShape::flank_rad`](crate::brdf::LobeShape::flank_rad). Twin of `clear_of` in glsl/methods/fitted.glsl.
-///
-/// Measured: earlier, rims of mirrored lamps are off in mirrors; later, lamps are in glossy plastics, of which few kernels know less. Steep
-/// flanks show the edges of lamps, which kernels know better than squares in the place of parts.
-pub fn clear_of(flank: f32) -> [f32; 2] {
-    if flank > 0.0 { [2.5, 4.0] } else { [1.25, 2.5] }
-}
-
 /// How far a source `away` from the mirrored view is from where the BRDF cannot be taken at a few points of it, because it is mirrored
 /// towards the eye and wider than the lobe; in units of two standard deviations, `source_width`, of the source. All in radians.
 /// Twin of `clearance` in glsl/methods/fitted.glsl.

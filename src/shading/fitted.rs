@@ -5,7 +5,7 @@ use glam::{IVec2, Vec2, Vec3};
 
 use super::{CpuShader, Point, Surface, smoothstep, turned};
 use crate::brdf::MIN_COS_THETA_D;
-use crate::environment::sources::{clear_of, clearance};
+use crate::environment::sources::clearance;
 use crate::environment::{LightMap, SourceRecord};
 use crate::light::{BlurredLight, finest_level};
 use crate::packing::stereographic_decode;
@@ -146,7 +146,7 @@ impl<'a> Lobe<'a> {
 
 /// Twin of `share_of_brdf`.
 fn share_of_brdf(least_clearance: f32, lobe: &Lobe) -> f32 {
-    smoothstep(clear_of(lobe.flank), least_clearance)
+    smoothstep(lobe.point.record().clear, least_clearance)
 }
 
 /// Twin of `needs_subpixels`.

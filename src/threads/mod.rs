@@ -37,7 +37,7 @@ mod table;
 pub(crate) mod test_materials;
 
 pub use file::{FORMAT_VERSION, parse, read, write};
-pub use fitted::FittedTable;
+pub use fitted::{FittedTable, GivingWay};
 pub use plot::plot;
 
 pub use slice_table::SliceTable;
@@ -128,16 +128,16 @@ impl Threads {
         self.fitted().map_or(0.0, |table| fitted::shared_deviation(lobe, table))
     }
 
-    /// [`LobeShape::radius_by`] these threads.
-    pub fn lobe_radius(&self, lobe: &LobeShape) -> f64 {
-        self.fitted().map_or(lobe.radius_rad, |table| lobe.radius_by(table.count))
+    /// Where these, if they are kernels of a BRDF of this lobe, give way to the BRDF beside small bright lights.
+    pub fn giving_way(&self, lobe: &LobeShape) -> Option<GivingWay> {
+        self.fitted().map(|table| GivingWay::of(lobe, table))
     }
 
     /// The record of a BRDF of this lobe, with what shading by these threads goes by.
     pub fn in_record(&self, record: MaterialRecord, lobe: &LobeShape) -> MaterialRecord {
-        let [shared_deviation, lobe_radius] =
-            [self.shared_deviation(lobe), self.lobe_radius(lobe)].map(|value| value as f32);
-        MaterialRecord { shared_deviation, lobe_radius, ..record }
+        let Some(GivingWay { lobe_radius_rad, clear }) = self.giving_way(lobe) else { return record };
+        let shared_deviation = self.shared_deviation(lobe) as f32;
+        MaterialRecord { shared_deviation, lobe_radius: lobe_radius_rad as f32, clear, ..record }
     }
 
     /// These, if they are kernels: fitted, or Gaussians.

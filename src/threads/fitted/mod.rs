@@ -20,6 +20,7 @@ mod directions;
 mod draft;
 mod edit;
 mod generate;
+mod giving_way;
 pub mod kernel;
 pub mod lights;
 mod sets;
@@ -31,6 +32,7 @@ mod validate;
 
 pub use draft::draft;
 pub use generate::generate;
+pub use giving_way::GivingWay;
 pub use sets::NEARLY_FLAT_RAD;
 pub(super) use sets::{set_count, shared_deviation};
 pub use table::{FittedTable, PackedKernel, UnpackedKernel, UsedThreads};
