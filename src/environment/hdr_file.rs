@@ -61,8 +61,12 @@ mod tests {
     #[test]
     fn primaries_of_the_header_count_where_it_names_any() {
         let plain = read("GAMMA=1");
-        for line in ["PRIMARIES=0 0 0 0 0 0 0 0", "PRIMARIES=0.64 0.33", "PRIMARIES=a b", "PRIMARIES=.64 .33 .3 .6 .15 .06 .3127 .329"]
-        {
+        for line in [
+            "PRIMARIES=0 0 0 0 0 0 0 0",
+            "PRIMARIES=0.64 0.33",
+            "PRIMARIES=a b",
+            "PRIMARIES=.64 .33 .3 .6 .15 .06 .3127 .329",
+        ] {
             assert_eq!(read(line), plain, "{line}");
         }
         // Those of Rec. 2020, and its published matrix to Rec. 709 (ITU-R BT.2087-0), which have the same white.

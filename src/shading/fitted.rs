@@ -183,7 +183,12 @@ impl Points {
     fn on_square(side: i32, sets: bool) -> Self {
         let last = Vec2::splat(0.5 * (side - 1) as f32);
         if side == 3 && !sets {
-            return Self { last, between: (3.0 * 0.6_f32).sqrt(), weight: Vec2::new(4.0, -1.5) / 9.0, is_stairs: false };
+            return Self {
+                last,
+                between: (3.0 * 0.6_f32).sqrt(),
+                weight: Vec2::new(4.0, -1.5) / 9.0,
+                is_stairs: false,
+            };
         }
         let between = if side == 2 && !sets { 2.0 } else { 12.0_f32.sqrt() / side as f32 };
         Self { last, between, weight: Vec2::new(1.0 / side as f32, 0.0), is_stairs: false }
