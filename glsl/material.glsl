@@ -21,8 +21,8 @@ struct Material {
     ThreadTable subpixel_threads; // of each sub-pixel of another pixel
     float shared_deviation; // of normals, up to which sub-pixels share one sum where the view is along them: src/threads/fitted/sets.rs
     float flank;       // flank_rad in src/brdf/lobe.rs
-    vec2 clear;        // src/threads/fitted/giving_way.rs
-    float lobe_radius; // the same
+    vec2 clear;        // that of its threads: src/threads/fitted/giving_way.rs
+    float lobe_radius; // lobe_radius_rad there
 };
 
 layout(set = 0, binding = 5, std430) readonly buffer Materials {

@@ -98,12 +98,12 @@ fn every_estimator_agrees_with_its_cpu_twin() {
     gpu.finish();
 }
 
-/// By which part of it a pixel may differ from that of the CPU: half of them, and 95 %.
-fn bounds(gpu: &Validated) -> (f32, f32) {
+/// By which part of it a pixel may differ from that of the CPU: half of them, and 95 %. `inexact` is what the functions of other CPU drivers
+/// than lavapipe cost.
+fn bounds(gpu: &Validated, inexact: (f32, f32)) -> (f32, f32) {
     match (gpu.has_exact_functions(), gpu.has_exact_lookups()) {
         (true, _) => (1e-4, 1e-3),
-        // SwiftShader: 3.3e-4 and 3.5e-3 for the narrowest lobe, 2e-4 and 1.6e-3 at most for others.
-        (false, true) => (4e-4, 4e-3),
+        (false, true) => inexact,
         // An NVIDIA H200: 5.4e-4 and 2.3e-3.
         (false, false) => (1e-3, 5e-3),
     }
@@ -128,7 +128,8 @@ fn compare_with_twin(gpu: &Validated, cpu: &Memo, scene: &Scene, name: &str) {
     differences.sort_by(f32::total_cmp);
     let (median, most) = (differences[differences.len() / 2], differences[differences.len() * 19 / 20]);
     println!("{name}: {} pixels, median {median:.1e}, 95 % below {most:.1e}", differences.len());
-    let bounds = bounds(gpu);
+    // SwiftShader: 2e-4 and 1.6e-3 at most.
+    let bounds = bounds(gpu, (4e-4, 3e-3));
     assert!(median < bounds.0 && most < bounds.1, "{name}: {median} {most}");
 }
 
@@ -191,7 +192,8 @@ fn anisotropic_models_are_the_same_in_glsl() {
         differences.sort_by(f32::total_cmp);
         let [median, most] = [differences[differences.len() / 2], differences[differences.len() * 19 / 20]];
         println!("{text:?}: {} pixels, median {median:.1e}, 95 % below {most:.1e}", differences.len());
-        let bounds = bounds(&gpu);
+        // SwiftShader: 3.3e-4 and 3.5e-3 for the narrowest lobe.
+        let bounds = bounds(&gpu, (4e-4, 4e-3));
         assert!(differences.len() > 100 && median < bounds.0 && most < bounds.1, "{text}: {median} {most}");
     }
     gpu.finish();

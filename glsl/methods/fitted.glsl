@@ -202,16 +202,13 @@ void add_source(inout AtSources sum, Source source, float clear, Surface surface
     // Four steps up.
     bool is_low = clear > FAR && lowest < (side == 1 ? LOW_DEVIATIONS * deviation : LOW_COSINE);
     Points points;
-    float steps = float(side);
     if (is_low) {
-        // Light straight above has no slope.
         // Light straight above has no slope; 1e-6 is far below the deviation of any other.
         vec2 up = slope / max(deviation, 1e-6);
         vec3 to_side = up.x * y - up.y * x;
         x = up.x * x + up.y * y;
         y = to_side;
         points = points_on_stairs();
-        steps = 4.0;
     } else {
         points = points_on_square(side, lowest < 0.0);
         // Light sets by the angle of normals, not by twice as much.
@@ -220,11 +217,12 @@ void add_source(inout AtSources sum, Source source, float clear, Surface surface
             y = within_pixel(y, surface);
         }
     }
-    float part_deviation = deviation / steps;
+    float part_deviation = deviation / (2.0 * points.last.x + 1.0);
     vec2 place = -points.last;
     do {
         vec2 at = points.between * place;
         if (points.is_stairs) {
+            // 1 at the ends, -1 between.
             at.y = place.x * place.x - 1.25;
         }
         vec2 weights = points.weight.x + points.weight.y * abs(place);

@@ -25,15 +25,14 @@ fn parse(path: &Path, bytes: &[u8]) -> Result<Environment> {
     let (width, height) = decoder.dimensions();
     output::check_pixels(path, [u64::from(width) * u64::from(height)], bytes.len(), MAX_PIXELS_PER_BYTE)?;
     let metadata = decoder.metadata();
-    let mut pixels = DynamicImage::from_decoder(decoder).map_err(broken)?.into_rgba32f();
-    let (texels, _) = pixels.as_chunks_mut();
+    let picture = DynamicImage::from_decoder(decoder).map_err(broken)?.into_rgb32f();
+    let mut texels: Vec<_> = picture.pixels().map(|pixel| pixel.0).collect();
     if let Some(primaries) = primaries(&metadata) {
-        primaries.convert(path, texels);
+        primaries.convert(path, &mut texels);
     }
     if let Some(exposure) = metadata.exposure.filter(|exposure| *exposure != 1.0) {
         tracing::warn!("{}: its EXPOSURE of {exposure} is not divided out; intensity can do that", path.display());
     }
-    let texels = texels.iter().map(|&[r, g, b, _]| [r, g, b]).collect();
     Environment::of_file(path, width as usize, height as usize, texels)
 }
 

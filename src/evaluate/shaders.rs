@@ -60,18 +60,20 @@ pub fn run(
     observer: &dyn Observer,
     costs: &mut Vec<ShaderCost>,
 ) -> Result<()> {
-    for has_tangents in [false, true] {
-        let [vertex, fragment] = geometry_shaders(has_tangents);
-        let made = device.compile_graphics(vertex, fragment, &GEOMETRY_STATE)?;
-        let of_cache = [vertex, fragment].into_iter().zip(made);
-        costs.extend(of_cache.map(|(shader, made)| ShaderCost::new(shader, "any", Vec::new(), made)));
-    }
-    let mut add = |shader, compiled_for, constants: Vec<_>| {
-        let made = device.compile(shader, &constants)?;
-        costs.push(ShaderCost::new(shader, compiled_for, constants, made));
+    let mut add = |made: Vec<ShaderCost>| {
+        costs.extend(made);
         observer.check()
     };
-    add(&compiled::BARE_LOOKUPS, "any", Vec::new())?;
+    let geometry = |compiled_for, has_tangents| -> Result<Vec<_>> {
+        let [vertex, fragment] = geometry_shaders(has_tangents);
+        let made = [vertex, fragment].into_iter().zip(device.compile_graphics(vertex, fragment, &GEOMETRY_STATE)?);
+        Ok(made.map(|(shader, made)| ShaderCost::new(shader, compiled_for, Vec::new(), made)).collect())
+    };
+    let compute = |shader, compiled_for, constants: Vec<_>| -> Result<Vec<_>> {
+        let made = device.compile(shader, &constants)?;
+        Ok(vec![ShaderCost::new(shader, compiled_for, constants, made)])
+    };
+    add(compute(&compiled::BARE_LOOKUPS, "any", Vec::new())?)?;
     for (index, &method) in methods.iter().enumerate() {
         let mut scene = scene.clone();
         scene.shading.method = method.name().to_owned();
@@ -86,17 +88,19 @@ pub fn run(
             shaders.constants[0].iter().copied().filter(|(name, _)| ["SUBPIXELS", "FIXED_PATTERN"].contains(name));
         let of_any = of_any.chain([("HAS_TANGENTS", 1)]).collect();
         if index == 0 {
-            add(&compiled::CLASSIFY, "scene", classify_constants(&prepared, shaders.constants.len()))?;
+            add(geometry("scene", prepared.has_tangents())?)?;
+            add(geometry("any", true)?)?;
+            add(compute(&compiled::CLASSIFY, "scene", classify_constants(&prepared, shaders.constants.len()))?)?;
         }
         for constants in shaders.constants {
-            add(shader, "scene", constants)?;
+            add(compute(shader, "scene", constants)?)?;
         }
-        add(shader, "any", of_any)?;
+        add(compute(shader, "any", of_any)?)?;
     }
     if scene.image.background == Background::Environment {
-        add(&compiled::BACKGROUND, "any", Vec::new())?;
+        add(compute(&compiled::BACKGROUND, "any", Vec::new())?)?;
     }
-    add(&compiled::TONE_MAP, "any", Vec::new())
+    add(compute(&compiled::TONE_MAP, "any", Vec::new())?)
 }
 
 /// The shaders that a rendering of `prepared` compiles.

@@ -182,7 +182,8 @@ pub fn parse_exr(path: &Path, bytes: &[u8]) -> Result<PictureFile> {
         image.attributes.chromaticities.filter(|_| names[0] == "R")
     {
         let at = |of: Vec2<f32>| [of.0, of.1];
-        Primaries { red: at(red), green: at(green), blue: at(blue), white: at(white) }.convert(path, &mut rgba);
+        Primaries { red: at(red), green: at(green), blue: at(blue), white: at(white) }
+            .convert(path, rgba.iter_mut().map(|[colour @ .., _]| colour));
     }
     let window = image.attributes.display_window;
     let alpha = find_channel(layer, &prefix, "A").is_some();
@@ -266,12 +267,13 @@ mod tests {
     use exr::prelude::SpecificChannels;
 
     /// The picture that an EXR of 2 x 1 pixels, the first at (3, -1), shows in a window of this place and size.
-    fn shown(position: (i32, i32), size: (usize, usize)) -> PictureFile {
+    fn shown(position: (i32, i32), size: (usize, usize), chromaticities: Option<Chromaticities>) -> PictureFile {
         let attributes = LayerAttributes { layer_position: Vec2(3, -1), ..LayerAttributes::default() };
         let colours = SpecificChannels::rgba(|Vec2(x, _): Vec2<usize>| (1.0 + x as f32, 0.5, 0.25, 0.75_f32));
         let layer = Layer::new((2, 1), attributes, Encoding::UNCOMPRESSED, colours);
         let mut image = Image::from_layer(layer);
         image.attributes.display_window = IntegerBounds::new(position, size);
+        image.attributes.chromaticities = chromaticities;
         let mut bytes = Cursor::new(Vec::new());
         image.write().to_buffered(&mut bytes).unwrap();
         parse_exr(Path::new("test.exr"), &bytes.into_inner()).unwrap()
@@ -287,9 +289,19 @@ mod tests {
             ((4, -1), (2, 1), vec![second, nothing]),
             ((-5, 7), (2, 1), vec![nothing; 2]),
         ] {
-            let picture = shown(position, size);
+            let picture = shown(position, size, None);
             assert_eq!((picture.width as usize, picture.height as usize), size);
             assert_eq!(picture.rgba, rgba, "{position:?} {size:?}");
         }
+    }
+
+    #[test]
+    fn colours_of_other_primaries_are_converted_and_alpha_is_not() {
+        let red = Vec2(0.713, 0.293);
+        let (green, blue, white) = (Vec2(0.165, 0.830), Vec2(0.128, 0.044), Vec2(0.32168, 0.33767));
+        let picture = shown((3, -1), (1, 1), Some(Chromaticities { red, green, blue, white }));
+        // ACEScg's published matrix times (1, 0.5, 0.25).
+        let expected = [1.37334, 0.43750, 0.19976, 0.75];
+        assert!(picture.rgba[0].iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-3), "{:?}", picture.rgba);
     }
 }

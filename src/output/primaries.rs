@@ -25,17 +25,17 @@ impl Primaries {
 
     /// Makes `pixels` of these primaries, from the file at `path`, ones of Rec. 709, with white as white (by Bradford's adaptation).
     /// Where a colour that is not negative leaves Rec. 709, it is cut off at 0. Primaries that make no colours are warned of.
-    pub fn convert(self, path: &Path, pixels: &mut [[f32; 4]]) {
+    pub fn convert<'a>(self, path: &Path, pixels: impl IntoIterator<Item = &'a mut [f32; 3]>) {
         if self.is_rec_709() {
             return;
         }
         let Some(matrix) = self.to_rec_709() else {
-            tracing::warn!("{}: its primaries make no colours ({self:?}); it is taken for Rec. 709", path.display());
+            tracing::warn!("{}: its primaries make no colours; it is taken for Rec. 709", path.display());
             return;
         };
-        tracing::info!("{}: converted to Rec. 709 from {self:?}", path.display());
-        for [r, g, b, _] in pixels {
-            let colour = DVec3::new((*r).into(), (*g).into(), (*b).into());
+        tracing::info!("{}: converted to Rec. 709 from the primaries that it names", path.display());
+        for pixel in pixels {
+            let colour = DVec3::from_array(pixel.map(f64::from));
             // What is done about NaN and infinity is for whoever reads the picture.
             if !colour.is_finite() {
                 continue;
@@ -44,7 +44,7 @@ impl Primaries {
             if colour.min_element() >= 0.0 {
                 converted = converted.max(DVec3::ZERO);
             }
-            [*r, *g, *b] = converted.as_vec3().to_array();
+            *pixel = converted.as_vec3().to_array();
         }
     }
 
@@ -118,23 +118,23 @@ mod tests {
     #[test]
     fn white_stays_white_and_rec_709_stays_as_it_is_to_the_bit() {
         let path = Path::new("test.exr");
-        let before = [[0.1, 0.7, 3.0, 0.5], [f32::NAN, 1.0, -2.0, 1.0]];
+        let before = [[0.1, 0.7, 3.0], [f32::NAN, 1.0, -2.0]];
         let mut pixels = before;
         Primaries::REC_709.convert(path, &mut pixels);
         assert_eq!(pixels.map(|pixel| pixel.map(f32::to_bits)), before.map(|pixel| pixel.map(f32::to_bits)));
-        let mut white = [[2.0, 2.0, 2.0, 0.5]];
+        let mut white = [[2.0; 3]];
         ACES_CG.convert(path, &mut white);
-        assert!(white[0][..3].iter().all(|value| (value - 2.0).abs() < 1e-4) && white[0][3] == 0.5, "{white:?}");
+        assert!(white[0].iter().all(|value| (value - 2.0).abs() < 1e-4), "{white:?}");
     }
 
     #[test]
     fn colours_outside_are_cut_off_and_what_was_no_colour_is_left_to_the_reader() {
-        let mut pixels = [[0.0, 1.0, 0.0, 1.0], [0.0, -1.0, 0.0, 1.0], [f32::INFINITY, 0.0, 0.0, 1.0]];
+        let mut pixels = [[0.0, 1.0, 0.0], [0.0, -1.0, 0.0], [f32::INFINITY, 0.0, 0.0]];
         ACES_CG.convert(Path::new("test.exr"), &mut pixels);
         let [outside, negative, infinite] = pixels;
         assert!(outside[0] == 0.0 && outside[2] == 0.0 && (outside[1] - 1.1408).abs() < 1e-3, "{outside:?}");
         assert!(negative[0] > 0.0 && negative[1] < -1.0, "{negative:?}");
-        assert_eq!(infinite, [f32::INFINITY, 0.0, 0.0, 1.0]);
+        assert_eq!(infinite, [f32::INFINITY, 0.0, 0.0]);
     }
 
     #[test]
@@ -146,9 +146,9 @@ mod tests {
             Primaries { green: [f32::NAN, 0.8], ..ACES_CG },
             Primaries { green: ACES_CG.red, ..ACES_CG },
         ] {
-            let mut pixels = [[0.1, 0.7, 3.0, 0.5]];
+            let mut pixels = [[0.1, 0.7, 3.0]];
             of.convert(Path::new("test.exr"), &mut pixels);
-            assert_eq!(pixels, [[0.1, 0.7, 3.0, 0.5]], "{of:?}");
+            assert_eq!(pixels, [[0.1, 0.7, 3.0]], "{of:?}");
         }
     }
 }

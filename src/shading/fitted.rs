@@ -246,19 +246,20 @@ impl AtSources {
         };
         let lowest = middle.z - half_side;
         let is_low = clear > FAR && lowest < if side == 1 { LOW_DEVIATIONS * deviation } else { LOW_COSINE };
-        let (points, steps) = if is_low {
+        let points = if is_low {
             let up = slope / deviation.max(1e-6);
             [x, y] = [up.x * x + up.y * y, up.x * y - up.y * x];
-            (Points::on_stairs(), 4)
+            Points::on_stairs()
         } else {
             if lowest > 0.0 {
                 [x, y] = [x, y].map(|axis| within_pixel(axis, &point.surface));
             }
-            (Points::on_square(side, lowest < 0.0), side)
+            Points::on_square(side, lowest < 0.0)
         };
+        let part_deviation = deviation / (2.0 * points.last.x + 1.0);
         for (at, weight) in points.iter() {
             let w_i = (middle + at.x * x + at.y * y).normalize();
-            let [cos, above] = risen(w_i.z, deviation / steps as f32);
+            let [cos, above] = risen(w_i.z, part_deviation);
             if cos > 0.0 {
                 let power = weight * cos * source.power.truncate();
                 self.f_cos += power * point.brdf(w_i.with_z(above).normalize(), lobe.w_o);

@@ -7,7 +7,7 @@ use threadlight::low_level::memo::{Memo, Round};
 use threadlight::low_level::pipeline::{DeviceScene, Rendering, Wanted};
 use threadlight::low_level::prepare::{Prepared, prepare};
 use threadlight::low_level::scene::{MaterialSettings, MaterialSource, Scene, Source};
-use threadlight::low_level::vulkan::{Device, Instance, Messages};
+use threadlight::low_level::vulkan::{Device, DeviceKind, Instance, Messages};
 
 /// A device with validation on; `finish` fails the test if validation said anything, from first call to last.
 pub struct Validated {
@@ -41,7 +41,7 @@ impl Validated {
     /// Whether lookups weight texels by floats, as on the CPU. Vulkan promises as many bits as `subTexelPrecisionBits` and
     /// `mipmapPrecisionBits` say; GPUs have 8.
     pub fn has_exact_lookups(&self) -> bool {
-        ["llvmpipe", "SwiftShader"].iter().any(|name| self.device.description().driver.starts_with(name))
+        self.device.description().kind == DeviceKind::Cpu
     }
 
     pub fn render(&self, prepared: &Prepared, wanted: Wanted) -> Rendering {

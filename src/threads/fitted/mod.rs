@@ -13,6 +13,7 @@
 //! | of an edited BRDF, at once and coarsely | [`draft()`] |
 //! | what the edit does to all rows | `edit` |
 //! | what a fit leaves, under other lights | [`validation_error`] |
+//! | where kernels give way to the BRDF beside lamps | [`GivingWay`] |
 //! | as stored and looked up, 12 bytes a thread and row | [`FittedTable`] |
 pub mod answers;
 pub mod cells;
