@@ -4,16 +4,22 @@
 #include "bounded.glsl"
 #include "camera.glsl"
 #include "lat_long.glsl"
+#include "tiles.glsl"
 
-layout(local_size_x = 8, local_size_y = 8) in;
+layout(local_size_x = TILE_SIDE, local_size_y = TILE_SIDE) in;
 
+// Of pixels that see no surface at all, this pass writes the first value.
 layout(set = 0, binding = 0, rgba32f) uniform image2D radiance;
+layout(set = 0, binding = 2, std430) readonly buffer Coverage {
+    uvec4 coverage[];
+};
 layout(set = 0, binding = 1) uniform sampler2D environment_map;
 
 layout(push_constant) uniform Push {
     Camera camera;
     uvec2 size_px;
     vec2 rotation;        // cosine and sine of the environment's rotation about +Y
+    Region region;
     float radiance_scale; // radiance of a texel of value 1
 } push;
 
@@ -22,9 +28,16 @@ void main() {
     if (any(greaterThanEqual(uvec2(pixel), push.size_px))) {
         return;
     }
-    vec4 surface = imageLoad(radiance, pixel);
-    if (surface.a >= 1.0) {
+    uvec4 of_tile = uvec4(0);
+    if (is_in_region(push.region, gl_WorkGroupID.xy)) {
+        of_tile = coverage[gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x];
+    }
+    if (sees_only_surface(of_tile, gl_LocalInvocationIndex)) {
         return;
+    }
+    vec4 surface = vec4(0.0);
+    if (sees_surface(of_tile, gl_LocalInvocationIndex)) {
+        surface = imageLoad(radiance, pixel);
     }
     vec3 d = normalize(camera_ray(push.camera, (vec2(pixel) + 0.5) / vec2(push.size_px)));
     vec2 place = lat_long(turned_back(push.rotation, d));

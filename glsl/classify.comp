@@ -24,6 +24,10 @@ layout(set = 0, binding = 2, std430) writeonly buffer TileList {
 layout(set = 0, binding = 3, std430) writeonly buffer PixelList {
     uint pixels[];
 } pixel_list;
+// For each tile of the image what its pixels see.
+layout(set = 0, binding = 5, std430) writeonly buffer Coverage {
+    uvec4 coverage[];
+};
 // The shader of each material.
 layout(set = 0, binding = 4, std430) readonly buffer Shaders {
     uint shaders[];
@@ -31,6 +35,7 @@ layout(set = 0, binding = 4, std430) readonly buffer Shaders {
 
 layout(push_constant) uniform Push {
     uvec2 size_px;
+    uvec2 first_tile; // the tile of the first workgroup
     // Of normals along each of two axes, and of tangents around the normal, in rad^2: below both, sub-pixels are one smooth surface,
     vec2 smooth_variance;
     float cos_smooth; // if all their normals are also within this angle of the first one's
@@ -38,6 +43,7 @@ layout(push_constant) uniform Push {
 } push;
 
 shared uint listed[CLASSES];
+shared uint tile_coverage[4];
 shared uint covered_total;
 shared uint covered_edge_total;
 
@@ -54,8 +60,14 @@ uint first_slot(uint pixel_class) {
     return slot;
 }
 
+// Columns and rows of tiles of the image.
+uvec2 tile_counts() {
+    return (push.size_px + TILE_SIDE - 1) / TILE_SIDE;
+}
+
 uint this_tile() {
-    return gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
+    uvec2 tile = push.first_tile + gl_WorkGroupID.xy;
+    return tile.y * tile_counts().x + tile.x;
 }
 
 void list_pixel(uint slot) {
@@ -66,13 +78,16 @@ void main() {
     if (gl_LocalInvocationIndex < CLASSES) {
         listed[gl_LocalInvocationIndex] = 0;
     }
+    if (gl_LocalInvocationIndex < 4) {
+        tile_coverage[gl_LocalInvocationIndex] = 0;
+    }
     if (gl_LocalInvocationIndex == 0) {
         covered_total = 0;
         covered_edge_total = 0;
     }
     barrier();
 
-    uvec2 pixel = gl_GlobalInvocationID.xy;
+    uvec2 pixel = push.first_tile * TILE_SIDE + gl_GlobalInvocationID.xy;
     bool inside = all(lessThan(pixel, push.size_px));
     uint covered = 0;
     uint shader = 0;
@@ -116,6 +131,11 @@ void main() {
         if (CLASSES == 2) {
             list_pixel(kind == INTERIOR ? place : TILE_PIXELS - 1 - place);
         }
+        uvec2 bit = coverage_bit(gl_LocalInvocationIndex);
+        atomicOr(tile_coverage[bit.x], bit.y);
+        if (covered == SUBPIXELS * SUBPIXELS) {
+            atomicOr(tile_coverage[2 + bit.x], bit.y);
+        }
         atomicAdd(covered_total, covered);
         if (kind == EDGE) {
             atomicAdd(covered_edge_total, covered);
@@ -126,10 +146,13 @@ void main() {
     if (CLASSES != 2 && covered > 0) {
         list_pixel(first_slot(pixel_class) + place);
     }
+    if (gl_LocalInvocationIndex == 0) {
+        coverage[this_tile()] = uvec4(tile_coverage[0], tile_coverage[1], tile_coverage[2], tile_coverage[3]);
+    }
     uint k = gl_LocalInvocationIndex;
     if (k < CLASSES && listed[k] > 0) {
         uint tile_place = atomicAdd(counters.classes[k].tile_count, 1);
-        uint tile_count = gl_NumWorkGroups.x * gl_NumWorkGroups.y;
+        uint tile_count = tile_counts().x * tile_counts().y;
         tile_list.tiles[k * tile_count + tile_place] = pack_tile(this_tile(), first_slot(k), listed[k]);
         atomicMax(counters.classes[k].groups_x, min(tile_place + 1, MAX_GROUPS));
         atomicMax(counters.classes[k].groups_y, 1);

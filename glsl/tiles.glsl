@@ -1,4 +1,4 @@
-// The tiles to shade, shared by the pass that lists them and the one that consumes them.
+// The tiles to shade, shared by the pass that lists them and those that go by that.
 // Twin of the layout: src/passes/classify.rs.
 //
 // Pixels are packed tile by tile rather than over the whole image: then the pixels of one workgroup of the shade pass are
@@ -55,4 +55,29 @@ uint tile_first_slot(uvec2 packed) {
 
 uint tile_pixel_count(uvec2 packed) {
     return packed.y >> 8;
+}
+
+// The tiles that may see a surface, those of columns and rows from the first to before the end; only these are drawn and sorted.
+struct Region {
+    uvec2 first_tile;
+    uvec2 end_tile;
+};
+
+bool is_in_region(Region region, uvec2 tile) {
+    return all(greaterThanEqual(tile, region.first_tile)) && all(lessThan(tile, region.end_tile));
+}
+
+// What the pixels of a tile see, a bit each: xy of any surface, zw of nothing else. Which word of the two the bit of pixel `place` is in, and it.
+uvec2 coverage_bit(uint place) {
+    return uvec2(place / 32u, 1u << (place % 32u));
+}
+
+bool sees_surface(uvec4 coverage, uint place) {
+    uvec2 bit = coverage_bit(place);
+    return (coverage[bit.x] & bit.y) != 0u;
+}
+
+bool sees_only_surface(uvec4 coverage, uint place) {
+    uvec2 bit = coverage_bit(place);
+    return (coverage[2u + bit.x] & bit.y) != 0u;
 }

@@ -1,6 +1,7 @@
 //! Threadlight's command line: parse, call, exit code.
 //!
-//! Exit codes: 0 done; 1 the machine could not (Vulkan, memory, validation messages); 2 the input was wrong;
+//! Exit codes: 0 done; 1 the machine could not (Vulkan, memory, validation messages), or pictures differ by more than they may
+//! (`compare --at-most`); 2 the input was wrong;
 //! 130 cancelled by Ctrl-C. Whatever went wrong is one line on standard error.
 
 mod cli;

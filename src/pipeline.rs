@@ -27,14 +27,16 @@ pub struct Wanted {
 }
 
 /// The frame: pass 1 and pass 2 of the paper and what surrounds them.
-pub(crate) fn declare<'a>(graph: &mut FrameGraph<'a>, renderer: &'a DeviceScene, view: &'a View) -> Frame {
-    let geometry = geometry_cache(graph, &renderer.geometry_cache, view); // pass 1 of the paper
-    let tiles = classify(graph, &renderer.classify, geometry, view);
+pub(crate) fn declare<'a>(
+    graph: &mut FrameGraph<'a>,
+    renderer: &'a DeviceScene,
+    region: Region,
+    view: &'a View,
+) -> Frame {
+    let geometry = geometry_cache(graph, &renderer.geometry_cache, region, view); // pass 1 of the paper
+    let tiles = classify(graph, &renderer.classify, geometry, region, view);
     let Shaded { radiance, lookups } = shade(graph, &renderer.shade, geometry, &tiles, view); // pass 2 of the paper
-    let radiance = match &renderer.background {
-        Some(of) => background(graph, of, radiance, view),
-        None => radiance,
-    };
+    let radiance = background(graph, &renderer.background, radiance, &tiles, view);
     let display = tone_map(graph, &renderer.tone_map, radiance, view);
     Frame { geometry, counters: tiles.counters, lookups, radiance, display }
 }
@@ -56,7 +58,7 @@ pub struct DeviceScene {
     geometry_cache: GeometryCache,
     classify: Classify,
     shade: Shade,
-    background: Option<Background>,
+    background: Background,
     tone_map: ToneMap,
     way_around: Option<WayAround>,
     device: Arc<Device>,
@@ -116,11 +118,11 @@ impl DeviceScene {
         let light = round.ask(&UploadLight { device, method, environment, light: &light, way_around })?;
         let pipelines = shaders.constants.iter().map(|constants| compile(shader, constants)).collect::<Result<_>>()?;
         let background = match prepared.show_environment {
-            true => Some(Background {
+            true => Background::Environment {
                 pipeline: compile(&compiled::BACKGROUND, &[])?,
                 map: round.ask(&UploadBackground { device, environment })?,
-            }),
-            false => None,
+            },
+            false => Background::Nothing(compile(&compiled::CLEAR_UNCOVERED, &[])?),
         };
         Ok(Self {
             view: view.clone(),
@@ -147,6 +149,11 @@ impl DeviceScene {
         keys.eq(other_keys)
     }
 
+    /// Where in the picture objects may be.
+    pub(crate) fn region(&self, view: &View) -> Region {
+        self.geometry_cache.region(view, self.classify.tile_px())
+    }
+
     /// Starts the random numbers of later frames from `seed`: other noise, for methods that have any.
     pub fn reseed(&mut self, seed: u64) {
         self.shade.sampling.seed = seed;
@@ -158,7 +165,11 @@ impl DeviceScene {
     /// Whatever Vulkan refuses.
     pub fn render(&self, wanted: Wanted, repeat: u32) -> Result<Rendering> {
         let mut graph = FrameGraph::new();
-        let frame = declare(&mut graph, self, &self.view);
+        let region = match wanted.geometry {
+            true => Region::whole(&self.view, self.classify.tile_px()),
+            false => self.region(&self.view),
+        };
+        let frame = declare(&mut graph, self, region, &self.view);
         let mut readbacks = Readbacks::new(&self.device, graph);
         let counters = readbacks.buffer("counters", frame.counters, size_of::<Counters>() as u64)?;
         let lookups = readbacks.buffer("lookups", frame.lookups, size_of::<u64>() as u64)?;
@@ -263,7 +274,7 @@ fn check_size(device: &Device, view: &View) -> Result<()> {
 pub fn render_geometry(device: &Arc<Device>, prepared: &Prepared, round: &Round) -> Result<Vec<[u32; 2]>> {
     let pass = ask_geometry_cache(device, prepared, round)?;
     let mut graph = FrameGraph::new();
-    let geometry = geometry_cache(&mut graph, &pass, &prepared.view);
+    let geometry = geometry_cache(&mut graph, &pass, Region::whole(&prepared.view, [1, 1]), &prepared.view);
     let mut readbacks = Readbacks::new(device, graph);
     let target = readbacks.image("geometry", geometry, prepared.view.cache_size(), 8, true)?;
     readbacks.run("geometry")?;

@@ -10,7 +10,7 @@ use threadlight::low_level::evaluate::{Comparable, Display, compare};
 use threadlight::low_level::geometry_texel::GeometryTexel;
 use threadlight::low_level::memo::{Key, Keyed, Memo};
 use threadlight::low_level::passes::Counters;
-use threadlight::low_level::pipeline::Rendering;
+use threadlight::low_level::pipeline::{Rendering, Wanted};
 use threadlight::low_level::prepare::Prepared;
 use threadlight::low_level::scene::{
     Background, Camera, MaterialSettings, MaterialSource, ObjectSettings, Scene, Source,
@@ -447,4 +447,42 @@ fn a_planted_nan_is_counted() {
         assert!(count(&prepared) > 0, "{method}");
     }
     gpu.finish();
+}
+
+/// What is drawn and sorted is where objects may be; if the geometry is read back, it is the whole picture.
+#[test]
+fn pictures_are_the_same_whether_or_not_geometry_is_drawn_where_no_object_is() {
+    let renderer = Validated::new();
+    let mut seen = Vec::new();
+    for (translate, scale, eye_z) in [
+        (Vec3::ZERO, 1.0, 5.0),
+        (Vec3::new(2.5, 1.4, 0.0), 1.0, 5.0),
+        (Vec3::new(-1.9, -1.3, 0.0), 0.02, 5.0),
+        (Vec3::new(0.3, 0.0, 0.0), -0.3, 5.0),
+        (Vec3::new(0.0, 0.9, 0.0), 1.0, 1.2),
+        (Vec3::new(0.0, 0.0, 0.0), 1.0, 0.3),
+        (Vec3::new(0.0, 0.0, 9.0), 1.0, 5.0),
+        (Vec3::new(40.0, 0.0, 0.0), 1.0, 5.0),
+    ] {
+        for background in [Background::Environment, Background::None] {
+            let mut scene = sphere(model("model = 'lambert'\nreflectance = 0.5"), "sky", 4, (75, 53));
+            scene.shading.method = "cosine".to_owned();
+            scene.image.background = background;
+            (scene.objects[0].translate, scene.objects[0].scale) = (translate, scale);
+            scene.objects[0].rotate_deg = Vec3::new(10.0, 20.0, 30.0);
+            scene.camera =
+                Some(Camera { eye: DVec3::new(0.1, 0.2, eye_z), target: DVec3::ZERO, up: DVec3::Y, fov_y_deg: 40.0 });
+            let prepared = ready(&scene);
+            let whole = renderer.render(&prepared, EVERYTHING);
+            let parts = renderer.render(&prepared, Wanted { geometry: false, ..EVERYTHING });
+            assert!(
+                whole.radiance == parts.radiance && whole.counters == parts.counters,
+                "{translate} {scale} {eye_z}"
+            );
+            seen.push(whole.counters.covered_pixels());
+        }
+    }
+    assert!(seen.iter().any(|pixels| *pixels == 0) && seen.iter().any(|pixels| *pixels == 75 * 53), "{seen:?}");
+    assert!(seen.iter().filter(|pixels| (1..3000).contains(*pixels)).count() > 6, "{seen:?}");
+    renderer.finish();
 }

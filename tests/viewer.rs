@@ -224,7 +224,12 @@ fn a_broken_file_is_told_and_changes_nothing() {
            {"drop": "broken.binary"}
            "wait""#,
     );
-    ended.expect_success();
+    // A script learns of it in the end.
+    assert!(
+        !ended.success && ended.log.last().is_some_and(|line| line.contains("4 of what it asks for")),
+        "{:#?}",
+        ended.log
+    );
     for name in ["letter.txt", "broken.obj", "broken.binary"] {
         assert!(ended.log.iter().any(|line| line.contains("WARN") && line.contains(name)), "{:#?}", ended.log);
     }
@@ -235,6 +240,45 @@ fn a_broken_file_is_told_and_changes_nothing() {
     let window = viewer.picture("window.png");
     let red = window.rgba.iter().filter(|[r, g, b, _]| *r > 3.0 * g && *r > 3.0 * b && *r > 0.3).count();
     assert!(red > 500, "{red} red pixels");
+}
+
+#[test]
+fn what_is_undone_looks_as_before_and_is_seen_from_where_the_camera_is() {
+    let Some(viewer) = Viewer::new() else { return };
+    let replay = r#"{"set": {"exposure": 2}}
+        "wait"
+        {"save_picture": "bright.png"}
+        {"set": {"material": {"builtin": "clay"}}}
+        {"set": {"environment": {"builtin": "sky"}}}
+        "wait"
+        {"save_picture": "last.png"}
+        {"drag": {"button": "left", "from": [80, 60], "by": [21, -9]}}
+        {"save_scene": "turned.toml"}
+        "undo"
+        "undo"
+        {"save_scene": "undone.toml"}
+        {"key": "home"}
+        "wait"
+        {"save_picture": "undone.png"}
+        "redo"
+        "redo"
+        "redo"
+        "wait"
+        {"save_picture": "redone.png"}
+        "undo"
+        "undo"
+        "undo"
+        "undo"
+        {"save_scene": "first.toml"}
+        "quit""#;
+    viewer.play(&SMALL, replay).expect_success();
+    let read = |name| std::fs::read(viewer.path(name)).expect("a file");
+    assert!(read("bright.png") == read("undone.png") && read("last.png") == read("redone.png"));
+    assert!(read("bright.png") != read("last.png"));
+    let text = |name| String::from_utf8(read(name)).expect("a scene");
+    let camera = |name| Some(text(name).split_once("[camera]")?.1.split("\n[").next()?.to_owned());
+    assert!(camera("turned.toml").is_some() && camera("turned.toml") == camera("undone.toml"));
+    assert!(text("first.toml").contains("gold") && text("first.toml").contains("exposure = 1"));
 }
 
 #[test]

@@ -13,6 +13,7 @@ Examples:
   threadlight compare paper.exr reference.exr
   threadlight compare paper.exr reference.exr --mask-background --difference where.png
   threadlight compare a.png b.png --json
+  threadlight compare new.exr golden.exr --at-most 1e-4     fails if they differ by more: for tests
 
 Display values are clamp(exposure L, 0, 1)^(1/gamma) of radiance L over black, compared in all three channels. A PNG \
 holds display values: --exposure and --gamma then say how it was made, for rms_linear.
@@ -32,6 +33,9 @@ pub struct Compare {
     /// Compare only pixels that see a surface in A or B, by the alpha of those rendered with --background none.
     #[arg(long)]
     mask_background: bool,
+    /// End with exit code 1 where the RMS of display values is above X, or a value is NaN or infinite.
+    #[arg(long, value_name = "X", value_parser = number(0.0..=1.0, "a number from 0 to 1"))]
+    at_most: Option<f64>,
     /// Print JSON instead of a table.
     #[arg(long)]
     json: bool,
@@ -51,6 +55,7 @@ impl Compare {
         if let Some(path) = &self.difference {
             output::check_png(path)?;
             output::check_writable(path)?;
+            output::check_not_read([path], [&self.a, &self.b])?;
         }
         let display = Display { exposure: self.exposure, gamma: self.gamma };
         let read = |path| -> Result<_> { Ok(Comparable::from_picture(&output::read_image(path)?, display)) };
@@ -63,7 +68,12 @@ impl Compare {
         }
         let text =
             if self.json { serde_json::to_string_pretty(&metrics).context("--json")? + "\n" } else { table(&metrics) };
-        Ok(std::io::stdout().write_all(text.as_bytes())?)
+        std::io::stdout().write_all(text.as_bytes())?;
+        if let Some(at_most) = self.at_most {
+            anyhow::ensure!(metrics.nan == 0, "{} values are NaN or infinite", metrics.nan);
+            anyhow::ensure!(metrics.rms <= at_most, "the RMS is {:.3e}, above {at_most:e}", metrics.rms);
+        }
+        Ok(())
     }
 }
 

@@ -105,6 +105,7 @@ impl Render {
         }
         output::check_all_writable(self.output.iter().chain(&self.stats))?;
         let scene = self.scene.scene()?;
+        output::check_not_read(self.output.iter().chain(&self.stats), self.scene.scene.iter().chain(&scene.files()))?;
         let method = Method::from_name(&scene.shading.method)?;
         let is_reference = method == Method::Reference;
         let useless = [

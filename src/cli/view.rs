@@ -4,11 +4,11 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::value_parser;
 use std::path::PathBuf;
 use std::time::Duration;
-use threadlight::Result;
 use threadlight::low_level::output;
 use threadlight::low_level::viewer::latency::Record;
 use threadlight::low_level::viewer::{self, Ended, ViewerSettings, input};
 use threadlight::low_level::vulkan::PresentMode;
+use threadlight::{Error, Result};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -23,7 +23,8 @@ In the window:
   wheel, pinch         zoom                         + - 0     exposure
   Ctrl + drag          turn the environment         [ ]       half, twice the threads
   drop a file          material, environment,       B         background
-                       mesh or scene                Escape    close the message";
+                       mesh or scene                Escape    close the message
+  Ctrl + Z             undo                         Ctrl + Y  redo (or Ctrl + Shift + Z)";
 
 /// Opens a window to look at a scene, change it, and save picture and scene. Flags override the scene file.
 #[derive(clap::Args)]
@@ -64,6 +65,8 @@ impl ViewArguments {
         self.screenshot.as_deref().map_or(Ok(()), output::check_png)?;
         output::check_all_writable(self.screenshot.iter().chain(&self.stats))?;
         let mut scene = self.scene.scene()?;
+        let read = self.scene.scene.iter().chain(&self.replay);
+        output::check_not_read(self.screenshot.iter().chain(&self.stats), read.chain(&scene.files()))?;
         if self.scene.scene.is_none() && self.scene.size.is_none() {
             (scene.image.width, scene.image.height) = SIZE;
         }
@@ -73,7 +76,7 @@ impl ViewArguments {
             (Some(_), false) => Record::All,
             (Some(_), true) => Record::AllAndErrors,
         };
-        let Ended { messages, stats } = viewer::run(ViewerSettings {
+        let Ended { messages, stats, failures } = viewer::run(ViewerSettings {
             scene,
             cache: self.machine.cache(),
             device: self.machine.device,
@@ -90,6 +93,11 @@ impl ViewArguments {
         }
         if let Some(first) = messages.first() {
             anyhow::bail!("validation: {} messages, the first: {}", messages.len(), first.replace('\n', " "));
+        }
+        // Whoever sits before the window has been told.
+        if let Some((replay, first)) = self.replay.as_deref().zip(failures.first()) {
+            let problem = format!("{} of what it asks for could not be done, the first: {first}", failures.len());
+            return Err(Error::in_file(replay, problem, "the log has all of them").into());
         }
         Ok(())
     }

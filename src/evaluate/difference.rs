@@ -2,7 +2,7 @@
 use super::metrics::{Comparable, compared_pixels};
 
 /// Differences of display values up to this are black; colours go by the logarithm from here to 1.
-const SMALLEST: f64 = 1e-4;
+pub const SMALLEST: f64 = 1e-4;
 /// Rows of the scale below the map, and of the gap above it.
 const SCALE_ROWS: usize = 12;
 const GAP_ROWS: usize = 4;
@@ -26,8 +26,8 @@ pub fn heat_map(a: &Comparable, b: &Comparable, mask_background: bool) -> Vec<u8
     map.flat_map(opaque).collect()
 }
 
-/// The colour of a difference.
-fn scale() -> impl Fn(f64) -> [u8; 3] {
+/// The colour of a difference in a [`heat_map`].
+pub fn scale() -> impl Fn(f64) -> [u8; 3] {
     let colours = nv_flip::magma_lut().to_vec();
     move |difference: f64| {
         let place = 1.0 - difference.max(SMALLEST).log10() / SMALLEST.log10();

@@ -97,9 +97,11 @@ pub fn run(
         }
         add(compute(shader, "any", of_any)?)?;
     }
-    if scene.image.background == Background::Environment {
-        add(compute(&compiled::BACKGROUND, "any", Vec::new())?)?;
-    }
+    let behind = match scene.image.background {
+        Background::Environment => &compiled::BACKGROUND,
+        Background::None => &compiled::CLEAR_UNCOVERED,
+    };
+    add(compute(behind, "any", Vec::new())?)?;
     add(compute(&compiled::TONE_MAP, "any", Vec::new())?)
 }
 

@@ -14,13 +14,15 @@ pub struct RasterPass<'g, 'a> {
     pipeline: &'a GraphicsPipeline,
     color: Option<(ImageHandle, [u32; 4])>,
     depth: Option<(ImageHandle, f32)>,
+    /// Left, top, width and height; none for all of the targets.
+    area: Option<[u32; 4]>,
     bindings: Vec<(&'a str, Bound<'a>)>,
 }
 
 impl<'a> FrameGraph<'a> {
     /// Adds a pass that draws with `pipeline`.
     pub fn raster(&mut self, name: &str, pipeline: &'a GraphicsPipeline) -> RasterPass<'_, 'a> {
-        RasterPass { pass: self.pass(name), pipeline, color: None, depth: None, bindings: Vec::new() }
+        RasterPass { pass: self.pass(name), pipeline, color: None, depth: None, area: None, bindings: Vec::new() }
     }
 }
 
@@ -39,6 +41,12 @@ impl<'a> RasterPass<'_, 'a> {
         self
     }
 
+    /// Draws and clears only within this area of the targets: left, top, width and height. Elsewhere they may hold anything afterwards.
+    pub fn within(mut self, area: [u32; 4]) -> Self {
+        self.area = Some(area);
+        self
+    }
+
     /// The shaders look at what is no resource of the graph, an image with its sampler, as their binding `name`.
     pub fn sampled(mut self, name: &'a str, image: &'a Image, sampler: &'a Sampler) -> Self {
         let bound = Bound::Sampled(image, sampler);
@@ -53,9 +61,9 @@ impl<'a> RasterPass<'_, 'a> {
             let pass = self.pass.name().to_owned();
             return self.pass.refuse(GraphError::NoTarget { pass });
         };
-        let Self { mut pass, pipeline, bindings, .. } = self;
+        let Self { mut pass, pipeline, area, bindings, .. } = self;
         let meshes: Vec<_> = meshes.into_iter().collect();
-        pass.depends_on(&pipeline.identity()).depends_on(&color.1).depends_on(&depth.1.to_bits());
+        pass.depends_on(&pipeline.identity()).depends_on(&color.1).depends_on(&depth.1.to_bits()).depends_on(&area);
         for (triangles, push) in &meshes {
             pass.depends_on(&triangles.identity()).depends_on(&bytemuck::bytes_of(push));
         }
@@ -63,7 +71,7 @@ impl<'a> RasterPass<'_, 'a> {
             let color = ColorTarget { image: resources.image(color.0)?, clear: color.1 };
             let depth = DepthTarget { image: resources.image(depth.0)?, clear: depth.1 };
             let draws = meshes.iter().map(|(triangles, push)| (*triangles, bytemuck::bytes_of(push)));
-            Ok(commands.render(pipeline, &color, &depth, &bindings, draws)?)
+            Ok(commands.render(pipeline, &color, &depth, area, &bindings, draws)?)
         }));
     }
 }

@@ -40,6 +40,22 @@ pub fn check_all_writable<'a>(paths: impl IntoIterator<Item = &'a PathBuf>) -> R
     Ok(())
 }
 
+/// Says at once if a file is to be `written` that the same command has `read`: it would be lost.
+pub fn check_not_read<'a>(
+    written: impl IntoIterator<Item = &'a PathBuf>,
+    read: impl IntoIterator<Item = &'a PathBuf>,
+) -> Result<()> {
+    let file = |path: &PathBuf| match target(path) {
+        Target::File(file) => Some(file),
+        Target::Stream => None,
+    };
+    let read: Vec<_> = read.into_iter().filter_map(file).collect();
+    match written.into_iter().find(|path| file(path).is_some_and(|file| read.contains(&file))) {
+        Some(path) => Err(Error::in_file(path, "is read by the same command", "give what is written another name")),
+        None => Ok(()),
+    }
+}
+
 /// Whether the name ends in a separator, which no file's does.
 fn names_a_folder(path: &Path) -> bool {
     path.to_string_lossy().ends_with(std::path::is_separator)

@@ -1,5 +1,5 @@
-//! Puts the environment behind the surface.
-use super::{CameraRays, View};
+//! What is seen past the surface: the environment, or nothing.
+use super::{CameraRays, Region, Tiles, View};
 use crate::Result;
 use crate::environment::Environment;
 use crate::graph::{FrameGraph, ImageHandle};
@@ -12,11 +12,16 @@ use std::sync::Arc;
 
 /// What the pass is made of: only where a background is asked for is the map itself on the device.
 #[derive(Clone)]
-pub struct Background {
-    /// The shader.
-    pub pipeline: Keyed<ComputePipeline>,
+pub enum Background {
     /// The environment.
-    pub map: Keyed<BackgroundMap>,
+    Environment {
+        /// The shader.
+        pipeline: Keyed<ComputePipeline>,
+        /// What it looks up.
+        map: Keyed<BackgroundMap>,
+    },
+    /// Nothing, black and transparent, by this shader.
+    Nothing(Keyed<ComputePipeline>),
 }
 
 /// The environment on the device, as a display shows it.
@@ -31,7 +36,23 @@ struct Push {
     camera: CameraRays,
     size_px: [u32; 2],
     rotation: [f32; 2],
+    region: TileRegion,
     radiance_scale: f32,
+}
+
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct ClearPush {
+    size_px: [u32; 2],
+    region: TileRegion,
+}
+
+/// `Region` in glsl/tiles.glsl.
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct TileRegion {
+    first_tile: [u32; 2],
+    end_tile: [u32; 2],
 }
 
 impl BackgroundMap {
@@ -81,20 +102,33 @@ pub(super) fn check_map_size(
     Err(crate::Error::input(&environment.name, problem, remedy))
 }
 
-/// Adds the environment where `radiance` is not wholly covered.
+/// Puts `background` where `radiance` is not wholly covered, by the `tiles`. Where it is not covered at all, it may hold anything before.
 pub fn background<'a>(
     graph: &mut FrameGraph<'a>,
     background: &'a Background,
     mut radiance: ImageHandle,
+    tiles: &Tiles,
     view: &View,
 ) -> ImageHandle {
     let size_px = [view.width, view.height];
-    let (rotation, radiance_scale) = (view.rotation(), view.intensity as f32);
-    graph
-        .compute("background", &background.pipeline)
-        .modify("radiance", &mut radiance)
-        .sampled("environment_map", &background.map.image, &background.map.sampler)
-        .push(&Push { camera: view.camera_rays(), size_px, rotation, radiance_scale })
-        .cover([view.width, view.height, 1]);
+    let Region { first_tile, end_tile, .. } = tiles.region;
+    let region = TileRegion { first_tile, end_tile };
+    let pass = match background {
+        Background::Environment { pipeline, map } => {
+            let (rotation, radiance_scale) = (view.rotation(), view.intensity as f32);
+            graph.compute("background", pipeline).sampled("environment_map", &map.image, &map.sampler).push(&Push {
+                camera: view.camera_rays(),
+                size_px,
+                rotation,
+                region,
+                radiance_scale,
+            })
+        }
+        Background::Nothing(pipeline) => {
+            graph.compute("clear_uncovered", pipeline).push(&ClearPush { size_px, region })
+        }
+    };
+    let pass = pass.modify("radiance", &mut radiance).read("Coverage", tiles.coverage);
+    pass.cover([view.width, view.height, 1]);
     radiance
 }

@@ -1,5 +1,5 @@
 //! Sorts pixels into interior, edge and background, and by the shader of their material. It lists those to shade: nothing else is looked at again.
-use super::View;
+use super::{Region, View};
 use crate::Result;
 use crate::environment::Environment;
 use crate::graph::{BufferDesc, BufferHandle, FrameGraph, ImageHandle};
@@ -43,6 +43,14 @@ pub struct Counters {
 /// Bytes of `TileClass` in glsl/tiles.glsl: the arguments of an indirect dispatch, and a count.
 const TILE_CLASS_BYTES: u64 = 16;
 
+impl Classify {
+    /// Width and height of a tile in pixels: it is a workgroup.
+    pub fn tile_px(&self) -> [u32; 2] {
+        let [width, height, _] = self.pipeline.group_size();
+        [width, height]
+    }
+}
+
 impl Counters {
     /// Pixels that see a surface.
     pub fn covered_pixels(&self) -> u64 {
@@ -74,6 +82,7 @@ pub struct Classify {
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct Push {
     size_px: [u32; 2],
+    first_tile: [u32; 2],
     smooth_variance: SmoothVariance,
     cos_smooth: f32,
     shader_of_mixed: u32,
@@ -108,12 +117,16 @@ impl SmoothVariance {
 /// What is to be shaded.
 #[derive(Clone, Copy)]
 pub struct Tiles {
+    /// Where there may be any.
+    pub region: Region,
     /// [`Counters`].
     pub counters: BufferHandle,
     /// For each class of pixels the tiles that hold any.
     pub tiles: BufferHandle,
     /// For each tile of the image the places of its pixels in it, class by class.
     pub pixels: BufferHandle,
+    /// For each tile of the region two bits a pixel: whether it sees any surface, and whether it sees nothing else.
+    pub coverage: BufferHandle,
 }
 
 /// Uploads the number of the shader of each material.
@@ -127,11 +140,16 @@ pub fn upload_shaders(device: &Arc<Device>, of_materials: &[u32]) -> Result<Buff
     Ok(Buffer::with_contents(device, "shaders of materials", usage, bytemuck::cast_slice(numbers))?)
 }
 
-/// Lists the pixels of `geometry` that hold surface.
-pub fn classify<'a>(graph: &mut FrameGraph<'a>, classify: &'a Classify, geometry: ImageHandle, view: &View) -> Tiles {
+/// Lists the pixels of `geometry` that hold surface, all of which is in `region`.
+pub fn classify<'a>(
+    graph: &mut FrameGraph<'a>,
+    classify: &'a Classify,
+    geometry: ImageHandle,
+    region: Region,
+    view: &View,
+) -> Tiles {
     let (width, height) = (view.width, view.height);
-    // A workgroup is a tile.
-    let [columns, rows, _] = classify.pipeline.group_size();
+    let [columns, rows] = region.tile_px;
     let tile_count = u64::from(width.div_ceil(columns)) * u64::from(height.div_ceil(rows));
     let tile_pixels = u64::from(columns * rows);
     // Kept: as long as nothing moves, other light and other materials are shaded by the same lists.
@@ -140,6 +158,7 @@ pub fn classify<'a>(graph: &mut FrameGraph<'a>, classify: &'a Classify, geometry
     graph.clear_buffer("clear_counters", &mut counters);
     let mut tiles = graph.kept_buffer("tile_list", BufferDesc { size_bytes: 8 * class_count as u64 * tile_count });
     let mut pixels = graph.kept_buffer("pixel_list", BufferDesc { size_bytes: 4 * tile_pixels * tile_count });
+    let mut coverage = graph.kept_buffer("coverage", BufferDesc { size_bytes: tile_pixels * tile_count / 4 });
     graph
         .compute("classify", &classify.pipeline)
         .read("geometry", geometry)
@@ -147,12 +166,14 @@ pub fn classify<'a>(graph: &mut FrameGraph<'a>, classify: &'a Classify, geometry
         .modify("counters", &mut counters)
         .write("tile_list", &mut tiles)
         .write("pixel_list", &mut pixels)
+        .write("Coverage", &mut coverage)
         .push(&Push {
             size_px: [width, height],
+            first_tile: region.first_tile,
             smooth_variance: classify.smooth_variance,
             cos_smooth: SMOOTH_DEG.to_radians().cos(),
             shader_of_mixed: classify.shader_of_mixed,
         })
-        .cover([width, height, 1]);
-    Tiles { counters, tiles, pixels }
+        .groups([region.tiles()[0], region.tiles()[1], 1]);
+    Tiles { region, counters, tiles, pixels, coverage }
 }

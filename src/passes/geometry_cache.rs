@@ -1,5 +1,5 @@
 //! Pass 1 of the paper (section 4.1): normal and material of what is seen, at sub-pixel resolution.
-use super::View;
+use super::{Region, View};
 use crate::Result;
 use crate::graph::{FrameGraph, ImageDesc, ImageHandle};
 use crate::memo::Keyed;
@@ -9,7 +9,7 @@ use crate::vulkan::{
 };
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
-use glam::{DAffine3, DVec2, DVec3, Vec3};
+use glam::{BVec3, DAffine3, DVec2, DVec3, Vec3};
 use std::sync::Arc;
 
 /// [`GeometryTexel`](crate::geometry_texel::GeometryTexel).
@@ -32,7 +32,9 @@ const TANGENT_OF_MESH: f32 = 3.0;
 pub struct DeviceMesh {
     triangles: Triangles,
     /// Bounding sphere in object space: centre and radius.
-    bounds: (Vec3, f32),
+    sphere: (Vec3, f32),
+    /// The smallest and largest coordinates there.
+    bounds: (Vec3, Vec3),
 }
 
 impl DeviceMesh {
@@ -52,7 +54,8 @@ impl DeviceMesh {
         ];
         Ok(Self {
             triangles: Triangles::new(device, name, &attributes, &mesh.indices)?,
-            bounds: mesh.bounding_sphere(),
+            sphere: mesh.bounding_sphere(),
+            bounds: mesh.bounds(),
         })
     }
 }
@@ -173,24 +176,38 @@ impl GeometryCache {
             };
             (&self.meshes[object.mesh].triangles, push)
         };
-        let inwards = inward_normals(view);
-        let is_seen = |object: &&PlacedMesh| {
-            let (center, radius) = self.bounds(object);
+        self.seen(view).map(draw).collect()
+    }
+
+    /// The objects that may be in the picture.
+    fn seen(&self, view: &View) -> impl Iterator<Item = &PlacedMesh> {
+        let (inwards, eye) = (inward_normals(view), view.camera.eye);
+        self.objects.iter().filter(move |object| {
+            let (center, radius) = self.sphere(object);
             may_be_within(center - eye, radius, &inwards)
-        };
-        self.objects.iter().filter(is_seen).map(draw).collect()
+        })
+    }
+
+    /// Where in the picture objects may be, in tiles of this size.
+    pub fn region(&self, view: &View, tile_px: [u32; 2]) -> Region {
+        let corners = self.seen(view).flat_map(|object| {
+            let (low, high) = self.meshes[object.mesh].bounds;
+            let corner = move |index: u32| Vec3::select(BVec3::from([1, 2, 4].map(|bit| index & bit != 0)), high, low);
+            (0..8).map(move |index| object.to_world.transform_point3(corner(index).as_dvec3()) - view.camera.eye)
+        });
+        Region::of_boxes(view, tile_px, corners)
     }
 
     /// Centre and radius of a sphere around an object, in world space.
-    fn bounds(&self, object: &PlacedMesh) -> (DVec3, f64) {
-        object.placed_sphere(self.meshes[object.mesh].bounds)
+    fn sphere(&self, object: &PlacedMesh) -> (DVec3, f64) {
+        object.placed_sphere(self.meshes[object.mesh].sphere)
     }
 
     /// Distance from the eye to the far side of the scene: the unit of length in which it is drawn, so that neither tiny nor
     /// huge scenes leave the range of single precision.
     fn extent(&self, view: &View) -> f64 {
         let far_side = |object: &PlacedMesh| {
-            let (center, radius) = self.bounds(object);
+            let (center, radius) = self.sphere(object);
             center.distance(view.camera.eye) + radius
         };
         let farthest = self.objects.iter().map(far_side).fold(0.0, f64::max);
@@ -215,13 +232,18 @@ fn may_be_within(center: DVec3, radius: f64, inwards: &[DVec3; 5]) -> bool {
     inwards.iter().all(|normal| center.dot(*normal) > -radius - margin)
 }
 
-/// Draws the objects that may be seen into the geometry cache.
-pub fn geometry_cache<'a>(graph: &mut FrameGraph<'a>, cache: &'a GeometryCache, view: &View) -> ImageHandle {
+/// Draws the objects that may be seen into the geometry cache. Outside of `region`, where they all are, it may hold anything.
+pub fn geometry_cache<'a>(
+    graph: &mut FrameGraph<'a>,
+    cache: &'a GeometryCache,
+    region: Region,
+    view: &View,
+) -> ImageHandle {
     let [width, height] = view.cache_size();
     let mut geometry = graph.kept_image("geometry", ImageDesc { format: GEOMETRY_FORMAT, width, height });
     let mut depth = graph.image("depth", ImageDesc { format: DEPTH_FORMAT, width, height });
     let pass = graph.raster("geometry_cache", &cache.pipeline);
-    pass.color(&mut geometry, [0; 4]).depth(&mut depth, 0.0).draw(cache.draws(view));
+    pass.color(&mut geometry, [0; 4]).depth(&mut depth, 0.0).within(region.subpixels(view)).draw(cache.draws(view));
     geometry
 }
 

@@ -13,6 +13,7 @@ mod light;
 #[cfg(feature = "viewer")]
 mod present;
 mod readback;
+mod region;
 mod shade;
 mod tone_map;
 #[cfg(feature = "viewer")]
@@ -31,6 +32,7 @@ pub use light::DeviceLight;
 #[cfg(feature = "viewer")]
 pub use present::{Area, present};
 pub use readback::{Readbacks, is_readback, texels};
+pub use region::Region;
 pub use shade::{DeviceMaterials, Sampling, Shade, Shaded, ShadedMaterial, models_used, shade};
 pub use tone_map::{ToneMap, tone_map};
 #[cfg(feature = "viewer")]

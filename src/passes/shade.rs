@@ -225,7 +225,8 @@ pub struct Shaded {
     pub lookups: BufferHandle,
 }
 
-/// Shades the pixels that `tiles` lists, by the shader of each: interior ones with one sum shared by all sub-pixels, then those at edges.
+/// Shades the pixels that `tiles` lists, by the shader of each: interior ones with one sum shared by all sub-pixels, then those at edges. Others may
+/// hold anything: see [`background`](super::background()).
 pub fn shade<'a>(
     graph: &mut FrameGraph<'a>,
     shade: &'a Shade,
@@ -233,11 +234,10 @@ pub fn shade<'a>(
     tiles: &Tiles,
     view: &View,
 ) -> Shaded {
-    let Tiles { counters, tiles, pixels } = *tiles;
+    let Tiles { counters, tiles, pixels, .. } = *tiles;
     let Shade { pipelines, materials, light, sampling } = shade;
     let format = vk::Format::R32G32B32A32_SFLOAT;
     let mut radiance = graph.kept_image("radiance", ImageDesc { format, width: view.width, height: view.height });
-    graph.clear_image("clear_radiance", &mut radiance, [0.0; 4]);
     let mut lookups = graph.buffer("lookups", BufferDesc { size_bytes: size_of::<u64>() as u64 });
     graph.clear_buffer("clear_lookups", &mut lookups);
     let dispatch = |pixel_class: usize| {
@@ -250,7 +250,7 @@ pub fn shade<'a>(
         .read("counters", counters)
         .read("tile_list", tiles)
         .read("pixel_list", pixels)
-        .modify("radiance", &mut radiance)
+        .write("radiance", &mut radiance)
         .modify("all_lookups", &mut lookups)
         .bind_all(materials.bindings())
         .bind_all(light.bindings())

@@ -18,6 +18,7 @@
 //! | `{"compare": "reference"}`, `{"compare": {"shading": {"method": "paper", "threads": 64}}}` | compares the picture with the reference, or with another method or number of threads; `{"compare": null}` ends that |
 //! | `{"wipe": 0.5}` | drags the line between two compared pictures: 0 is the left edge, 1 the right one |
 //! | `{"heat_map": true}` | shows where the two differ in the place of the other picture, or no longer |
+//! | `"undo"`, `"redo"` | takes back what was last set or dropped, and does it again; the camera stays where it is |
 //! | `"wait"` | waits until all background work is done and its frame drawn; an error after `--replay-limit` seconds |
 //! | `{"save_picture": "x.png"}`, `{"save_scene": "x.toml"}` | saves |
 //! | `"quit"` | closes the window |
@@ -66,6 +67,10 @@ pub enum Input {
     Wipe(f64),
     /// Show where the two differ in the place of the other picture, or no longer.
     HeatMap(bool),
+    /// Take back what was last set or dropped.
+    Undo,
+    /// Do again what was taken back.
+    Redo,
     /// Go on when all background work is done and has been drawn.
     Wait,
     /// Save the picture that is shown.
@@ -267,7 +272,7 @@ mod tests {
         // What stands in back quotes and looks like an event.
         let quoted: Vec<_> = documented
             .flat_map(|line| line.split('`').skip(1).step_by(2))
-            .filter(|text| text.starts_with('{') || ["\"wait\"", "\"quit\""].contains(text))
+            .filter(|text| text.starts_with('{') || ["\"wait\"", "\"quit\"", "\"undo\"", "\"redo\""].contains(text))
             .collect();
         assert!(quoted.len() > 20, "{quoted:?}");
         for text in quoted {

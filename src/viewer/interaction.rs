@@ -3,6 +3,7 @@ use super::change::{Change, most_count};
 use super::comparer::Comparer;
 use super::comparison::Wipe;
 use super::dynamic_resolution::DynamicResolution;
+use super::history::History;
 use super::input::{DragAction, Dropped, Input, change_of_dropped};
 use super::latency::{Latency, Record};
 use super::latest_job::LatestJob;
@@ -37,10 +38,14 @@ pub struct Notice {
 pub struct Viewer {
     /// The scene that is asked for, and the one that is seen.
     pub session: Session,
+    /// What of it can be undone.
+    pub history: History,
     /// Where the picture is in the window.
     pub area: Area,
     /// What was last told.
     pub notice: Option<Notice>,
+    /// What could not be done so far, in order.
+    pub failures: Vec<String>,
     /// What frames have shown of themselves.
     pub measured: Measured,
     /// Whether the camera turns by itself.
@@ -93,8 +98,10 @@ impl Viewer {
         let area = Area { left: 0, top: 0, width: scene.image.width, height: scene.image.height };
         let mut viewer = Self {
             session: Session::new(scene),
+            history: History::default(),
             area,
             notice: None,
+            failures: Vec::new(),
             measured: Measured::default(),
             turntable: false,
             loaded: None,
@@ -171,9 +178,8 @@ impl Viewer {
                     // The window stays as large as it is.
                     (scene.image.width, scene.image.height) = (self.area.width, self.area.height);
                     scene.files().iter().for_each(|path| self.memo.look_again(path));
-                    self.changes += 1;
-                    self.session.replace(scene, self.changes);
-                    self.request();
+                    self.history.record(self.session.wanted(), None, Instant::now());
+                    self.replace(scene);
                     Ok(())
                 }
             },
@@ -199,6 +205,16 @@ impl Viewer {
             }
             Input::HeatMap(shows) => {
                 self.comparer.shows_heat_map = *shows;
+                Ok(())
+            }
+            Input::Undo => {
+                let scene = self.history.undo(self.session.wanted());
+                scene.into_iter().for_each(|scene| self.replace(scene));
+                Ok(())
+            }
+            Input::Redo => {
+                let scene = self.history.redo(self.session.wanted());
+                scene.into_iter().for_each(|scene| self.replace(scene));
                 Ok(())
             }
             // What the window itself does.
@@ -247,10 +263,19 @@ impl Viewer {
         if let Some(path) = change.file() {
             self.memo.look_again(path);
         }
+        let before = self.session.wanted().clone();
         self.session.change(change, self.changes + 1)?;
+        self.history.record(&before, Some(change), Instant::now());
         self.changes += 1;
         self.request();
         Ok(())
+    }
+
+    /// Asks for another scene.
+    fn replace(&mut self, scene: Scene) {
+        self.changes += 1;
+        self.session.replace(scene, self.changes);
+        self.request();
     }
 
     pub(super) fn move_camera(&mut self, act: impl FnOnce(&mut Orbit)) -> Result<()> {
@@ -276,6 +301,8 @@ impl Viewer {
 
     pub(super) fn tell_error(&mut self, error: &Error) {
         tracing::warn!("{error}");
-        self.notice = Some(Notice { text: error.to_string(), is_error: true });
+        let text = error.to_string();
+        self.failures.push(text.clone());
+        self.notice = Some(Notice { text, is_error: true });
     }
 }

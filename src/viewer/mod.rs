@@ -6,6 +6,7 @@
 //! | the camera's orbit | [`orbit`] | pure |
 //! | what can be changed of a scene | [`change`] | pure |
 //! | the scene that is asked for, and the one that is seen | [`session`] | pure |
+//! | undo and redo | [`history`] | pure |
 //! | how coarse a moving picture is | [`dynamic_resolution`] | pure |
 //! | loading and making in the background | [`latest_job`] | threads |
 //! | another picture of the same view, and the difference | [`comparison`] | |
@@ -26,6 +27,7 @@ pub mod comparer;
 pub mod comparison;
 mod drawing;
 pub mod dynamic_resolution;
+pub mod history;
 pub mod input;
 pub mod interaction;
 pub mod latency;
@@ -85,6 +87,8 @@ pub struct Ended {
     pub messages: Vec<String>,
     /// How long inputs waited, if all were to be recorded.
     pub stats: Option<Stats>,
+    /// What was asked for and could not be done, as the user was told.
+    pub failures: Vec<String>,
 }
 
 /// Opens a window and runs until it is closed.
@@ -101,12 +105,12 @@ pub fn run(settings: ViewerSettings) -> Result<Ended> {
     let event_loop = event_loop.build()?;
     let mut app = window::App::new(settings, event_loop.create_proxy());
     event_loop.run_app(&mut app)?;
-    let window::App { result, messages, stats, edited, .. } = app;
+    let window::App { result, messages, stats, edited, failures, .. } = app;
     if let (Err(Error::Vulkan(_)), Some(scene)) = (&result, edited) {
         keep(&scene, &folder.join("edited.toml"));
     }
     result?;
-    Ok(Ended { messages: messages.map(|messages| messages.all()).unwrap_or_default(), stats })
+    Ok(Ended { messages: messages.map(|messages| messages.all()).unwrap_or_default(), stats, failures })
 }
 
 /// Keeps a `scene` whose viewer fails.

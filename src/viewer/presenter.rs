@@ -75,7 +75,8 @@ fn declare_window<'a>(
     let desc = ImageDesc { format: Swapchain::FORMAT, width, height };
     let window = graph.import_image("window", desc, None, Some(Access::Present));
     let nowhere = Area { left: 0, top: 0, width, height };
-    let frame = picture.map(|ShownPicture { renderer, view, .. }| declare(graph, renderer, view));
+    let frame =
+        picture.map(|ShownPicture { renderer, view, .. }| declare(graph, renderer, renderer.region(view), view));
     let area = picture.map_or(nowhere, |picture| picture.area);
     let shown = present(graph, frame.as_ref().map(|frame| frame.display), window, area);
     let shown = ui(graph, painter, panel, shown);

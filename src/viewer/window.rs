@@ -1,4 +1,5 @@
 //! The window: what winit tells becomes inputs, and frames are drawn when there is something new.
+use super::change::Change;
 use super::input::{Button, Drag, Input, Scroll};
 use super::interaction::Viewer;
 use super::latency::Stats;
@@ -30,6 +31,8 @@ pub struct Wake;
 const RETRY: Duration = Duration::from_millis(100);
 /// How often the progress of background work is drawn.
 const PROGRESS_INTERVAL: Duration = Duration::from_millis(100);
+/// What the picture has at least, so that the panel beside it can be used.
+const LEAST_PICTURE: [u32; 2] = [160, 240];
 /// A window system has this long to give the window the size that a replay asks for.
 const RESIZE_PATIENCE: Duration = Duration::from_secs(2);
 
@@ -46,6 +49,8 @@ pub struct App {
     pub stats: Option<Stats>,
     /// The scene as it was at the end, if it is another than at the beginning.
     pub edited: Option<Scene>,
+    /// What could not be done that was asked for, in order.
+    pub failures: Vec<String>,
 }
 
 /// An open window.
@@ -94,16 +99,33 @@ struct Script {
 impl App {
     /// An app that will open its window when winit says so.
     pub fn new(settings: ViewerSettings, proxy: EventLoopProxy<Wake>) -> Self {
-        Self { settings, proxy, open: None, result: Ok(()), messages: None, stats: None, edited: None }
+        Self {
+            settings,
+            proxy,
+            open: None,
+            result: Ok(()),
+            messages: None,
+            stats: None,
+            edited: None,
+            failures: Vec::new(),
+        }
     }
 
     fn open(&mut self, event_loop: &ActiveEventLoop) -> Result<Open> {
         let ViewerSettings { scene, device, validate, cache, present_mode, frames, screenshot, replay, .. } =
             &self.settings;
         let image = &scene.image;
+        let [least_width, least_height] = LEAST_PICTURE;
+        if image.width < least_width || image.height < least_height {
+            tracing::warn!(
+                "a picture of {} x {} is smaller than the window can be, and has at least {least_width} x {least_height}",
+                image.width,
+                image.height
+            );
+        }
         let attributes = Window::default_attributes()
             .with_title("Threadlight")
-            .with_min_inner_size(LogicalSize::new(panel::WIDTH + 160.0, 240.0))
+            .with_min_inner_size(LogicalSize::new(panel::WIDTH + least_width as f32, least_height as f32))
             .with_inner_size(PhysicalSize::new(image.width + panel::WIDTH.ceil() as u32, image.height));
         let window = Arc::new(event_loop.create_window(attributes).map_err(failed)?);
         // The panel is as wide as the display's scale makes it, the picture as large as asked for.
@@ -277,7 +299,7 @@ impl Open {
                 return Err(Error::input("the replay", problem, "raise --replay-limit, or ask for less"));
             }
             Input::Quit => return Ok(true),
-            Input::Resize(width, height) => {
+            Input::Resize(width, height) | Input::Set(Change::Size(width, height)) => {
                 let size = window_size([*width, *height], self.window.scale_factor());
                 if let Some(size) = self.window.request_inner_size(size) {
                     tracing::debug!("the window is {} x {} at once", size.width, size.height);
@@ -374,12 +396,10 @@ impl Open {
                 self.redraw();
             }
             WindowEvent::KeyboardInput { event, .. }
-                if event.state == ElementState::Pressed
-                    && !self.context.wants_keyboard_input()
-                    && (self.modifiers - ModifiersState::SHIFT).is_empty() =>
+                if event.state == ElementState::Pressed && !self.context.wants_keyboard_input() =>
             {
-                if let Some(key) = name_of(&event.logical_key) {
-                    self.viewer.handle(&Input::Key(key));
+                if let Some(input) = name_of(&event.logical_key).and_then(|key| input_of(key, self.modifiers)) {
+                    self.viewer.handle(&input);
                     self.redraw();
                 }
             }
@@ -401,6 +421,19 @@ fn name_of(key: &Key) -> Option<String> {
         Key::Named(NamedKey::Home) => Some("home".to_owned()),
         Key::Named(NamedKey::Escape) => Some("escape".to_owned()),
         _ => None,
+    }
+}
+
+/// What a key asks for, with what is held down beside it.
+fn input_of(key: String, held: ModifiersState) -> Option<Input> {
+    let shift = held.shift_key();
+    // Command on macOS.
+    let control = [ModifiersState::CONTROL, ModifiersState::SUPER].contains(&(held - ModifiersState::SHIFT));
+    match key.as_str() {
+        "z" if control && !shift => Some(Input::Undo),
+        "z" if control => Some(Input::Redo),
+        "y" if control && !shift => Some(Input::Redo),
+        _ => (held - ModifiersState::SHIFT).is_empty().then_some(Input::Key(key)),
     }
 }
 
@@ -461,7 +494,8 @@ impl ApplicationHandler<Wake> for App {
 
     fn exiting(&mut self, _: &ActiveEventLoop) {
         // All that Vulkan made goes while the window is still there.
-        let Some(open) = self.open.take() else { return };
+        let Some(mut open) = self.open.take() else { return };
+        self.failures = std::mem::take(&mut open.viewer.failures);
         let wanted = open.viewer.session.wanted();
         let mut opened = self.settings.scene.clone();
         // The window has its size of the window system.

@@ -4,7 +4,7 @@ use super::error::During;
 use super::error::{Result, VulkanError, call};
 use ash::{ext, khr, vk};
 use std::ffi::{CStr, c_void};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
 /// What errors call it.
@@ -33,12 +33,17 @@ pub struct Instance {
     messages: Messages,
     // The callback's user data: at one address for as long as the messenger lives.
     user_data: Box<Messages>,
+    validates: bool,
     /// Whether it was made for a window system.
     #[cfg(feature = "viewer")]
     pub(super) presents: bool,
     // Unloads the loader when dropped: last.
     pub(super) entry: ash::Entry,
 }
+
+/// The first instance that was let go, and its loader: it stays, so that drivers stay loaded. The loader unloads them with the last instance,
+/// and NVIDIA's (580.159, with glibc 2.36) cannot be loaded more than 30 times in one process.
+static DRIVERS: OnceLock<(ash::Instance, ash::Entry)> = OnceLock::new();
 
 impl Instance {
     /// Loads the Vulkan loader and makes an instance, with core and synchronisation validation when `validate` is set.
@@ -82,6 +87,7 @@ impl Instance {
             messenger: None,
             messages,
             user_data,
+            validates: validate,
             #[cfg(feature = "viewer")]
             presents: !wanted.is_empty(),
             entry,
@@ -109,6 +115,10 @@ impl Drop for Instance {
         if let Some((functions, messenger)) = self.messenger.take() {
             // SAFETY: made by this instance, destroyed once, before it.
             unsafe { functions.destroy_debug_utils_messenger(messenger, None) };
+        }
+        // With validation, what is left behind is to be told.
+        if !self.validates && DRIVERS.set((self.raw.clone(), self.entry.clone())).is_ok() {
+            return;
         }
         // SAFETY: every device holds an `Arc` of this instance, so none is left.
         unsafe { self.raw.destroy_instance(None) };
@@ -213,4 +223,19 @@ unsafe extern "system" fn on_message(
     tracing::error!("validation: {text}");
     messages.push(text);
     vk::FALSE
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn instances_can_be_made_again_and_again() {
+        for made in 0..100 {
+            let instance = Instance::new(made % 10 == 9).unwrap_or_else(|error| panic!("instance {made}: {error}"));
+            // SAFETY: plain query of an instance.
+            let devices = unsafe { instance.raw.enumerate_physical_devices() };
+            assert!(devices.is_ok_and(|devices| !devices.is_empty()), "instance {made}");
+        }
+    }
 }

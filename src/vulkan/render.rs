@@ -23,22 +23,23 @@ pub(crate) struct DepthTarget<'a> {
 }
 
 impl Commands {
-    /// Clears the targets and draws into them, each mesh with its push constants and all with these `bindings`.
+    /// Clears the targets and draws into them, within `area` (left, top, width, height) if there is one, each mesh with its push constants and all with these `bindings`.
     ///
     /// # Errors
-    /// Targets that `pipeline` was not made for, or that differ in size; meshes, bindings or push constants that are not what its
+    /// Targets that `pipeline` was not made for, or that differ in size; an area that is empty or beyond them; meshes, bindings or push constants that are not what its
     /// shaders declare.
     pub(crate) fn render<'d>(
         &mut self,
         pipeline: &GraphicsPipeline,
         color: &ColorTarget,
         depth: &DepthTarget,
+        area: Option<[u32; 4]>,
         bindings: &[(&str, Bound)],
         draws: impl Iterator<Item = (&'d Triangles, &'d [u8])>,
     ) -> Result<()> {
         self.check_targets(pipeline, color.image, depth.image)?;
         let [width, height, _] = color.image.shape.extent;
-        let area = vk::Rect2D { offset: vk::Offset2D::default(), extent: vk::Extent2D { width, height } };
+        let area = area_within(color.image, area)?;
         let colors = [vk::RenderingAttachmentInfo::default()
             .image_view(color.image.view)
             .image_layout(vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL)
@@ -108,4 +109,16 @@ impl Commands {
         }
         Ok(())
     }
+}
+
+/// `area` of `image`, all of it if there is none.
+fn area_within(image: &Image, area: Option<[u32; 4]>) -> Result<vk::Rect2D> {
+    let [image_width, image_height, _] = image.shape.extent;
+    let [left, top, width, height] = area.unwrap_or([0, 0, image_width, image_height]);
+    let fits = |start: u32, size: u32, whole: u32| size > 0 && start.checked_add(size).is_some_and(|end| end <= whole);
+    if !(fits(left, width, image_width) && fits(top, height, image_height)) {
+        return Err(VulkanError::unfit(image.name(), "the area that is drawn is empty or beyond it"));
+    }
+    let offset = vk::Offset2D { x: left as i32, y: top as i32 };
+    Ok(vk::Rect2D { offset, extent: vk::Extent2D { width, height } })
 }

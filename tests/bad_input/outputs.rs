@@ -28,6 +28,24 @@ fn outputs_that_cannot_be_written_are_refused_before_any_work() {
 }
 
 #[test]
+fn what_a_command_reads_it_does_not_write() {
+    let folder = workplace();
+    fs::write(folder.path().join("scene.toml"), "[environment]\nfile = 'light.exr'\n").unwrap();
+    for name in ["light.exr", "a.png", "b.png"] {
+        fs::write(folder.path().join(name), "precious").unwrap();
+    }
+    for (arguments, name) in [
+        ("render --environment light.exr -o ./light.exr", "./light.exr"),
+        ("render scene.toml -o light.exr", "light.exr"),
+        ("render scene.toml -o out/image.png --stats scene.toml", "scene.toml"),
+        ("view scene.toml --stats scene.toml", "scene.toml"),
+        ("compare a.png b.png --difference out/../b.png", "out/../b.png"),
+    ] {
+        refuses(&folder, arguments, &[&format!("{name}: is read by the same command")]);
+    }
+}
+
+#[test]
 fn a_picture_from_before_survives_a_refusal() {
     let folder = workplace();
     fs::write(folder.path().join("out/image.png"), "precious").unwrap();

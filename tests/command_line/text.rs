@@ -280,6 +280,20 @@ fn pictures_are_compared_as_a_table_as_json_and_as_a_heat_map() {
     let expected = 0.4_f64.powf(2.2) - 0.2_f64.powf(2.2);
     assert!((json["rms_linear"].as_f64().unwrap() - expected).abs() < 1e-6);
 
+    // As a test: equal enough, or not.
+    printed(&mut threadlight(&folder, "compare a.png b.png --at-most 0.201"));
+    for (pictures, reason) in
+        [("a.png b.png", "the RMS is 2.000e-1, above 1.99e-1"), ("nan.exr a.png", "384 values are NaN")]
+    {
+        let header = threadlight::low_level::output::ExrHeader::default();
+        let nan = [[f32::NAN, 0.0, 0.0, 1.0]; 24 * 16];
+        threadlight::low_level::output::write_exr(&folder.path().join("nan.exr"), 24, 16, &nan, false, &header)
+            .unwrap();
+        let output = threadlight(&folder, &format!("compare {pictures} --at-most 0.199")).output().unwrap();
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.code() == Some(1) && said.contains(reason) && !output.stdout.is_empty(), "{said}");
+    }
+
     // Below the picture there is the scale.
     let map = picture(&folder, "where.png");
     assert_eq!((map.width, map.height), (24, 32));

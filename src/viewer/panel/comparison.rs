@@ -1,6 +1,7 @@
 //! With what the picture is compared, by how much the two differ, and the other one right of a line that can be dragged.
 use super::group;
 use super::shading::what_is_counted;
+use crate::evaluate::difference;
 use crate::method::Method;
 use crate::passes::Area;
 use crate::scene::{Scene, ShadingSettings};
@@ -9,8 +10,8 @@ use crate::viewer::comparison::{Compared, Other, Wipe};
 use crate::viewer::input::Input;
 use crate::viewer::interaction::Viewer;
 use egui::{
-    Align2, Color32, ColorImage, ComboBox, Context, CursorIcon, DragValue, FontId, Id, LayerId, Order, ProgressBar,
-    Rect, Sense, Stroke, TextureHandle, TextureOptions, Ui, pos2, vec2,
+    Align2, Color32, ColorImage, ComboBox, Context, CursorIcon, DragValue, FontId, Id, LayerId, Order, Painter,
+    ProgressBar, Rect, Sense, Stroke, TextureHandle, TextureOptions, Ui, Vec2, pos2, vec2,
 };
 use std::sync::Arc;
 
@@ -80,7 +81,38 @@ impl State {
         label(&compared.own_name, Align2::RIGHT_TOP, -8.0);
         let name = if viewer.comparer.shows_heat_map { "difference" } else { &compared.name };
         label(name, Align2::LEFT_TOP, 8.0);
+        if viewer.comparer.shows_heat_map {
+            draw_scale(&painter, place);
+        }
         inputs.extend(dragged_line(context, picture, x).map(Input::Wipe));
+    }
+}
+
+/// What the colours of the heat map at `place` stand for, at its lower left.
+fn draw_scale(painter: &Painter, place: Rect) {
+    const BAR: Vec2 = vec2(192.0, 10.0);
+    const STEPS: usize = 96;
+    let bar = Rect::from_min_size(place.left_bottom() + vec2(16.0, -16.0 - BAR.y), BAR);
+    let colour = difference::scale();
+    let decades = -difference::SMALLEST.log10();
+    let at = |part: f32| bar.left() + part * BAR.x;
+    painter.rect_filled(bar.expand2(vec2(14.0, 6.0)).with_min_y(bar.top() - 20.0), 3.0, Color32::from_black_alpha(160));
+    for step in 0..STEPS {
+        let [low, high] = [step, step + 1].map(|end| end as f32 / STEPS as f32);
+        let [r, g, b] = colour(10_f64.powf((f64::from(low + high) / 2.0 - 1.0) * decades));
+        let part = Rect::from_x_y_ranges(at(low)..=at(high), bar.y_range());
+        painter.rect_filled(part, 0.0, Color32::from_rgb(r, g, b));
+    }
+    for decade in 0..=decades.round() as i32 {
+        let part = decade as f32 / decades as f32;
+        let text = format!("{}", 10_f64.powi(decade) * difference::SMALLEST);
+        painter.text(
+            pos2(at(part), bar.top() - 3.0),
+            Align2::CENTER_BOTTOM,
+            text,
+            FontId::proportional(11.0),
+            Color32::WHITE,
+        );
     }
 }
 

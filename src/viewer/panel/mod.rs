@@ -36,7 +36,11 @@ impl Panel {
         let mut inputs = Vec::new();
         SidePanel::right("panel").exact_width(WIDTH).resizable(false).show(context, |ui| {
             ui.add_space(4.0);
-            progress(ui, viewer);
+            ui.horizontal(|ui| {
+                undo_and_redo(ui, viewer, &mut inputs);
+                progress(ui, viewer);
+            });
+            ui.separator();
             ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
                 ui.spacing_mut().slider_width = 120.0;
                 self.material.show(ui, viewer, &mut inputs);
@@ -58,6 +62,18 @@ impl Panel {
     }
 }
 
+fn undo_and_redo(ui: &mut Ui, viewer: &Viewer, inputs: &mut Vec<Input>) {
+    let [can_undo, can_redo] = viewer.history.has();
+    for (name, input, can, tooltip) in [
+        ("undo", Input::Undo, can_undo, "Takes back what was last set or opened; the camera stays. Ctrl+Z"),
+        ("redo", Input::Redo, can_redo, "Does again what was taken back. Ctrl+Shift+Z or Ctrl+Y"),
+    ] {
+        if ui.add_enabled(can, egui::Button::new(name).small()).on_hover_text(tooltip).clicked() {
+            inputs.push(input);
+        }
+    }
+}
+
 /// What is being loaded or made, above all else, always of the same height so that nothing jumps.
 fn progress(ui: &mut Ui, viewer: &Viewer) {
     let (share, what) = match viewer.progress().filter(|_| viewer.is_loading()) {
@@ -69,7 +85,6 @@ fn progress(ui: &mut Ui, viewer: &Viewer) {
     ui.add(bar).on_hover_text(
         "What is made in the background: threads (one row for each view angle), uploads. The old picture stays until it is done.",
     );
-    ui.separator();
 }
 
 /// What was last told, over the picture, until it is clicked away.

@@ -1,0 +1,177 @@
+//! Undo and redo: the scenes that were asked for before, one for each thing that the user did.
+//!
+//! Camera and size of the picture are not among what is undone: who takes a material back wants to see it from where the other was seen.
+use super::change::Change;
+use crate::scene::Scene;
+use std::time::{Duration, Instant};
+
+/// Changes of one setting that follow each other within this time are one: a slider that is dragged, a key that is held down.
+const ONE_MOTION: Duration = Duration::from_millis(500);
+/// So many scenes are kept. Each is some hundred bytes, the tables that it names are elsewhere.
+const KEPT: usize = 1000;
+
+/// What was asked for before, and what was undone.
+#[derive(Clone, Debug, Default)]
+pub struct History {
+    before: Vec<Scene>,
+    undone: Vec<Scene>,
+    /// The last change, and when it was made.
+    last: Option<(Change, Instant)>,
+}
+
+impl History {
+    /// `change` is about to be made of the scene `before`, or another scene takes its place (none), at the time `now`.
+    pub fn record(&mut self, before: &Scene, change: Option<&Change>, now: Instant) {
+        if matches!(change, Some(Change::Camera(_) | Change::Size(..))) {
+            return;
+        }
+        let goes_on = self.last.as_ref().zip(change).is_some_and(|((last, when), change)| {
+            last.is_undone_by(change) && now.saturating_duration_since(*when) < ONE_MOTION
+        });
+        self.last = change.map(|change| (change.clone(), now));
+        self.undone.clear();
+        if goes_on {
+            return;
+        }
+        if self.before.len() == KEPT {
+            self.before.remove(0);
+        }
+        self.before.push(before.clone());
+    }
+
+    /// The scene before the last thing that changed `wanted`, looked at as that is; none if nothing did.
+    pub fn undo(&mut self, wanted: &Scene) -> Option<Scene> {
+        step(&mut self.before, &mut self.undone, &mut self.last, wanted)
+    }
+
+    /// The scene before the last [`undo`](Self::undo), looked at as `wanted` is; none if something else was done since.
+    pub fn redo(&mut self, wanted: &Scene) -> Option<Scene> {
+        step(&mut self.undone, &mut self.before, &mut self.last, wanted)
+    }
+
+    /// Whether there is something to undo, and to redo.
+    pub fn has(&self) -> [bool; 2] {
+        [!self.before.is_empty(), !self.undone.is_empty()]
+    }
+}
+
+/// Takes the last scene that is not `wanted` anyway, as what could not be loaded leaves, and puts `wanted` into its place.
+fn step(
+    from: &mut Vec<Scene>,
+    to: &mut Vec<Scene>,
+    last: &mut Option<(Change, Instant)>,
+    wanted: &Scene,
+) -> Option<Scene> {
+    *last = None;
+    while let Some(mut scene) = from.pop() {
+        scene.camera = wanted.camera;
+        (scene.image.width, scene.image.height) = (wanted.image.width, wanted.image.height);
+        if scene != *wanted {
+            to.push(wanted.clone());
+            return Some(scene);
+        }
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::MaterialSource;
+
+    /// What a user does, one thing a second.
+    struct User {
+        history: History,
+        scene: Scene,
+        now: Instant,
+    }
+
+    impl User {
+        fn new() -> Self {
+            Self { history: History::default(), scene: Scene::default(), now: Instant::now() }
+        }
+
+        fn does_after(&mut self, change: &Change, wait: Duration) {
+            self.now += wait;
+            self.history.record(&self.scene, Some(change), self.now);
+            change.apply(&mut self.scene).unwrap();
+        }
+
+        fn does(&mut self, change: &Change) {
+            self.does_after(change, Duration::from_secs(1));
+        }
+
+        fn undoes(&mut self) -> bool {
+            let scene = self.history.undo(&self.scene);
+            scene.map(|scene| self.scene = scene).is_some()
+        }
+
+        fn redoes(&mut self) -> bool {
+            let scene = self.history.redo(&self.scene);
+            scene.map(|scene| self.scene = scene).is_some()
+        }
+    }
+
+    #[test]
+    fn each_thing_done_is_undone_and_done_again_in_turn() {
+        let mut user = User::new();
+        assert!(!user.undoes() && !user.redoes() && user.history.has() == [false, false]);
+        let mut scenes = vec![user.scene.clone()];
+        for change in
+            [Change::Exposure(2.0), Change::Material(MaterialSource::Builtin("silver".into())), Change::Gamma(1.5)]
+        {
+            user.does(&change);
+            scenes.push(user.scene.clone());
+        }
+        for scene in scenes.iter().rev().skip(1) {
+            assert!(user.undoes() && user.scene == *scene);
+        }
+        assert!(!user.undoes());
+        for scene in &scenes[1..] {
+            assert!(user.redoes() && user.scene == *scene);
+        }
+        assert!(!user.redoes());
+        // What was undone is gone when something else is done.
+        user.undoes();
+        user.does(&Change::Gamma(2.0));
+        assert!(user.history.has() == [true, false] && !user.redoes());
+    }
+
+    #[test]
+    fn a_slider_that_is_dragged_is_one_thing() {
+        let mut user = User::new();
+        for step in 0..20 {
+            user.does_after(&Change::Exposure(1.0 + f64::from(step)), Duration::from_millis(100));
+        }
+        // Another setting is another thing, and so is the same one later.
+        user.does_after(&Change::Gamma(1.5), Duration::from_millis(100));
+        user.does(&Change::Gamma(1.8));
+        user.undoes();
+        assert_eq!((user.scene.image.exposure, user.scene.image.gamma), (20.0, 1.5));
+        user.undoes();
+        assert_eq!((user.scene.image.exposure, user.scene.image.gamma), (20.0, 2.2));
+        assert!(user.undoes() && user.scene == Scene::default());
+    }
+
+    #[test]
+    fn camera_and_size_stay_as_they_are() {
+        let mut user = User::new();
+        user.does(&Change::Exposure(2.0));
+        let camera = crate::scene::Camera::framing(glam::DVec3::ONE, 3.0, 1.0);
+        user.does(&Change::Camera(Some(camera)));
+        user.does(&Change::Size(30, 20));
+        assert!(user.undoes());
+        assert_eq!((user.scene.image.exposure, user.scene.camera, user.scene.image.width), (1.0, Some(camera), 30));
+        assert!(!user.undoes(), "moving the camera is nothing to undo");
+    }
+
+    #[test]
+    fn what_could_not_be_loaded_is_nothing_to_undo() {
+        let mut user = User::new();
+        user.does(&Change::Exposure(2.0));
+        let before = user.scene.clone();
+        user.does(&Change::Material(MaterialSource::File("broken.binary".into())));
+        user.scene = before;
+        assert!(user.undoes() && user.scene == Scene::default());
+    }
+}
