@@ -46,7 +46,7 @@ fn each_change_makes_what_it_needs_and_nothing_else() {
         ("turn of the light", |scene| scene.environment.rotation_deg = 10.0, &[]),
         ("intensity", |scene| scene.environment.intensity = 2.0, &[]),
         ("camera", |scene| scene.camera = Some(Camera::framing(glam::DVec3::ZERO, 2.0, 1.0)), &[]),
-        ("no background", |scene| scene.image.background = Background::None, &[]),
+        ("no background", |scene| scene.image.background = Background::None, &["shaders"]),
         ("place of an object", |scene| scene.objects[0].scale = 2.0, &[]),
         // They are made in as many sets.
         ("sub-pixels", |scene| scene.image.subpixels = 1, &["threads", "upload of materials", "shaders"]),

@@ -12,6 +12,10 @@ use super::{Brdf, LobeShape, MadeTable, lobe_radius};
 /// Relative error of a table at which nodes are no longer added.
 const TARGET_ERROR: f64 = 2e-3;
 
+/// Views that are darker than this part of the brightest one count as if they had it: beside an edge of f, as that of the shadows of `sgd`, a view
+/// may be black whose table is only nearly so.
+const NEARLY_BLACK: f64 = 1e-3;
+
 /// Nodes along tan(theta_h / 2) of tables of isotropic BRDFs: 0.3 to 2.5 MB of 8 bytes a texel.
 const TANGENTS: &[usize] = &[32, 63, 125, 249];
 
@@ -111,8 +115,11 @@ fn error(table: &Brdf, samples: &[Vec<Sample>]) -> f64 {
             sum += sample.value * sample.weight;
             difference += (sample.value - table.evaluate(sample.w_i, sample.w_o)).abs() * sample.weight;
         }
-        // A black channel has no error: its table is black.
-        (difference / sum.max(DVec3::splat(f64::MIN_POSITIVE))).max_element()
+        (sum, difference)
     };
-    samples.iter().map(of_view).fold(0.0, f64::max)
+    let views: Vec<_> = samples.iter().map(of_view).collect();
+    let brightest = views.iter().fold(DVec3::ZERO, |brightest, (sum, _)| brightest.max(*sum));
+    // A black channel has no error: its table is black.
+    let least = (NEARLY_BLACK * brightest).max(DVec3::splat(f64::MIN_POSITIVE));
+    views.iter().map(|(sum, difference)| (difference / sum.max(least)).max_element()).fold(0.0, f64::max)
 }

@@ -209,6 +209,12 @@ impl Device {
         self.timestamp_valid_bits > 0 && !self.is_lavapipe
     }
 
+    /// Whether clearing all of a target is faster than a part of it: lavapipe clears parts by one thread, and whole targets tile by tile, as it
+    /// draws into them.
+    pub(super) fn clears_whole_targets(&self) -> bool {
+        self.is_lavapipe
+    }
+
     /// An error for the object `name` of `other`, if that is another device than this.
     pub(super) fn check_same(&self, other: &Self, name: &str) -> Result<()> {
         if std::ptr::eq(self, other) { Ok(()) } else { Err(VulkanError::unfit(name, "it is of another device")) }

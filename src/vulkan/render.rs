@@ -23,11 +23,12 @@ pub(crate) struct DepthTarget<'a> {
 }
 
 impl Commands {
-    /// Clears the targets and draws into them, within `area` (left, top, width, height) if there is one, each mesh with its push constants and all with these `bindings`.
+    /// Clears the targets and draws into them, each mesh with its push constants and all with these `bindings`. Where there is an `area` (left, top,
+    /// width, height), they may hold anything beyond it afterwards.
     ///
     /// # Errors
-    /// Targets that `pipeline` was not made for, or that differ in size; an area that is empty or beyond them; meshes, bindings or push constants that are not what its
-    /// shaders declare.
+    /// Targets that `pipeline` was not made for, or that differ in size; an area that is empty or beyond them; meshes, bindings or push constants
+    /// that are not what its shaders declare.
     pub(crate) fn render<'d>(
         &mut self,
         pipeline: &GraphicsPipeline,
@@ -40,6 +41,7 @@ impl Commands {
         self.check_targets(pipeline, color.image, depth.image)?;
         let [width, height, _] = color.image.shape.extent;
         let area = area_within(color.image, area)?;
+        let cleared = if self.device.clears_whole_targets() { area_within(color.image, None)? } else { area };
         let colors = [vk::RenderingAttachmentInfo::default()
             .image_view(color.image.view)
             .image_layout(vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL)
@@ -54,7 +56,7 @@ impl Commands {
             .store_op(vk::AttachmentStoreOp::DONT_CARE)
             .clear_value(vk::ClearValue { depth_stencil });
         let info = vk::RenderingInfo::default()
-            .render_area(area)
+            .render_area(cleared)
             .layer_count(1)
             .color_attachments(&colors)
             .depth_attachment(&depth_attachment);

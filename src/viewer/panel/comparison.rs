@@ -92,11 +92,11 @@ impl State {
 fn draw_scale(painter: &Painter, place: Rect) {
     const BAR: Vec2 = vec2(192.0, 10.0);
     const STEPS: usize = 96;
-    let bar = Rect::from_min_size(place.left_bottom() + vec2(16.0, -16.0 - BAR.y), BAR);
+    let bar = Rect::from_min_size(place.left_bottom() + vec2(36.0, -16.0 - BAR.y), BAR);
     let colour = difference::scale();
     let decades = -difference::SMALLEST.log10();
     let at = |part: f32| bar.left() + part * BAR.x;
-    painter.rect_filled(bar.expand2(vec2(14.0, 6.0)).with_min_y(bar.top() - 20.0), 3.0, Color32::from_black_alpha(160));
+    painter.rect_filled(bar.expand2(vec2(24.0, 6.0)).with_min_y(bar.top() - 20.0), 3.0, Color32::from_black_alpha(160));
     for step in 0..STEPS {
         let [low, high] = [step, step + 1].map(|end| end as f32 / STEPS as f32);
         let [r, g, b] = colour(10_f64.powf((f64::from(low + high) / 2.0 - 1.0) * decades));
