@@ -1,6 +1,7 @@
 //! Undo and redo: the scenes that were asked for before, one for each thing that the user did.
 //!
-//! Camera and size of the picture are not among what is undone: who takes a material back wants to see it from where the other was seen.
+//! Camera and size of the picture are not among what is undone: who takes a material back wants to see it from where the other was seen. Only
+//! where a whole scene is taken back does its camera go with it.
 use super::change::Change;
 use crate::scene::Scene;
 use std::time::{Duration, Instant};
@@ -13,10 +14,18 @@ const KEPT: usize = 1000;
 /// What was asked for before, and what was undone.
 #[derive(Clone, Debug, Default)]
 pub struct History {
-    before: Vec<Scene>,
-    undone: Vec<Scene>,
+    before: Vec<Moment>,
+    undone: Vec<Moment>,
     /// The last change, and when it was made.
     last: Option<(Change, Instant)>,
+}
+
+/// A scene as it was.
+#[derive(Clone, Debug)]
+struct Moment {
+    scene: Scene,
+    /// Whether another scene took its place, whose camera was another.
+    was_replaced: bool,
 }
 
 impl History {
@@ -36,7 +45,7 @@ impl History {
         if self.before.len() == KEPT {
             self.before.remove(0);
         }
-        self.before.push(before.clone());
+        self.before.push(Moment { scene: before.clone(), was_replaced: change.is_none() });
     }
 
     /// The scene before the last thing that changed `wanted`, looked at as that is; none if nothing did.
@@ -57,17 +66,19 @@ impl History {
 
 /// Takes the last scene that is not `wanted` anyway, as what could not be loaded leaves, and puts `wanted` into its place.
 fn step(
-    from: &mut Vec<Scene>,
-    to: &mut Vec<Scene>,
+    from: &mut Vec<Moment>,
+    to: &mut Vec<Moment>,
     last: &mut Option<(Change, Instant)>,
     wanted: &Scene,
 ) -> Option<Scene> {
     *last = None;
-    while let Some(mut scene) = from.pop() {
-        scene.camera = wanted.camera;
+    while let Some(Moment { mut scene, was_replaced }) = from.pop() {
+        if !was_replaced {
+            scene.camera = wanted.camera;
+        }
         (scene.image.width, scene.image.height) = (wanted.image.width, wanted.image.height);
         if scene != *wanted {
-            to.push(wanted.clone());
+            to.push(Moment { scene: wanted.clone(), was_replaced });
             return Some(scene);
         }
     }
@@ -163,6 +174,18 @@ mod tests {
         assert!(user.undoes());
         assert_eq!((user.scene.image.exposure, user.scene.camera, user.scene.image.width), (1.0, Some(camera), 30));
         assert!(!user.undoes(), "moving the camera is nothing to undo");
+    }
+
+    #[test]
+    fn a_whole_scene_goes_with_its_camera() {
+        let mut user = User::new();
+        let camera = |x: f64| Some(crate::scene::Camera::framing(glam::DVec3::ONE, x, 1.0));
+        user.does(&Change::Camera(camera(1.0)));
+        user.history.record(&user.scene, None, user.now);
+        let dropped = Scene { camera: camera(2.0), objects: Vec::new(), ..Scene::default() };
+        let before = std::mem::replace(&mut user.scene, dropped.clone());
+        assert!(user.undoes() && user.scene == before);
+        assert!(user.redoes() && user.scene == dropped);
     }
 
     #[test]

@@ -31,7 +31,7 @@ fn outputs_that_cannot_be_written_are_refused_before_any_work() {
 fn what_a_command_reads_it_does_not_write() {
     let folder = workplace();
     fs::write(folder.path().join("scene.toml"), "[environment]\nfile = 'light.exr'\n").unwrap();
-    for name in ["light.exr", "a.png", "b.png"] {
+    for name in ["light.exr", "a.png", "b.png", "a.toml", "a.binary"] {
         fs::write(folder.path().join(name), "precious").unwrap();
     }
     for (arguments, name) in [
@@ -40,6 +40,8 @@ fn what_a_command_reads_it_does_not_write() {
         ("render scene.toml -o out/image.png --stats scene.toml", "scene.toml"),
         ("view scene.toml --stats scene.toml", "scene.toml"),
         ("compare a.png b.png --difference out/../b.png", "out/../b.png"),
+        ("materials fit a.toml --model ggx -o a.toml", "a.toml"),
+        ("materials export a.binary -o ./a.binary", "./a.binary"),
     ] {
         refuses(&folder, arguments, &[&format!("{name}: is read by the same command")]);
     }

@@ -25,6 +25,7 @@ impl Export {
             return Err(Error::in_file(&self.output, "is no known kind of material file", remedy).into());
         }
         output::check_writable(&self.output)?;
+        output::check_not_read([&self.output], [&PathBuf::from(&self.named.material)])?;
         let brdf = self.named.load()?;
         if !brdf.is_isotropic() {
             let remedy = "export an isotropic material";

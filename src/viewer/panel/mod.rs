@@ -65,7 +65,7 @@ impl Panel {
 fn undo_and_redo(ui: &mut Ui, viewer: &Viewer, inputs: &mut Vec<Input>) {
     let [can_undo, can_redo] = viewer.history.has();
     for (name, input, can, tooltip) in [
-        ("undo", Input::Undo, can_undo, "Takes back what was last set or opened; the camera stays. Ctrl+Z"),
+        ("undo", Input::Undo, can_undo, "Takes back what was last set, from where the camera is, or opened. Ctrl+Z"),
         ("redo", Input::Redo, can_redo, "Does again what was taken back. Ctrl+Shift+Z or Ctrl+Y"),
     ] {
         if ui.add_enabled(can, egui::Button::new(name).small()).on_hover_text(tooltip).clicked() {
