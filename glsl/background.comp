@@ -3,17 +3,14 @@
 #extension GL_GOOGLE_include_directive : require
 #include "bounded.glsl"
 #include "camera.glsl"
+#include "coverage.glsl"
 #include "lat_long.glsl"
-#include "tiles.glsl"
 
 layout(local_size_x = TILE_SIDE, local_size_y = TILE_SIDE) in;
 
 // Of pixels that see no surface at all, this pass writes the first value.
 layout(set = 0, binding = 0, rgba32f) uniform image2D radiance;
-layout(set = 0, binding = 2, std430) readonly buffer Coverage {
-    uvec4 coverage[];
-};
-layout(set = 0, binding = 1) uniform sampler2D environment_map;
+layout(set = 0, binding = 2) uniform sampler2D environment_map;
 
 layout(push_constant) uniform Push {
     Camera camera;
@@ -28,10 +25,7 @@ void main() {
     if (any(greaterThanEqual(uvec2(pixel), push.size_px))) {
         return;
     }
-    uvec4 of_tile = uvec4(0);
-    if (is_in_region(push.region, gl_WorkGroupID.xy)) {
-        of_tile = coverage[gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x];
-    }
+    uvec4 of_tile = coverage_of_tile(push.region);
     if (sees_only_surface(of_tile, gl_LocalInvocationIndex)) {
         return;
     }

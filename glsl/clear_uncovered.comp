@@ -1,14 +1,11 @@
 #version 450
 // Makes pixels that see no surface black and transparent, where nothing is put behind the objects.
 #extension GL_GOOGLE_include_directive : require
-#include "tiles.glsl"
+#include "coverage.glsl"
 
 layout(local_size_x = TILE_SIDE, local_size_y = TILE_SIDE) in;
 
 layout(set = 0, binding = 0, rgba32f) uniform writeonly image2D radiance;
-layout(set = 0, binding = 1, std430) readonly buffer Coverage {
-    uvec4 coverage[];
-};
 
 layout(push_constant) uniform Push {
     uvec2 size_px;
@@ -20,11 +17,7 @@ void main() {
     if (any(greaterThanEqual(uvec2(pixel), push.size_px))) {
         return;
     }
-    uvec4 of_tile = uvec4(0);
-    if (is_in_region(push.region, gl_WorkGroupID.xy)) {
-        of_tile = coverage[gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x];
-    }
-    if (!sees_surface(of_tile, gl_LocalInvocationIndex)) {
+    if (!sees_surface(coverage_of_tile(push.region), gl_LocalInvocationIndex)) {
         imageStore(radiance, pixel, vec4(0.0));
     }
 }

@@ -63,21 +63,8 @@ struct Region {
     uvec2 end_tile;
 };
 
-bool is_in_region(Region region, uvec2 tile) {
-    return all(greaterThanEqual(tile, region.first_tile)) && all(lessThan(tile, region.end_tile));
-}
-
-// What the pixels of a tile see, a bit each: xy of any surface, zw of nothing else. Which word of the two the bit of pixel `place` is in, and it.
+// What the pixels of a tile see, a bit each in four words: in two of any surface, in the other two of nothing else. Which of the two the bit of
+// pixel `place` is in, and it.
 uvec2 coverage_bit(uint place) {
     return uvec2(place / 32u, 1u << (place % 32u));
-}
-
-bool sees_surface(uvec4 coverage, uint place) {
-    uvec2 bit = coverage_bit(place);
-    return (coverage[bit.x] & bit.y) != 0u;
-}
-
-bool sees_only_surface(uvec4 coverage, uint place) {
-    uvec2 bit = coverage_bit(place);
-    return (coverage[2u + bit.x] & bit.y) != 0u;
 }
