@@ -39,7 +39,7 @@ pub struct Device {
     pub(super) queue_family: u32,
     pub(super) properties: vk::PhysicalDeviceProperties,
     pub(super) timestamp_valid_bits: u32,
-    is_lavapipe: bool,
+    driver: vk::DriverId,
     description: DeviceDescription,
     #[cfg(feature = "viewer")]
     pub(super) swapchain: Option<khr::swapchain::Device>,
@@ -178,7 +178,7 @@ impl Device {
             queue_family: chosen.queue_family,
             properties: chosen.properties,
             timestamp_valid_bits: chosen.timestamp_valid_bits,
-            is_lavapipe: chosen.is_lavapipe,
+            driver: chosen.driver,
             description: chosen.description,
             #[cfg(feature = "viewer")]
             swapchain: chosen
@@ -206,13 +206,13 @@ impl Device {
     /// Lavapipe (Mesa 22.3) writes them with the next batch of rasterisation, not between the dispatches that they
     /// stand between: a full-screen dispatch of 20 ms was seen to take 0.02 ms by them.
     pub fn times_passes(&self) -> bool {
-        self.timestamp_valid_bits > 0 && !self.is_lavapipe
+        self.timestamp_valid_bits > 0 && self.driver != vk::DriverId::MESA_LLVMPIPE
     }
 
-    /// Whether clearing all of a target is faster than a part of it: lavapipe clears parts by one thread, and whole targets tile by tile, as it
-    /// draws into them.
-    pub(super) fn clears_whole_targets(&self) -> bool {
-        self.is_lavapipe
+    /// Whether clearing a part of a target is faster than all of it. So it was seen to be with NVIDIA's driver. Mesa's for AMD and Intel have fast
+    /// clears of whole targets only, and lavapipe clears parts by one thread, whole targets tile by tile as it draws into them.
+    pub(super) fn clears_parts(&self) -> bool {
+        self.driver == vk::DriverId::NVIDIA_PROPRIETARY
     }
 
     /// An error for the object `name` of `other`, if that is another device than this.

@@ -76,7 +76,7 @@ pub(super) struct Candidate {
     pub properties: vk::PhysicalDeviceProperties,
     pub queue_family: u32,
     pub timestamp_valid_bits: u32,
-    pub is_lavapipe: bool,
+    pub driver: vk::DriverId,
     pub extensions: Vec<&'static CStr>,
 }
 
@@ -123,8 +123,15 @@ fn candidate(instance: &Instance, index: usize, physical: vk::PhysicalDevice) ->
         api_version: version_text(properties.api_version),
         lacks,
     };
-    let is_lavapipe = driver.driver_id == vk::DriverId::MESA_LLVMPIPE;
-    Ok(Candidate { description, physical, properties, queue_family, timestamp_valid_bits, is_lavapipe, extensions })
+    Ok(Candidate {
+        description,
+        physical,
+        properties,
+        queue_family,
+        timestamp_valid_bits,
+        driver: driver.driver_id,
+        extensions,
+    })
 }
 
 /// The extensions to enable: of those that are wanted, the ones that there are. Needed ones that there are not go to `lacks`.

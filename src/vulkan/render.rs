@@ -41,7 +41,7 @@ impl Commands {
         self.check_targets(pipeline, color.image, depth.image)?;
         let [width, height, _] = color.image.shape.extent;
         let area = area_within(color.image, area)?;
-        let cleared = if self.device.clears_whole_targets() { area_within(color.image, None)? } else { area };
+        let cleared = if self.device.clears_parts() { area } else { area_within(color.image, None)? };
         let colors = [vk::RenderingAttachmentInfo::default()
             .image_view(color.image.view)
             .image_layout(vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL)
