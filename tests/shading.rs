@@ -454,15 +454,19 @@ fn a_planted_nan_is_counted() {
 fn pictures_are_the_same_whether_or_not_geometry_is_drawn_where_no_object_is() {
     let renderer = Validated::new();
     let mut seen = Vec::new();
-    for (translate, scale, eye_z) in [
-        (Vec3::ZERO, 1.0, 5.0),
-        (Vec3::new(2.5, 1.4, 0.0), 1.0, 5.0),
-        (Vec3::new(-1.9, -1.3, 0.0), 0.02, 5.0),
-        (Vec3::new(0.3, 0.0, 0.0), -0.3, 5.0),
-        (Vec3::new(0.0, 0.9, 0.0), 1.0, 1.2),
-        (Vec3::new(0.0, 0.0, 0.0), 1.0, 0.3),
-        (Vec3::new(0.0, 0.0, 9.0), 1.0, 5.0),
-        (Vec3::new(40.0, 0.0, 0.0), 1.0, 5.0),
+    let near = |translate, scale, eye_z| (translate, scale, DVec3::ZERO, eye_z, 40.0);
+    for (translate, scale, target, eye_z, fov_y_deg) in [
+        near(Vec3::ZERO, 1.0, 5.0),
+        near(Vec3::new(2.5, 1.4, 0.0), 1.0, 5.0),
+        near(Vec3::new(-1.9, -1.3, 0.0), 0.02, 5.0),
+        near(Vec3::new(0.3, 0.0, 0.0), -0.3, 5.0),
+        near(Vec3::new(0.0, 0.9, 0.0), 1.0, 1.2),
+        near(Vec3::ZERO, 1.0, 0.3),
+        near(Vec3::new(0.0, 0.0, 9.0), 1.0, 5.0),
+        near(Vec3::new(40.0, 0.0, 0.0), 1.0, 5.0),
+        // Where single precision shows.
+        (Vec3::new(3e5, 0.0, 0.0), 1.0, DVec3::new(3e5, 0.0, 0.0), 5.0, 40.0),
+        (Vec3::ZERO, 1.0, DVec3::ZERO, 1e6, 2e-4),
     ] {
         for background in [Background::Environment, Background::None] {
             let mut scene = sphere(model("model = 'lambert'\nreflectance = 0.5"), "sky", 4, (75, 53));
@@ -470,8 +474,8 @@ fn pictures_are_the_same_whether_or_not_geometry_is_drawn_where_no_object_is() {
             scene.image.background = background;
             (scene.objects[0].translate, scene.objects[0].scale) = (translate, scale);
             scene.objects[0].rotate_deg = Vec3::new(10.0, 20.0, 30.0);
-            scene.camera =
-                Some(Camera { eye: DVec3::new(0.1, 0.2, eye_z), target: DVec3::ZERO, up: DVec3::Y, fov_y_deg: 40.0 });
+            let eye = target + DVec3::new(0.1, 0.2, eye_z);
+            scene.camera = Some(Camera { eye, target, up: DVec3::Y, fov_y_deg });
             let prepared = ready(&scene);
             let whole = renderer.render(&prepared, EVERYTHING);
             let parts = renderer.render(&prepared, Wanted { geometry: false, ..EVERYTHING });

@@ -1,4 +1,5 @@
 //! Pass 1 of the paper (section 4.1): normal and material of what is seen, at sub-pixel resolution.
+use super::region::Corner;
 use super::{Region, View};
 use crate::Result;
 use crate::graph::{FrameGraph, ImageDesc, ImageHandle};
@@ -22,6 +23,9 @@ const VERTEX_STRIDE: u32 = size_of::<[f32; 3]>() as u32;
 /// Distance of the near plane in units of the scene's extent: with reversed, infinite depth it costs no precision to keep it
 /// nearer than any surface that a camera outside of the scene sees.
 const NEAR_PLANE: f64 = 1e-6;
+
+/// What the vertex shader may be off by, of the size of what it adds: some ten roundings of 2^-24.
+const ROUNDING: f64 = 1e-6;
 
 /// How tangents go by the axis of an object, as glsl/geometry_cache.glsl has it; 0 is not at all.
 const TANGENT_AROUND: f32 = 1.0;
@@ -192,8 +196,13 @@ impl GeometryCache {
     pub fn region(&self, view: &View, tile_px: [u32; 2]) -> Region {
         let corners = self.seen(view).flat_map(|object| {
             let (low, high) = self.meshes[object.mesh].bounds;
-            let corner = move |index: u32| Vec3::select(BVec3::from([1, 2, 4].map(|bit| index & bit != 0)), high, low);
-            (0..8).map(move |index| object.to_world.transform_point3(corner(index).as_dvec3()) - view.camera.eye)
+            let DAffine3 { matrix3, translation } = object.to_world;
+            let from_eye = translation - view.camera.eye;
+            (0..8).map(move |index| {
+                let corner = Vec3::select(BVec3::from([1, 2, 4].map(|bit| index & bit != 0)), high, low);
+                let turned = matrix3 * corner.as_dvec3();
+                Corner { from_eye: turned + from_eye, error: ROUNDING * (turned.length() + from_eye.length()) }
+            })
         });
         Region::of_boxes(view, tile_px, corners)
     }

@@ -14,12 +14,20 @@ pub struct Region {
     pub tile_px: [u32; 2],
 }
 
-/// Corners may be projected to so many pixels beside where vertices are: what single precision makes of these, below a tenth of a pixel where
-/// [`MIN_DEPTH`] holds, and then some.
+/// A corner of a box around an object, as seen from the eye.
+#[derive(Clone, Copy, Debug)]
+pub struct Corner {
+    /// Where it is.
+    pub from_eye: DVec3,
+    /// How far off single precision, in which vertices are drawn, may put a vertex there.
+    pub error: f64,
+}
+
+/// Devices move corners of triangles to fractions of a pixel; a whole one is more than that.
 const MARGIN_PX: f64 = 1.0;
 
 /// Boxes with corners that are not this far before the eye, of their distance, may be anywhere: small errors of a vertex are large ones on the
-/// picture there, and behind the eye there is no place on it.
+/// picture there, and behind the eye there is no place on it. So are errors that are more than this part of the distance.
 const MIN_DEPTH: f64 = 0.01;
 
 impl Region {
@@ -28,27 +36,29 @@ impl Region {
         Self { first_tile: [0; 2], end_tile: tiles(view, tile_px), tile_px }
     }
 
-    /// Where boxes with these corners, from the eye, are in the picture.
-    pub fn of_boxes(view: &View, tile_px: [u32; 2], corners: impl IntoIterator<Item = DVec3>) -> Self {
+    /// Where boxes with these corners are in the picture.
+    pub fn of_boxes(view: &View, tile_px: [u32; 2], corners: impl IntoIterator<Item = Corner>) -> Self {
         let (right, up, forward) = view.camera.basis();
         let half_size = view.half_size();
         let size_px = DVec2::new(f64::from(view.width), f64::from(view.height));
         let (mut low, mut high) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
-        for corner in corners {
-            let depth = corner.dot(forward);
+        for Corner { from_eye, error } in corners {
+            let depth = from_eye.dot(forward);
+            let least_depth = (MIN_DEPTH * from_eye.length()).max(error / MIN_DEPTH);
             // A NaN is not before the eye.
-            if depth.partial_cmp(&(MIN_DEPTH * corner.length())) != Some(Ordering::Greater) {
+            if depth.partial_cmp(&least_depth) != Some(Ordering::Greater) {
                 return Self::whole(view, tile_px);
             }
-            let place = DVec2::new(corner.dot(right), -corner.dot(up)) / (depth * half_size);
-            let place = (0.5 * place + 0.5) * size_px;
-            (low, high) = (low.min(place), high.max(place));
+            let px = 0.5 * size_px / (depth * half_size);
+            let place = 0.5 * size_px + px * DVec2::new(from_eye.dot(right), -from_eye.dot(up));
+            // Off to the side, and off in depth, which moves what is beside the axis in proportion.
+            let margin = MARGIN_PX + px * error * (1.0 + from_eye.length() / depth);
+            (low, high) = (low.min(place - margin), high.max(place + margin));
         }
         let tile = DVec2::new(f64::from(tile_px[0]), f64::from(tile_px[1]));
         let end = tiles(view, tile_px);
         // Without corners, or with all of them beside the picture, the first tile stands for nothing.
-        let first = ((low - MARGIN_PX) / tile).floor().to_array();
-        let last = ((high + MARGIN_PX) / tile).ceil().to_array();
+        let (first, last) = ((low / tile).floor().to_array(), (high / tile).ceil().to_array());
         let first_tile = [0, 1].map(|axis| (first[axis].max(0.0) as u32).min(end[axis] - 1));
         let end_tile = [0, 1].map(|axis| (last[axis].max(0.0) as u32).clamp(first_tile[axis] + 1, end[axis]));
         Self { first_tile, end_tile, tile_px }
@@ -79,6 +89,10 @@ mod tests {
     use crate::scene::Camera;
 
     const TILE_PX: [u32; 2] = [8, 8];
+
+    fn exact(from_eye: DVec3) -> Corner {
+        Corner { from_eye, error: 0.0 }
+    }
 
     fn view() -> View {
         let camera = Camera {
@@ -113,7 +127,7 @@ mod tests {
             let corner = |k: usize| {
                 center + half * DVec3::from([0, 1, 2].map(|axis| f64::from((k >> axis & 1) as u8) * 2.0 - 1.0))
             };
-            let region = Region::of_boxes(&view, TILE_PX, (0..8).map(corner));
+            let region = Region::of_boxes(&view, TILE_PX, (0..8).map(corner).map(exact));
             let [left, top, width, height] = region.subpixels(&view).map(|subpixels| f64::from(subpixels) / 2.0);
             for k in 0..200 {
                 let at = |m: usize| (k * m % 199) as f64 / 99.0 - 1.0;
@@ -145,14 +159,36 @@ mod tests {
         let whole = Region::whole(&view, TILE_PX);
         assert_eq!((whole.tiles(), whole.subpixels(&view)), ([51, 26], [0, 0, 806, 406]));
         for corners in [vec![forward, -forward], vec![DVec3::ZERO], vec![forward, DVec3::NAN]] {
-            assert_eq!(Region::of_boxes(&view, TILE_PX, corners), whole);
+            assert_eq!(Region::of_boxes(&view, TILE_PX, corners.into_iter().map(exact)), whole);
         }
+        assert_eq!(Region::of_boxes(&view, TILE_PX, [Corner { from_eye: forward, error: 0.02 }]), whole);
         assert_eq!(Region::of_boxes(&view, TILE_PX, []).tiles(), [1, 1]);
         // Right of the picture and below it.
         let (right, up, _) = view.camera.basis();
         for beside in [forward + 2.0 * right, forward - 2.0 * up, forward + 2.0 * up, forward - 2.0 * right] {
-            let [columns, rows] = Region::of_boxes(&view, TILE_PX, [beside]).tiles();
+            let [columns, rows] = Region::of_boxes(&view, TILE_PX, [exact(beside)]).tiles();
             assert!(columns == 1 || rows == 1, "{beside}");
+        }
+    }
+
+    #[test]
+    fn where_vertices_may_be_off_there_is_room_for_them() {
+        let view = view();
+        let (right, up, forward) = view.camera.basis();
+        for error in [0.0, 1e-4, 1e-3, 9e-3] {
+            let at = forward + 0.1 * right - 0.05 * up;
+            let [left, top, width, height] = Region::of_boxes(&view, TILE_PX, [Corner { from_eye: at, error }])
+                .subpixels(&view)
+                .map(|subpixels| f64::from(subpixels) / 2.0);
+            for k in 0..200 {
+                let turn = |m: usize| (k * m) as f64;
+                let off = DVec3::new(turn(3).sin(), turn(17).cos(), turn(71).sin()).normalize() * error;
+                let pixel = pixel_of(&view, at + off).expect("a point before the eye");
+                assert!(
+                    pixel.x >= left && pixel.x < left + width && pixel.y >= top && pixel.y < top + height,
+                    "{error} {pixel}"
+                );
+            }
         }
     }
 }
