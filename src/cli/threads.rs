@@ -43,6 +43,12 @@ pub struct Threads {
 }
 
 impl Threads {
+    /// Those of `material` that are made where nothing else is asked for, to be written to `output`.
+    pub fn of(material: String, output: PathBuf) -> Self {
+        let method = ThreadKind::default().name().to_owned();
+        Self { material, count: None, method, seed: 0, no_cache: false, output: Some(output), plot: None }
+    }
+
     pub fn run(self) -> anyhow::Result<()> {
         if self.output.is_none() && self.plot.is_none() {
             let remedy = "name a thread file with -o FILE, or a picture with --plot FILE.png";

@@ -157,6 +157,11 @@ fn a_material_is_exported_and_plotted() {
     threadlight(&folder, "materials plot gold -o gold.svg").assert().success();
     assert!(String::from_utf8(bytes(&folder, "gold.svg")).unwrap().contains("</svg>"));
     threadlight(&folder, "materials export clay -o clay.png").assert().code(2);
+    threadlight(&folder, "materials export clay -o exported.threads").assert().success();
+    threadlight(&folder, "threads clay -o made.threads").assert().success();
+    let [exported, made] =
+        ["exported", "made"].map(|name| fs::read(folder.path().join(name).with_extension("threads")).unwrap());
+    assert!(exported == made);
 }
 
 #[test]

@@ -1,28 +1,34 @@
-//! `threadlight materials export`: a BRDF as a file that other programs read.
+//! `threadlight materials export`: a BRDF as a file that other programs read, or its threads.
 use super::Named;
+use crate::cli::threads::Threads;
+use std::ffi::OsStr;
 use std::path::PathBuf;
 use threadlight::Error;
 use threadlight::low_level::brdf::merl_bytes;
 use threadlight::low_level::output;
 
-/// Writes the BRDF as a table of the MERL database's form: a `.binary` file of 35 MB.
+/// Writes the BRDF as a table of the MERL database's form, a `.binary` file of 35 MB, or its sample threads, a `.threads` file.
 ///
-/// Its cells are about a degree wide, finer towards the mirror direction: a GGX lobe of roughness 0.03 comes back with an error below 1 %,
-/// one of 0.01 with 2 %. Sample threads are written by `threadlight threads MATERIAL -o FILE.threads`.
+/// Cells of the table are about a degree wide, finer towards the mirror direction: a GGX lobe of roughness 0.03 comes back with an error below
+/// 1 %, one of 0.01 with 2 %. Threads are as `threadlight threads` makes them, which has flags for their number and kind.
 #[derive(clap::Args)]
 pub struct Export {
     #[command(flatten)]
     named: Named,
-    /// File to write; its name ends in .binary.
-    #[arg(short, long, value_name = "FILE.binary")]
+    /// File to write; its name ends in .binary or .threads.
+    #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
 }
 
 impl Export {
     pub fn run(self) -> anyhow::Result<()> {
-        if self.output.extension().is_none_or(|extension| extension != "binary") {
-            let remedy = "end its name in .binary; for .threads there is `threadlight threads`";
-            return Err(Error::in_file(&self.output, "is no known kind of material file", remedy).into());
+        match self.output.extension().and_then(OsStr::to_str) {
+            Some("binary") => {}
+            Some("threads") => return Threads::of(self.named.material, self.output).run(),
+            _ => {
+                let remedy = "end its name in .binary or .threads";
+                return Err(Error::in_file(&self.output, "is no known kind of material file", remedy).into());
+            }
         }
         output::check_writable(&self.output)?;
         output::check_not_read([&self.output], [&PathBuf::from(&self.named.material)])?;
