@@ -8,6 +8,10 @@ use super::three_numbers;
 const DEFAULT_EYE: DVec3 = DVec3::new(1.5, 1.0, 3.5);
 /// Vertical field of view of the default view.
 const DEFAULT_FOV_Y_DEG: f64 = 36.0;
+/// Below it single precision, in which rays are, has fewer than 30 directions from edge to edge of a picture.
+const NARROWEST_DEG: f64 = 1e-4;
+/// Objects reach 1e9 from the origin at most; they can be looked at from a million times as far.
+const FARTHEST: f64 = 1e15;
 
 /// A camera that looks from `eye` to `target`. World right-handed; pixel (0, 0) is at the top left.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -19,7 +23,7 @@ pub struct Camera {
     pub target: DVec3,
     /// Whatever is up in the image; not parallel to the line of sight.
     pub up: DVec3,
-    /// Vertical field of view in degrees, in (0, 180).
+    /// Vertical field of view in degrees, from 1e-4 to below 180.
     pub fov_y_deg: f64,
 }
 
@@ -80,27 +84,35 @@ impl Camera {
             if !value.is_finite() {
                 return Err(format!("`{key}` must be three finite numbers"));
             }
+            if key != "up" && value.abs().max_element() > FARTHEST {
+                return Err(format!("`{key}` must be within {FARTHEST:e} of the origin"));
+            }
         }
         let sight = self.target - self.eye;
         if sight.length() == 0.0 {
             return Err("`eye` and `target` must not be the same point".into());
         }
         // Below a thousandth of a degree, roundings would decide which way is right.
-        let sine = sight.normalize().cross(self.up.normalize_or_zero()).length();
+        let sine = sight.normalize().cross(self.unit_up()).length();
         if sine < 1e-5 {
             return Err("`up` must not be zero or parallel to the line from `eye` to `target`".into());
         }
         // Not written as two comparisons of the other sense, as NaN must fail too.
-        if !(self.fov_y_deg > 0.0 && self.fov_y_deg < 180.0) {
-            return Err("`fov_y_deg` must be between 0 and 180".into());
+        if !(self.fov_y_deg >= NARROWEST_DEG && self.fov_y_deg < 180.0) {
+            return Err(format!("`fov_y_deg` must be at least {NARROWEST_DEG:e} and below 180"));
         }
         Ok(())
+    }
+
+    /// `up` of length 1, however long it is; 0 if it is 0.
+    pub fn unit_up(&self) -> DVec3 {
+        (self.up / self.up.abs().max_element()).normalize_or_zero()
     }
 
     /// The unit vectors right, up and forward of the image.
     pub fn basis(&self) -> (DVec3, DVec3, DVec3) {
         let forward = (self.target - self.eye).normalize();
-        let right = forward.cross(self.up).normalize();
+        let right = forward.cross(self.unit_up()).normalize();
         (right, right.cross(forward), forward)
     }
 
@@ -127,7 +139,7 @@ impl Camera {
     }
 
     fn view_f64(&self) -> DMat4 {
-        dcamera::rh::view::look_at_mat4(self.eye, self.target, self.up.normalize())
+        dcamera::rh::view::look_at_mat4(self.eye, self.target, self.unit_up())
     }
 
     fn projection_f64(&self, aspect: f64) -> DMat4 {
@@ -163,6 +175,17 @@ mod tests {
             let error = reference().ray(x, y, 640, 480) - DVec3::from_array(expected);
             assert!(error.abs().max_element() < 1e-6, "{x} {y}: {error}");
         }
+    }
+
+    #[test]
+    fn it_does_not_matter_how_long_up_is() {
+        let camera = |length: f64| Camera { up: length * DVec3::new(0.1, 2.0, 0.3), ..reference() };
+        for length in [1e-300, 1e-5, 1e5, 1e300] {
+            assert_eq!(camera(length).validate(), Ok(()));
+            let off = camera(length).ray(3.0, 5.0, 64, 48) - camera(1.0).ray(3.0, 5.0, 64, 48);
+            assert!(off.length() < 1e-12 && camera(length).view().is_finite(), "{length}: {off}");
+        }
+        assert!(camera(0.0).validate().is_err());
     }
 
     #[test]

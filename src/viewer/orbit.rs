@@ -62,7 +62,7 @@ impl Orbit {
     /// The orbit that `camera` (a sound one: [`Camera::validate`]) is on, around objects within `bounds`. Where the camera is
     /// nearer to a pole, nearer or farther than orbits go, it is put at the bound.
     pub fn new(camera: &Camera, bounds: Bounds) -> Self {
-        let vertical = camera.up.normalize();
+        let vertical = camera.unit_up();
         let out = camera.eye - camera.target;
         let height = out.dot(vertical);
         let across = out - height * vertical;
@@ -187,7 +187,7 @@ mod tests {
         let same = |a: DVec3, b: DVec3| a.distance(b) < 1e-9 * (1.0 + a.length());
         same(a.eye, b.eye)
             && same(a.target, b.target)
-            && same(a.up.normalize(), b.up.normalize())
+            && same(a.unit_up(), b.unit_up())
             && (a.fov_y_deg - b.fov_y_deg).abs() < 1e-9
     }
 

@@ -41,6 +41,8 @@ fn hostile_scene_files_are_refused() {
         ("[[material]]\nname = 'velvet'", "blue-velvet"),
         ("[camera]\neye = [0, 0, 0]", "target"),
         ("[camera]\neye = [0, 0, 4]\nfov_y_deg = 180", "fov_y_deg"),
+        ("[camera]\neye = [0, 0, 4]\nfov_y_deg = 1e-300", "at least 1e-4"),
+        ("[camera]\neye = [0, 0, 1e200]", "`eye` must be within 1e15"),
     ] {
         println!("{text}");
         fs::write(folder.path().join("bad.toml"), text).unwrap();
