@@ -1,4 +1,5 @@
 //! Reads meshes from Wavefront OBJ files, and cleans them so that nothing degenerate reaches the rasteriser.
+use std::borrow::Cow;
 use std::collections::HashMap;
 use std::fmt::Write;
 use std::path::Path;
@@ -17,6 +18,9 @@ pub struct TexturedMesh {
     /// One a position, not finite where there is none; or empty.
     pub uvs: Vec<Vec2>,
 }
+
+/// What lines of the mesh begin with.
+const MESH_KEYWORDS: [&str; 4] = ["v", "vn", "vt", "f"];
 
 pub(super) const FORMAT: FileFormat<Mesh> =
     FileFormat { extension: "obj", name: "a Wavefront .obj", is_of_format: |_| true, parse };
@@ -40,7 +44,7 @@ fn parse_parts(path: &Path, bytes: &[u8], is_textured: bool) -> Result<TexturedM
     // Names in old files are in any encoding; the numbers are ASCII in all of them.
     let text = String::from_utf8_lossy(bytes);
     // Some editors put a byte order mark first, which would be part of the first word.
-    let obj = read_obj(text.trim_start_matches('\u{feff}'), is_textured)
+    let obj = read_obj(&joined_lines(text.trim_start_matches('\u{feff}')), is_textured)
         .map_err(|problem| Error::in_file(path, problem, "repair or export it again"))?;
     let (textured, dropped) = clean(&obj);
     let mesh = &textured.mesh;
@@ -53,6 +57,30 @@ fn parse_parts(path: &Path, bytes: &[u8], is_textured: bool) -> Result<TexturedM
     }
     tracing::debug!("{}: {} triangles, {} vertices", path.display(), mesh.indices.len() / 3, mesh.positions.len());
     Ok(textured)
+}
+
+/// `text` with each line of the mesh that a backslash continues as one. Lines after it keep their numbers. Comments and names, such as that of a
+/// folder, may end in a backslash and go no further.
+fn joined_lines(text: &str) -> Cow<'_, str> {
+    if !text.contains('\\') {
+        return text.into();
+    }
+    let (mut joined, mut continued) = (String::with_capacity(text.len()), 0);
+    for line in text.lines() {
+        let is_of_mesh =
+            continued > 0 || MESH_KEYWORDS.contains(&line.split_ascii_whitespace().next().unwrap_or_default());
+        match line.trim_end().strip_suffix('\\').filter(|_| is_of_mesh) {
+            Some(begun) => {
+                joined.extend([begun, " "]);
+                continued += 1;
+            }
+            None => {
+                joined.push_str(line);
+                joined.extend(std::iter::repeat_n('\n', 1 + std::mem::take(&mut continued)));
+            }
+        }
+    }
+    joined.into()
 }
 
 /// The triangles in the text of an OBJ, each corner with an index into the positions and one into the normals; a corner
@@ -87,7 +115,7 @@ fn geometry_lines(text: &str, is_textured: bool) -> Result<String, String> {
     let (mut lines, mut normals_before, mut uvs_before) = (String::with_capacity(text.len()), 0, 0);
     for (index, line) in text.lines().enumerate() {
         let mut words = line.split_ascii_whitespace();
-        let Some(keyword @ ("v" | "vn" | "vt" | "f")) = words.next() else { continue };
+        let Some(keyword) = words.next().filter(|word| MESH_KEYWORDS.contains(word)) else { continue };
         if keyword == "vt" && !is_textured {
             continue;
         }
@@ -187,6 +215,19 @@ fn vectors(numbers: &[f32]) -> Vec<Vec3> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_backslash_continues_a_line_of_the_mesh_and_nothing_else() {
+        let whole = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+        let broken = "# C:\\models\\\nv 0 \\\n0 0\nv 1 0 0\no a\\\nv 0 1 0\nf 1\\ \r\n 2 \\\n3\n";
+        let parse = |text: &str| parse(Path::new("a.obj"), text.as_bytes());
+        let [whole, broken] = [whole, broken].map(|text| parse(text).unwrap());
+        assert_eq!((whole.positions, whole.indices), (broken.positions, broken.indices));
+        // Errors name the line in the file; at its end there is nothing to go on with.
+        let error = parse("v 0 \\\n0 0\nv 1 0 0\nv 0 1 0\nf 1//9 2 3\n").unwrap_err().to_string();
+        assert!(error.contains("line 5"), "{error}");
+        assert!(parse("v 0 0 0\nf 1 1 \\").is_err());
+    }
 
     #[test]
     fn no_mixture_of_hostile_words_panics_or_gives_a_mesh_that_cannot_be_drawn() {

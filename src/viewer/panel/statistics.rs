@@ -16,8 +16,9 @@ pub fn show(ui: &mut Ui, viewer: &Viewer) {
             let [width, height] = measured.size;
             row("frame", format!("{:.1} ms", measured.frame.as_secs_f64() * 1e3), "From the start of the last frame until it was handed to the window.");
             if let (Some(median), Some(latest)) = (viewer.latency.shown_ms(0.5), viewer.latency.answers().back()) {
-                let finished = latest.finished_ms.map_or_else(String::new, |ms| format!(", finished {ms:.0}"));
-                row("input", format!("{median:.0} ms, latest {:.0}{finished}", latest.shown_ms), "From an input to the frame that shows it: median of the latest hundred, and the latest one; and where it shows threads that are only drafts, to the frame with finished ones.");
+                row("input", format!("{median:.0} ms"), "From an input to the frame that shows it: median of the latest hundred.");
+                let finished = latest.finished_ms.map_or_else(String::new, |ms| format!(", finished {ms:.0} ms"));
+                row("latest input", format!("{:.0} ms{finished}", latest.shown_ms), "The same of the latest one; where that frame shows threads that are only drafts, also to the frame with finished ones.");
             }
             row("picture", format!("{width} x {height}"), "Pixels of the last frame: fewer than the window has while it moves, where it would be slow.");
             if let Some((counters, lookups)) = measured.counted {
