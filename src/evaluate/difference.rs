@@ -21,16 +21,20 @@ pub fn heat_map(a: &Comparable, b: &Comparable, mask_background: bool) -> Vec<u8
     let compared = compared_pixels(a, b, mask_background).unwrap_or_else(|_| vec![true; a.display.len()]);
     let map = a.display.iter().zip(&b.display).zip(&compared).map(|((a, b), compared)| {
         let largest = (0..3).map(|channel| (a[channel] - b[channel]).abs()).fold(0.0, f32::max);
-        if *compared { colour(f64::from(largest)) } else { LEFT_OUT }
+        if *compared { colour(place_of(f64::from(largest))) } else { LEFT_OUT }
     });
     map.flat_map(opaque).collect()
 }
 
-/// The colour of a difference in a [`heat_map`].
+/// Where on the scale a difference is: 0 at the smallest one, 1 at 1.
+fn place_of(difference: f64) -> f64 {
+    1.0 - difference.max(SMALLEST).log10() / SMALLEST.log10()
+}
+
+/// The scale of a [`heat_map`]: the colour at a place on it, from 0, which is [`SMALLEST`], by the logarithm to 1.
 pub fn scale() -> impl Fn(f64) -> [u8; 3] {
     let colours = nv_flip::magma_lut().to_vec();
-    move |difference: f64| {
-        let place = 1.0 - difference.max(SMALLEST).log10() / SMALLEST.log10();
+    move |place: f64| {
         let index = (255.0 * place).round().min(255.0) as usize;
         [colours[3 * index], colours[3 * index + 1], colours[3 * index + 2]]
     }
@@ -51,12 +55,13 @@ pub fn difference_picture(a: &Comparable, b: &Comparable, mask_background: bool)
     let width = a.width;
     let decades = -SMALLEST.log10();
     let scale = (0..width).map(|x| {
-        let exponent = (x as f64 + 0.5) / width as f64 * decades - decades;
+        let place = (x as f64 + 0.5) / width as f64;
+        let exponent = (place - 1.0) * decades;
         let half_a_pixel = 0.5 * decades / width as f64;
         let is_tick = (exponent - exponent.round()).abs() <= half_a_pixel
             && exponent.round().abs() < decades
             && exponent.round() != 0.0;
-        if is_tick { LEFT_OUT } else { colour(10_f64.powf(exponent)) }
+        if is_tick { LEFT_OUT } else { colour(place) }
     });
     let scale: Vec<_> = scale.collect();
     let gap = std::iter::repeat_n(LEFT_OUT, GAP_ROWS * width);

@@ -1,5 +1,5 @@
 //! What is seen past the surface: the environment, or nothing.
-use super::{CameraRays, Region, Tiles, View};
+use super::{CameraRays, Tiles, View};
 use crate::Result;
 use crate::environment::Environment;
 use crate::graph::{FrameGraph, ImageHandle};
@@ -47,13 +47,8 @@ struct ClearPush {
     region: TileRegion,
 }
 
-/// `Region` in glsl/tiles.glsl.
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-struct TileRegion {
-    first_tile: [u32; 2],
-    end_tile: [u32; 2],
-}
+/// `Region` in glsl/tiles.glsl: the first tile, and those after the last.
+type TileRegion = [[u32; 2]; 2];
 
 impl BackgroundMap {
     /// Uploads the map.
@@ -111,8 +106,7 @@ pub fn background<'a>(
     view: &View,
 ) -> ImageHandle {
     let size_px = [view.width, view.height];
-    let Region { first_tile, end_tile, .. } = tiles.region;
-    let region = TileRegion { first_tile, end_tile };
+    let region = [tiles.region.first_tile, tiles.region.end_tile];
     let pass = match background {
         Background::Environment { pipeline, map } => {
             let (rotation, radiance_scale) = (view.rotation(), view.intensity as f32);

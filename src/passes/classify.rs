@@ -43,14 +43,6 @@ pub struct Counters {
 /// Bytes of `TileClass` in glsl/tiles.glsl: the arguments of an indirect dispatch, and a count.
 const TILE_CLASS_BYTES: u64 = 16;
 
-impl Classify {
-    /// Width and height of a tile in pixels: it is a workgroup.
-    pub fn tile_px(&self) -> [u32; 2] {
-        let [width, height, _] = self.pipeline.group_size();
-        [width, height]
-    }
-}
-
 impl Counters {
     /// Pixels that see a surface.
     pub fn covered_pixels(&self) -> u64 {
@@ -76,6 +68,14 @@ pub struct Classify {
     pub shader_count: u32,
     /// That of pixels of materials that have different ones.
     pub shader_of_mixed: u32,
+}
+
+impl Classify {
+    /// Width and height of a tile in pixels: it is a workgroup.
+    pub fn tile_px(&self) -> [u32; 2] {
+        let [width, height, _] = self.pipeline.group_size();
+        [width, height]
+    }
 }
 
 #[repr(C)]

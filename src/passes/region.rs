@@ -4,7 +4,7 @@ use glam::{DVec2, DVec3};
 use std::cmp::Ordering;
 
 /// A rectangle of whole tiles in the picture, at least one.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Region {
     /// Column and row of the first tile.
     pub first_tile: [u32; 2],

@@ -80,12 +80,14 @@ impl Camera {
 
     /// Whether the camera can see: an error in words names the key at fault.
     pub fn validate(&self) -> Result<(), String> {
-        for (key, value) in [("eye", self.eye), ("target", self.target), ("up", self.up)] {
+        for (key, value, most) in
+            [("eye", self.eye, FARTHEST), ("target", self.target, FARTHEST), ("up", self.up, f64::MAX)]
+        {
             if !value.is_finite() {
                 return Err(format!("`{key}` must be three finite numbers"));
             }
-            if key != "up" && value.abs().max_element() > FARTHEST {
-                return Err(format!("`{key}` must be within {FARTHEST:e} of the origin"));
+            if value.abs().max_element() > most {
+                return Err(format!("`{key}` must be within {most:e} of the origin"));
             }
         }
         let sight = self.target - self.eye;

@@ -207,14 +207,11 @@ impl Viewer {
                 self.comparer.shows_heat_map = *shows;
                 Ok(())
             }
-            Input::Undo => {
-                let scene = self.history.undo(self.session.wanted());
-                scene.into_iter().for_each(|scene| self.replace(scene));
-                Ok(())
-            }
-            Input::Redo => {
-                let scene = self.history.redo(self.session.wanted());
-                scene.into_iter().for_each(|scene| self.replace(scene));
+            Input::Undo | Input::Redo => {
+                let step = if *input == Input::Undo { History::undo } else { History::redo };
+                if let Some(scene) = step(&mut self.history, self.session.wanted()) {
+                    self.replace(scene);
+                }
                 Ok(())
             }
             // What the window itself does.

@@ -99,7 +99,7 @@ fn draw_scale(painter: &Painter, place: Rect) {
     painter.rect_filled(bar.expand2(vec2(24.0, 6.0)).with_min_y(bar.top() - 20.0), 3.0, Color32::from_black_alpha(160));
     for step in 0..STEPS {
         let [low, high] = [step, step + 1].map(|end| end as f32 / STEPS as f32);
-        let [r, g, b] = colour(10_f64.powf((f64::from(low + high) / 2.0 - 1.0) * decades));
+        let [r, g, b] = colour(f64::from(low + high) / 2.0);
         let part = Rect::from_x_y_ranges(at(low)..=at(high), bar.y_range());
         painter.rect_filled(part, 0.0, Color32::from_rgb(r, g, b));
     }

@@ -2,6 +2,7 @@
 use super::group;
 use crate::viewer::input::Input;
 use egui::Ui;
+use std::collections::HashSet;
 use std::path::PathBuf;
 
 pub struct State {
@@ -9,7 +10,7 @@ pub struct State {
     scene: String,
     opened: String,
     /// Files that this session has written.
-    written: Vec<PathBuf>,
+    written: HashSet<PathBuf>,
     /// A file of somebody else's that the next press would replace.
     to_replace: Option<PathBuf>,
 }
@@ -20,7 +21,7 @@ impl Default for State {
             picture: "threadlight.png".to_owned(),
             scene: "threadlight.toml".to_owned(),
             opened: String::new(),
-            written: Vec::new(),
+            written: HashSet::new(),
             to_replace: None,
         }
     }
@@ -58,7 +59,7 @@ impl State {
             return false;
         }
         self.to_replace = None;
-        self.written.push(path.clone());
+        self.written.insert(path.clone());
         true
     }
 }
