@@ -13,7 +13,7 @@
 //!
 //! Row r is for the view angle theta_o = r 90 deg / rows, in the frame whose z is the normal and in which w_o = (sin theta_o, 0,
 //! cos theta_o). Colours are linear Rec. 709. Thread k of row r is the (r count + k)-th. Of an anisotropic BRDF there are as many rows for
-//! each of 10, 19 or 37 azimuths of w_o from the tangent, every 10 degrees; then those of the second azimuth follow those of the first.
+//! each of 19, 37 or 73 azimuths of w_o from the tangent, every 5 degrees; then those of the second azimuth follow those of the first.
 //! Of fitted threads and Gaussians in several sets thread k is of set k % sets: each set does alone, with as many times the weights as there are sets.
 //! Twice as much content are two such tables: the second is of threads in sets, for sub-pixels, and the first of as many threads that are not, for
 //! pixels whose sub-pixels share one sum.
@@ -40,7 +40,7 @@ use crate::file_format;
 use crate::output::write_whole;
 
 /// Version of the file format and of the threads in it: to be raised when either changes, since caches depend on it.
-pub const FORMAT_VERSION: u32 = 16;
+pub const FORMAT_VERSION: u32 = 17;
 
 const MAGIC: &[u8; 8] = b"THREADS\0";
 const DIGEST_BYTES: usize = blake3::OUT_LEN;

@@ -65,7 +65,7 @@ impl CustomBrdf for Leaning {
     }
 }
 
-/// Anisotropic ones of each symmetry, by name: of 10, 19 and 37 azimuths of the view.
+/// Anisotropic ones of each symmetry, by name: of 19, 37 and 73 azimuths of the view.
 pub fn anisotropic() -> Vec<(&'static str, Brdf)> {
     let brushed = |text: &str| Brdf::from_parameters("conductor", text.parse().unwrap()).unwrap();
     vec![

@@ -5,6 +5,7 @@ use super::edit::Edit;
 use super::generate::{Neighbour, Row, carried, from_the_middle, most_moved, scaled};
 use super::kernel::{Kernel, SHARPEST_LEVEL, WIDEST_LEVEL, all_between};
 use super::lights::{Quadrature, TestLights};
+use super::sets::share_of_sets;
 use super::solve::{Effort, Fit};
 use super::table::FittedTable;
 use crate::brdf::{Brdf, SeenBrdf, luminance};
@@ -17,7 +18,7 @@ use crate::threads::slice::{Resolution, Slice};
 const ROW_STEP: usize = 5;
 
 /// The same of azimuths of the view.
-const AZIMUTH_STEP: usize = 3;
+const AZIMUTH_STEP: usize = 6;
 
 /// One more row is fitted, so many before the last: at the rim threads move most from row to row, and blends of rows further apart flicker.
 /// Not of anisotropic BRDFs: brushed aluminium's drafts had 1.1 times the error with it, for a quarter more time.
@@ -51,14 +52,15 @@ const LIGHTS_A_THREAD: usize = 16;
 /// # Errors
 /// Cancelled by `observer`.
 pub fn draft(brdf: &Brdf, before: &FittedTable, observer: &dyn Observer) -> Result<FittedTable> {
-    let Some(of_subpixels) = &before.of_subpixels else { return continued(brdf, before, observer) };
+    let share = share_of_sets(before.azimuths, before.of_subpixels.is_some());
+    let Some(of_subpixels) = &before.of_subpixels else { return continued(brdf, before, share, observer) };
     let (of_pixels, of_subpixels) =
-        rayon::join(|| continued(brdf, before, observer), || continued(brdf, of_subpixels, observer));
+        rayon::join(|| continued(brdf, before, share, observer), || continued(brdf, of_subpixels, share, observer));
     Ok(of_pixels?.with_subpixels(of_subpixels?))
 }
 
-/// The threads of `before`, but not those of its sub-pixels.
-fn continued(brdf: &Brdf, before: &FittedTable, observer: &dyn Observer) -> Result<FittedTable> {
+/// The threads of `before`, but not those of its sub-pixels; what `share` is, [`Fit::in_sets`] says.
+fn continued(brdf: &Brdf, before: &FittedTable, share: f32, observer: &dyn Observer) -> Result<FittedTable> {
     let FittedTable { rows, azimuths, count, sets, .. } = *before;
     let (mut places, columns) = (every(ROW_STEP, rows), every(AZIMUTH_STEP, azimuths));
     let before_rim = rows.saturating_sub(RIM_STEP + 1);
@@ -78,7 +80,7 @@ fn continued(brdf: &Brdf, before: &FittedTable, observer: &dyn Observer) -> Resu
     let middle = places[places.len() / 2];
     let edit = {
         let (lights, albedo, kernels) = of_row(middle);
-        let fit = Fit::new(&lights, albedo / lights.unit).in_sets(sets);
+        let fit = Fit::new(&lights, albedo / lights.unit).in_sets(sets, share);
         Edit::found(&fit, &kernels, view(middle).theta_o)
     };
     let fit = |index: usize, neighbours: [Neighbour; 2]| -> Result<Row> {
@@ -91,7 +93,7 @@ fn continued(brdf: &Brdf, before: &FittedTable, observer: &dyn Observer) -> Resu
             [a, b] => a.or(b).map(carried),
         };
         let mut start = edit.applied(&kernels, view(index).theta_o, beside.as_deref());
-        let fit = Fit::new(&lights, albedo / lights.unit).in_sets(sets);
+        let fit = Fit::new(&lights, albedo / lights.unit).in_sets(sets, share);
         fit.solve_weights(&mut start);
         let (tied_to, strength, effort) = match &beside {
             Some(beside) => (beside, TIED, NEXT),

@@ -35,11 +35,6 @@ const LEAST_DIAGONAL: f32 = 1e-12;
 /// Steps to the best weights: the first is exact but for weights that would be negative and for what rounding makes of kernels that are alike.
 const WEIGHT_STEPS: usize = 4;
 
-/// How much the squared residuals of sets alone, in their mean, count beside those of all together. With less, sub-pixels whose normals are
-/// so far apart that their errors do not cancel err more; with more, all others do. Of ten measured materials in three maps, with 16 threads
-/// and at 80 x 60, a dragon has 0.0018, 0.0016 and 0.0015 with 0.5, 0.7 and 1.5, a sphere 0.0016, 0.0015 and 0.0017.
-const SHARE_OF_SETS: f32 = 0.7;
-
 /// What kernels leave.
 struct Rest {
     cost: f64,
@@ -54,6 +49,8 @@ pub struct Fit<'a> {
     albedo: DVec3,
     /// Kernel k is of set k % `sets`.
     sets: usize,
+    /// How much the squared residuals of sets alone, in their mean, count beside those of all together.
+    share_of_sets: f32,
     /// Tied to these, with this strength: the row before.
     prior: Option<(&'a [Kernel], f64)>,
 }
@@ -61,13 +58,13 @@ pub struct Fit<'a> {
 impl<'a> Fit<'a> {
     /// Of the slice with this albedo, which answers `lights` as they say; the albedo and all weights in units of `lights`.
     pub fn new(lights: &'a TestLights, albedo: DVec3) -> Self {
-        Self { lights, albedo, sets: 1, prior: None }
+        Self { lights, albedo, sets: 1, share_of_sets: 0.0, prior: None }
     }
 
     /// The same in so many sets of kernels, each of which answers the lights by itself too, with as many times the weights: kernel k is of
-    /// set k % `sets`. Their mean is what all kernels together answer.
-    pub fn in_sets(self, sets: usize) -> Self {
-        Self { sets, ..self }
+    /// set k % `sets`. Their mean is what all kernels together answer. That counts once, and what sets answer `share_of_sets` times, in their mean.
+    pub fn in_sets(self, sets: usize, share_of_sets: f32) -> Self {
+        Self { sets, share_of_sets, ..self }
     }
 
     /// The same, tied to kernels `before`: each that moves by its width, or whose level changes by 1, counts as much as this part of the
@@ -121,9 +118,9 @@ impl<'a> Fit<'a> {
         }
         let of_set = |set: usize| {
             let mut alone = self.residuals(kernels, answers, Some(set));
-            cost += f64::from(SHARE_OF_SETS) / self.sets as f64 * squares(&alone);
+            cost += f64::from(self.share_of_sets) / self.sets as f64 * squares(&alone);
             for (alone, together) in alone.iter_mut().zip(&together) {
-                alone.iter_mut().zip(together).for_each(|(a, t)| *a = t + SHARE_OF_SETS * *a);
+                alone.iter_mut().zip(together).for_each(|(a, t)| *a = t + self.share_of_sets * *a);
             }
             alone
         };
@@ -322,7 +319,7 @@ impl<'a> Fit<'a> {
     /// the weights as there are sets.
     fn coupling(&self, k: usize, l: usize) -> f32 {
         let is_within = self.sets > 1 && k % self.sets == l % self.sets;
-        if is_within { 1.0 + SHARE_OF_SETS * self.sets as f32 } else { 1.0 }
+        if is_within { 1.0 + self.share_of_sets * self.sets as f32 } else { 1.0 }
     }
 
     /// The lower half of Gauss and Newton's matrix, and the gradient. Unknowns: red, green and blue weights of all kernels, then two
