@@ -362,7 +362,7 @@ pub fn threads() -> Reader {
             };
             let of_subpixels = Some(Box::new(FittedTable { material: String::new(), ..fitted(2, 1) }));
             let of_both = FittedTable { sets: 1, of_subpixels, ..fitted(2, 1) };
-            let (isotropic, anisotropic) = (Threads::Fitted(of_both.clone()), Threads::Fitted(fitted(1, 10)));
+            let (isotropic, anisotropic) = (Threads::Fitted(of_both.clone()), Threads::Fitted(fitted(1, 19)));
             let file = |threads| written("x.threads", |path| threads::write(&threads, path).expect("a file"));
             vec![file(Threads::Paper(paper)), file(isotropic), file(anisotropic), file(Threads::Gaussian(of_both))]
         },
