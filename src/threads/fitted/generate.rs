@@ -24,13 +24,10 @@ const NEXT: Effort = Effort { steps: 40, least_gain: 3e-3 };
 /// All rows have the same lights where these are not placed by the slice: threads follow the BRDF, not the lights.
 const LIGHTS_SEED: usize = 0;
 
-/// How strongly a row is tied to what is carried over from its neighbour: [`Fit::tied`]. With ten times as much, ten measured materials err by
-/// 3 and 10 % more with 16 and 64 threads, and threads turn from row to row by a seventh less.
-const TIED: f64 = 1e-7;
-
-/// The same for an anisotropic BRDF, whose azimuths are five times as far apart as its view angles. With [`TIED`], four brushed materials err by 1 to
-/// 2 % more, since they err more between azimuths.
-const TIED_BY_AZIMUTH: f64 = 3e-7;
+/// How strongly a row is tied to what is carried over from its neighbour: [`Fit::tied`]. With three times as much, ten measured materials err by
+/// 3 and 7 % more with 16 and 64 threads. With a third of it they err by 3 % less with 64, but kernels of gold move by more than
+/// [`MOST_MOVED`] in a row near the rim, and four brushed materials err by 1 to 2 % more, since they err more between azimuths.
+const TIED: f64 = 3e-7;
 
 /// By [`most_moved`] kernels must not move by more than this between rows a degree apart: what moves by more, since some changed places,
 /// shows as a line, however well each of both rows is fitted. Where they would, they go part of the way, and further in the next rows. What
@@ -137,7 +134,6 @@ fn fit_all(
     row_is_done: &(impl Fn() + Sync),
 ) -> Result<FittedTable> {
     let rows = settings.rows;
-    let tied = if targets.azimuths == 1 { TIED } else { TIED_BY_AZIMUTH };
     // Row `index` of all azimuths, from what its neighbours' kernels are there: those of the view angle before and of the azimuth before.
     let fit = |index: usize, neighbours: &[(usize, &Row)]| -> Result<Row> {
         observer.check()?;
@@ -151,22 +147,28 @@ fn fit_all(
             (before, here)
         });
         let (before, neighbours): (Vec<_>, Vec<_>) = neighbours.unzip();
+        let fit = Fit::new(lights, *albedo / lights.unit).in_sets(settings.sets, share);
         let start = match &neighbours[..] {
             [] => {
                 let View { theta_o, phi_o } = View::of_row(index, rows);
                 let [_, lobes] = Slice::with_lobes(&SeenBrdf::from_azimuth(brdf, phi_o), theta_o, Resolution::FULL);
-                let mut start = in_units(&in_sets(&lobes, settings.count, settings.sets));
-                start.iter_mut().for_each(|kernel| kernel.level = kernel.level.max(lights.sharpest_level()));
-                start
+                let solved = |cells: Vec<Kernel>| {
+                    let mut kernels = in_units(&cells);
+                    kernels.iter_mut().for_each(|kernel| kernel.level = kernel.level.max(lights.sharpest_level()));
+                    fit.solve(&mut kernels, FIRST, observer)?;
+                    Ok((fit.cost(&kernels), kernels))
+                };
+                let starts = in_sets(&lobes, settings.count, settings.sets);
+                let all = starts.into_par_iter().map(solved).collect::<Result<Vec<_>>>()?;
+                let best = all.into_iter().min_by(|(a, _), (b, _)| a.total_cmp(b));
+                best.map(|(_, kernels)| kernels).unwrap_or_default()
             }
             [one] => one.clone(),
             [a, b, ..] => all_between(a, b, 0.5),
         };
-        let fit = Fit::new(lights, *albedo / lights.unit).in_sets(settings.sets, share);
         let mut free = start.clone();
-        match neighbours.is_empty() {
-            true => fit.solve(&mut free, FIRST, observer)?,
-            false => fit.tied(&start, tied).solve(&mut free, NEXT, observer)?,
+        if !neighbours.is_empty() {
+            fit.tied(&start, TIED).solve(&mut free, NEXT, observer)?;
         }
         let is_steady = |kernels: &[Kernel]| match (&before[..], targets.azimuths) {
             ([before], 1) => {

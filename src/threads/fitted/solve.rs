@@ -90,6 +90,11 @@ impl<'a> Fit<'a> {
         (squares(&residuals) / if responses > 0.0 { responses } else { 1.0 }).sqrt()
     }
 
+    /// What is minimised (F22), in units of `lights`.
+    pub fn cost(&self, kernels: &[Kernel]) -> f64 {
+        self.rest(kernels, &Answers::new(kernels, self.lights)).cost
+    }
+
     /// (F21), of all kernels or of a set alone: red, green, blue.
     fn residuals(&self, kernels: &[Kernel], answers: &Answers, set: Option<usize>) -> [Vec<f32>; 3] {
         let TestLights { cosine, response, .. } = self.lights;

@@ -59,8 +59,8 @@ fn kernels_do_not_jump_between_rows() {
         let albedo = glam::Vec3::from(table.albedo[row]).as_dvec3();
         let before = at(row - 1);
         let moved = most_moved([&before, &carried(&before, from, to)], &at(row), albedo);
-        // What is packed is rounded, and where less would double the error, in the last rows, one moves by 1.07 times that.
-        assert!(moved < 1.1 * MOST_MOVED, "row {row}, {} sets: {moved}", table.sets);
+        // What is packed is rounded.
+        assert!(moved < 1.05 * MOST_MOVED, "row {row}, {} sets: {moved}", table.sets);
     }
 }
 
@@ -237,10 +237,8 @@ fn each_set_of_threads_does_alone_and_all_do_better() {
         let each: Vec<_> = (0..4).map(|set| error(&alone(table, set))).collect();
         let all = error(table);
         println!("{name}: {few:.4} with 4 threads, {each:.4?} with sets of 4, {all:.4} with all 16, {free:.4} if free");
-        // Of a lobe of 0.3 degrees, which 4 threads answer as 16 do, one set has 2.6 times the error of the others.
-        let most = if name == "conductor 0.005" { 1.2 } else { 1.0 };
         assert!(each.iter().all(|&each| each < 3.0 * few), "{name}: {few} {each:?}");
-        assert!(all < most * few && all < each.iter().sum::<f64>() / 4.0, "{name}: {all} {few} {each:?}");
+        assert!(all < few && all < each.iter().sum::<f64>() / 4.0, "{name}: {all} {few} {each:?}");
     }
 }
 
