@@ -16,10 +16,10 @@ layout(set = 0, binding = 1, std430) buffer Counters {
     Counted counted;
     TileClass classes[];
 } counters;
-// For each class of pixels the tiles that hold any.
-layout(set = 0, binding = 2, std430) writeonly buffer TileList {
-    uvec2 tiles[];
-} tile_list;
+// For each class of pixels the parts of tiles that hold them.
+layout(set = 0, binding = 2, std430) writeonly buffer PartList {
+    uint parts[];
+} part_list;
 // For each tile of the image the places of its pixels in it, class by class.
 layout(set = 0, binding = 3, std430) writeonly buffer PixelList {
     uint pixels[];
@@ -151,10 +151,15 @@ void main() {
     }
     uint k = gl_LocalInvocationIndex;
     if (k < CLASSES && listed[k] > 0) {
-        uint tile_place = atomicAdd(counters.classes[k].tile_count, 1);
-        uint tile_count = tile_counts().x * tile_counts().y;
-        tile_list.tiles[k * tile_count + tile_place] = pack_tile(this_tile(), first_slot(k), listed[k]);
-        atomicMax(counters.classes[k].groups_x, min(tile_place + 1, MAX_GROUPS));
+        uint parts = (listed[k] + PART_PIXELS - 1) / PART_PIXELS;
+        uint others = atomicAdd(counters.classes[k].part_count, parts);
+        uint first = k * PARTS * tile_counts().x * tile_counts().y + others;
+        uint slot = first_slot(k);
+        for (uint part = 0; part < parts; ++part) {
+            uint before = part * PART_PIXELS;
+            part_list.parts[first + part] = pack_part(this_tile(), slot + before, min(listed[k] - before, PART_PIXELS));
+        }
+        atomicMax(counters.classes[k].groups_x, min((others + parts + PARTS - 1) / PARTS, MAX_GROUPS));
         atomicMax(counters.classes[k].groups_y, 1);
         atomicMax(counters.classes[k].groups_z, 1);
         atomicAdd(counters.counted.pixels[kind_of(k)], listed[k]);

@@ -14,15 +14,17 @@ layout(local_size_x = TILE_PIXELS) in;
 
 layout(constant_id = 0) const uint SUBPIXELS = 2; // per axis
 layout(constant_id = 5) const uint HAS_TANGENTS = 0; // 0: no material of the scene needs them
+// 0: pixels at edges, whose sub-pixels share nothing. A driver that masks lanes out would have each of them pay for what interior ones share.
+layout(constant_id = 7) const uint IS_INTERIOR = 1;
 
 layout(set = 0, binding = 0) uniform utexture2D geometry;
 layout(set = 0, binding = 1, std430) readonly buffer Counters {
     Counted counted;
     TileClass classes[];
 } counters;
-layout(set = 0, binding = 2, std430) readonly buffer TileList {
-    uvec2 tiles[];
-} tile_list;
+layout(set = 0, binding = 2, std430) readonly buffer PartList {
+    uint parts[];
+} part_list;
 layout(set = 0, binding = 9, std430) readonly buffer PixelList {
     uint pixels[];
 } pixel_list;
@@ -94,23 +96,23 @@ void main() {
         group_lookups = 0;
     }
     uvec2 tiles = (push.size_px + TILE_SIDE - 1) / TILE_SIDE;
-    bool interior = kind_of(push.pixel_class) == INTERIOR;
-    // Only as many workgroups as tiles are dispatched. So the first needs no test, and with the test at the end of a loop no driver that
-    // masks lanes out runs the body once more for none.
-    uint t = gl_WorkGroupID.x;
+    uint part_count = counters.classes[push.pixel_class].part_count;
+    // With the test at the end of a loop no driver that masks lanes out runs the body once more for none.
+    uint p = PARTS * gl_WorkGroupID.x + gl_LocalInvocationIndex / PART_PIXELS;
     do {
-        uvec2 packed = tile_list.tiles[push.pixel_class * tiles.x * tiles.y + t];
-        if (gl_LocalInvocationIndex < tile_pixel_count(packed)) {
-            uint tile = tile_index(packed);
-            uint slot = tile_first_slot(packed) + gl_LocalInvocationIndex;
+        uint part = part_list.parts[push.pixel_class * PARTS * tiles.x * tiles.y + min(p, part_count - 1)];
+        uint place_in_part = gl_LocalInvocationIndex % PART_PIXELS;
+        if (p < part_count && place_in_part < part_pixel_count(part)) {
+            uint tile = part_tile(part);
+            uint slot = part_first_slot(part) + place_in_part;
             uint place = pixel_list.pixels[tile * TILE_PIXELS + slot];
             uvec2 pixel = uvec2(tile % tiles.x, tile / tiles.x) * TILE_SIDE + uvec2(place % TILE_SIDE, place / TILE_SIDE);
-            vec4 shaded = shade_pixel(pixel, interior);
+            vec4 shaded = shade_pixel(pixel, IS_INTERIOR != 0);
             vec3 scaled = bounded(bounded(shaded.rgb * push.radiance_scale) * push.intensity);
             imageStore(radiance, ivec2(pixel), vec4(scaled, shaded.a));
         }
-        t += gl_NumWorkGroups.x;
-    } while (t < counters.classes[push.pixel_class].tile_count);
+        p += PARTS * gl_NumWorkGroups.x;
+    } while (p < part_count);
     barrier();
     atomicAdd(group_lookups, lookups);
     barrier();

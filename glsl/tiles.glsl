@@ -1,12 +1,19 @@
 // The tiles to shade, shared by the pass that lists them and those that go by that.
 // Twin of the layout: src/passes/classify.rs.
 //
-// Pixels are packed tile by tile rather than over the whole image: then the pixels of one workgroup of the shade pass are
+// Pixels are packed tile by tile rather than over the whole image, and listed in parts of a tile: then the pixels of a part are
 // the same, in the same order, in every run. On a CPU device the last bit of a lookup depends on the lookups of its neighbours.
 
 // Pixels on the side of a tile; a tile is a workgroup of both passes.
 const uint TILE_SIDE = 8u;
 const uint TILE_PIXELS = TILE_SIDE * TILE_SIDE;
+
+// Pixels of one class in a part of a tile, at most: the lanes of lavapipe. Of larger parts more lanes are idle, since most tiles of a mesh have pixels
+// of several classes; smaller ones are longer lists.
+const uint PART_PIXELS = 8u;
+
+// Parts of a tile that is of one class, and of a workgroup that shades.
+const uint PARTS = TILE_PIXELS / PART_PIXELS;
 
 // Interior pixels see one smooth surface in all their sub-pixels, which share one sum or share its samples out;
 // in edge pixels each covered sub-pixel is a sum of its own.
@@ -22,12 +29,12 @@ uint kind_of(uint pixel_class) {
     return pixel_class & 1u;
 }
 
-// The tiles that hold pixels of one class: the arguments of an indirect dispatch, and how many tiles are listed.
+// The tiles that hold pixels of one class: the arguments of an indirect dispatch, and how many parts of them are listed.
 struct TileClass {
     uint groups_x;
     uint groups_y;
     uint groups_z;
-    uint tile_count;
+    uint part_count;
 };
 
 // What is counted of all classes, by kind of pixels where there are two.
@@ -37,24 +44,25 @@ struct Counted {
     uint covered_edge_subpixels;
 };
 
-// The limit on workgroups that every device has; beyond it a workgroup takes several tiles.
+// The limit on workgroups that every device has; beyond it a workgroup takes more than PARTS.
 const uint MAX_GROUPS = 65535u;
 
-// A listed tile: its index, row by row, the first slot of the class among the tile's pixels, and how many of these are of the class (1 to 64).
-uvec2 pack_tile(uint tile, uint first_slot, uint pixel_count) {
-    return uvec2(tile, first_slot | pixel_count << 8);
+// A listed part of a tile: the tile's index, row by row (a picture of 16384 x 16384 pixels has 2^22), the part's first slot among the pixels of the
+// tile, and how many it has (1 to PART_PIXELS).
+uint pack_part(uint tile, uint first_slot, uint pixel_count) {
+    return tile << 9 | first_slot << 3 | pixel_count - 1;
 }
 
-uint tile_index(uvec2 packed) {
-    return packed.x;
+uint part_tile(uint part) {
+    return part >> 9;
 }
 
-uint tile_first_slot(uvec2 packed) {
-    return packed.y & 255u;
+uint part_first_slot(uint part) {
+    return part >> 3 & 63;
 }
 
-uint tile_pixel_count(uvec2 packed) {
-    return packed.y >> 8;
+uint part_pixel_count(uint part) {
+    return (part & 7) + 1;
 }
 
 // The tiles that may see a surface, those of columns and rows from the first to before the end; only these are drawn and sorted.

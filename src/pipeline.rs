@@ -116,7 +116,8 @@ impl DeviceScene {
         let materials = round.ask(&upload)?;
         let shaders = ShadersOfMaterials::new(prepared, light.blurred.as_ref());
         let light = round.ask(&UploadLight { device, method, environment, light: &light, way_around })?;
-        let pipelines = shaders.constants.iter().map(|constants| compile(shader, constants)).collect::<Result<_>>()?;
+        let of_classes = shaders.constants_of_classes().map(|constants| compile(shader, &constants));
+        let pipelines = of_classes.collect::<Result<_>>()?;
         let background = match prepared.show_environment {
             true => Background::Environment {
                 pipeline: compile(&compiled::BACKGROUND, &[])?,

@@ -10,7 +10,7 @@ pub(crate) type Constants = Vec<(&'static str, u32)>;
 /// The shaders of a scene's method: materials that need the same share one, so that no pixel pays for what other materials are made of.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct ShadersOfMaterials {
-    /// What each is specialised by; no two are alike.
+    /// What each is specialised by, besides the kind of pixels; no two are alike.
     pub constants: Vec<Constants>,
     /// Which of them shades each material.
     pub of_materials: Vec<u32>,
@@ -31,6 +31,13 @@ impl ShadersOfMaterials {
         });
         let of_all = shade_constants(prepared, &prepared.materials, light.map(|light| light.needs));
         Self::of(&of_each.collect::<Vec<_>>(), of_all)
+    }
+
+    /// What the shader of each class of pixels is specialised by: of interior pixels and of those at edges, shader by shader.
+    pub fn constants_of_classes(&self) -> impl Iterator<Item = Constants> {
+        self.constants.iter().flat_map(|constants| {
+            [1, 0].map(|is_interior| constants.iter().copied().chain([("IS_INTERIOR", is_interior)]).collect())
+        })
     }
 
     /// Where each material needs these constants, and all together need `of_all`; that is also the shader of materials beyond [`MAX_SHADERS`].

@@ -258,11 +258,10 @@ AtSources at_sources(Surface surface, Material material, Lobe lobe) {
 }
 
 // Between which rows a view is, of the table's words where these start: two of an isotropic BRDF, three of an anisotropic one, which are
-// the corners of a triangle of view angles and azimuths. Blends are the first, and these parts of the ways from it to the others.
+// the corners of a triangle of view angles and azimuths.
 struct Rows {
     uvec3 start;
-    float to_second;
-    float to_third;   // 0 of an isotropic BRDF
+    vec3 share; // of each in what is between them, 1 together; the third has none of an isotropic BRDF
     float side; // 1, or -1 where the view is the mirror image of one that there are rows for
     float added_variance; // of the kernels, by the pixel's normals
 };
@@ -272,20 +271,19 @@ Rows rows_at(Surface surface, ThreadTable table) {
     float row = min(surface.theta_o * (float(table.row_count) / radians(90.0)), float(table.row_count - 1));
     uint below = table.first + uint(row) * words_a_row(table);
     uint above = below + (uint(row) + 1 < table.row_count ? words_a_row(table) : 0);
-    Rows rows = Rows(uvec3(below, above, below), fract(row), 0.0, 1.0, variance_of_pixel(surface.normal_variance));
+    float t = fract(row);
+    Rows rows = Rows(uvec3(below, above, below), vec3(1.0 - t, t, 0.0), 1.0, variance_of_pixel(surface.normal_variance));
     if (HAS_TANGENTS != 0 && table.azimuth_count > 1) {
         vec2 folded = fold_azimuth(surface.phi_o, table.azimuth_count);
         uint before = min(uint(folded.x), table.azimuth_count - 2);
         uint an_azimuth = table.row_count * words_a_row(table);
         rows.start += before * an_azimuth;
         rows.start.z = rows.start.y + an_azimuth;
-        float t = rows.to_second;
         float towards_next = folded.x - float(before);
         if (towards_next > t) {
             rows.start.y = rows.start.x + an_azimuth;
         }
-        rows.to_second = abs(t - towards_next);
-        rows.to_third = min(t, towards_next);
+        rows.share = vec3(1.0 - max(t, towards_next), abs(t - towards_next), min(t, towards_next));
         rows.side = folded.y;
     }
     return rows;
@@ -295,15 +293,17 @@ Rows rows_at(Surface surface, ThreadTable table) {
 Kernel kernel_at(Rows rows, uint k) {
     Kernel a = unpack_kernel(rows.start.x, k);
     Kernel b = unpack_kernel(rows.start.y, k);
-    float t = rows.to_second;
-    Kernel kernel = Kernel(mix(a.place, b.place, t), mix(a.level, b.level, t), mix(a.weight, b.weight, t));
-    if (HAS_TANGENTS != 0 && rows.to_third > 0.0) {
-        Kernel c = unpack_kernel(rows.start.z, k);
-        kernel.place += rows.to_third * (c.place - a.place);
-        kernel.level += rows.to_third * (c.level - a.level);
-        kernel.weight += rows.to_third * (c.weight - a.weight);
-    }
+    vec2 share = rows.share.xy;
+    Kernel kernel = Kernel(
+        share.x * a.place + share.y * b.place,
+        share.x * a.level + share.y * b.level,
+        share.x * a.weight + share.y * b.weight
+    );
     if (HAS_TANGENTS != 0) {
+        Kernel c = unpack_kernel(rows.start.z, k);
+        kernel.place += rows.share.z * c.place;
+        kernel.level += rows.share.z * c.level;
+        kernel.weight += rows.share.z * c.weight;
         kernel.place.y *= rows.side;
     }
     kernel.level = level_within_pixel(kernel.level, rows.added_variance);
@@ -316,10 +316,9 @@ vec3 looks_towards(Kernel kernel, Surface surface) {
 }
 
 vec3 albedo_at(Rows rows) {
-    vec3 first = unpack_albedo(rows.start.x);
-    vec3 albedo = mix(first, unpack_albedo(rows.start.y), rows.to_second);
+    vec3 albedo = rows.share.x * unpack_albedo(rows.start.x) + rows.share.y * unpack_albedo(rows.start.y);
     if (HAS_TANGENTS != 0) {
-        albedo += rows.to_third * (unpack_albedo(rows.start.z) - first);
+        albedo += rows.share.z * unpack_albedo(rows.start.z);
     }
     return albedo;
 }

@@ -92,7 +92,7 @@ pub fn run(
             add(geometry("any", true)?)?;
             add(compute(&compiled::CLASSIFY, "scene", classify_constants(&prepared, shaders.constants.len()))?)?;
         }
-        for constants in shaders.constants {
+        for constants in shaders.constants_of_classes() {
             add(compute(shader, "scene", constants)?)?;
         }
         add(compute(shader, "any", of_any)?)?;

@@ -174,7 +174,7 @@ pub struct Sampling {
 /// What the pass is made of.
 #[derive(Clone)]
 pub struct Shade {
-    /// The method's shader, for each way that materials are specialised in.
+    /// The method's shader, for each class of pixels: [`Counters::arguments_of`].
     pub pipelines: Vec<Keyed<ComputePipeline>>,
     /// What objects are made of.
     pub materials: Keyed<DeviceMaterials>,
@@ -234,7 +234,7 @@ pub fn shade<'a>(
     tiles: &Tiles,
     view: &View,
 ) -> Shaded {
-    let Tiles { counters, tiles, pixels, .. } = *tiles;
+    let Tiles { counters, parts, pixels, .. } = *tiles;
     let Shade { pipelines, materials, light, sampling } = shade;
     let format = vk::Format::R32G32B32A32_SFLOAT;
     let mut radiance = graph.kept_image("radiance", ImageDesc { format, width: view.width, height: view.height });
@@ -242,18 +242,18 @@ pub fn shade<'a>(
     graph.clear_buffer("clear_lookups", &mut lookups);
     let dispatch = |pixel_class: usize| {
         let push = Push::new(view, sampling, light, pixel_class as u32);
-        (&*pipelines[pixel_class / 2], Counters::arguments_of(pixel_class), push)
+        (&*pipelines[pixel_class], Counters::arguments_of(pixel_class), push)
     };
     graph
         .compute("shade", &pipelines[0])
         .read("geometry", geometry)
         .read("counters", counters)
-        .read("tile_list", tiles)
+        .read("part_list", parts)
         .read("pixel_list", pixels)
         .write("radiance", &mut radiance)
         .modify("all_lookups", &mut lookups)
         .bind_all(materials.bindings())
         .bind_all(light.bindings())
-        .indirect(counters, (0..2 * pipelines.len()).map(dispatch));
+        .indirect(counters, (0..pipelines.len()).map(dispatch));
     Shaded { radiance, lookups }
 }

@@ -1,7 +1,7 @@
 //! Fitted threads. Twin of glsl/methods/fitted.glsl, by functions of the same names.
 use std::f32::consts::{FRAC_PI_2, PI};
 
-use glam::{IVec2, Vec2, Vec3};
+use glam::{DVec3, IVec2, Mat3, Vec2, Vec3};
 
 use super::{CpuShader, Point, Surface, smoothstep, turned};
 use crate::brdf::MIN_COS_THETA_D;
@@ -284,8 +284,7 @@ fn at_sources(lobe: &Lobe, sources: &[SourceRecord]) -> AtSources {
 /// Between which rows a view is. Twin of `Rows`.
 struct Rows {
     index: [usize; 3],
-    to_second: f32,
-    to_third: f32,
+    share: Vec3,
     side: f32,
 }
 
@@ -296,28 +295,28 @@ impl Rows {
         let (below, t) = (row as usize, row.fract());
         let above = (below + 1).min(threads.rows - 1);
         if threads.azimuths == 1 {
-            return Self { index: [below, above, below], to_second: t, to_third: 0.0, side: 1.0 };
+            return Self { index: [below, above, below], share: Vec3::new(1.0 - t, t, 0.0), side: 1.0 };
         }
         let azimuths = Azimuths::around(surface.phi_o.to_angle().into(), threads.azimuths);
-        let (index, [to_second, to_third]) = azimuths.triangle([below, above], t.into(), threads.rows);
-        Self { index, to_second: to_second as f32, to_third: to_third as f32, side: azimuths.side() as f32 }
+        let (index, share) = azimuths.triangle([below, above], t.into(), threads.rows);
+        Self { index, share: DVec3::from(share).as_vec3(), side: azimuths.side() as f32 }
     }
 
     /// Twin of `kernel_at`, in the shading frame.
     fn kernel(&self, threads: &FittedTable, k: usize) -> UnpackedKernel {
         let [a, b, c] = self.index.map(|row| threads.row(row)[k].unpack());
-        let (t, u) = (self.to_second, self.to_third);
+        let [p, q, r] = self.share.to_array();
         UnpackedKernel {
-            place: Vec2::new(1.0, self.side) * (a.place.lerp(b.place, t) + u * (c.place - a.place)),
-            level: a.level + t * (b.level - a.level) + u * (c.level - a.level),
-            weight: a.weight.lerp(b.weight, t) + u * (c.weight - a.weight),
+            place: Vec2::new(1.0, self.side) * (p * a.place + q * b.place + r * c.place),
+            level: p * a.level + q * b.level + r * c.level,
+            weight: p * a.weight + q * b.weight + r * c.weight,
         }
     }
 
     /// Twin of `albedo_at`.
     fn albedo(&self, threads: &FittedTable) -> Vec3 {
         let [a, b, c] = self.index.map(|row| Vec3::from(threads.albedo[row]));
-        a.lerp(b, self.to_second) + self.to_third * (c - a)
+        Mat3::from_cols(a, b, c) * self.share
     }
 }
 

@@ -76,13 +76,14 @@ impl Azimuths {
     }
 
     /// The three of the table's rows that a view is between, the part `t` of the way from row `below` to row `above` of an azimuth that has
-    /// `rows`: the corners of a triangle of view angles and azimuths. What is linear between them is that of the first, and these parts of
-    /// the ways from it to the second and to the third. Twin: `rows_at` in glsl/methods/fitted.glsl.
-    pub fn triangle(&self, [below, above]: [usize; 2], t: f64, rows: usize) -> ([usize; 3], [f64; 2]) {
+    /// `rows`: the corners of a triangle of view angles and azimuths, and the share of each in what is linear between them. Twin: `rows_at`
+    /// in glsl/methods/fitted.glsl.
+    pub fn triangle(&self, [below, above]: [usize; 2], t: f64, rows: usize) -> ([usize; 3], [f64; 3]) {
         let first = self.before * rows + below;
         let opposite = (self.before + 1) * rows + above;
-        let second = if self.towards_next > t { first + rows } else { self.before * rows + above };
-        ([first, second, opposite], [(t - self.towards_next).abs(), t.min(self.towards_next)])
+        let u = self.towards_next;
+        let second = if u > t { first + rows } else { self.before * rows + above };
+        ([first, second, opposite], [1.0 - t.max(u), (t - u).abs(), t.min(u)])
     }
 
     /// The azimuth, in radians, of the view or of its mirror image.
@@ -99,6 +100,7 @@ impl Azimuths {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use glam::DVec3;
 
     #[test]
     fn azimuths_are_folded_by_the_symmetry_that_their_number_stands_for() {
@@ -129,12 +131,10 @@ mod tests {
         for row in [0.0_f64, 0.25, 17.0, 17.5, 60.999, 88.3] {
             for azimuth in [0.0, 0.2, 0.5, 3.0, 7.25, 7.75, 9.0] {
                 let azimuths = Azimuths::around(azimuth * STEP_RAD, 19);
-                let (index, [to_second, to_third]) =
-                    azimuths.triangle([row as usize, row as usize + 1], row.fract(), rows);
-                let [a, b, c] = index.map(|index| linear((index % rows) as f64, (index / rows) as f64));
-                let between = a + to_second * (b - a) + to_third * (c - a);
+                let (index, shares) = azimuths.triangle([row as usize, row as usize + 1], row.fract(), rows);
+                let at_corners = index.map(|index| linear((index % rows) as f64, (index / rows) as f64));
+                let between = DVec3::from(at_corners).dot(shares.into());
                 assert!((between - linear(row, azimuth)).abs() < 1e-12, "{row} {azimuth}");
-                let shares = [1.0 - to_second - to_third, to_second, to_third];
                 assert!(shares.iter().all(|share| (-1e-12..=1.0 + 1e-12).contains(share)), "{shares:?}");
             }
         }

@@ -229,7 +229,7 @@ mod tests {
         }
         assert_eq!(shade.group_size, [64, 1, 1]);
         let classify = compiled::CLASSIFY.reflect().unwrap();
-        assert_eq!((classify.bindings["tile_list"].access, classify.group_size), (WriteOnly, [8, 8, 1]));
+        assert_eq!((classify.bindings["part_list"].access, classify.group_size), (WriteOnly, [8, 8, 1]));
         assert_eq!(compiled::BACKGROUND.reflect().unwrap().bindings["radiance"].access, ReadWrite);
     }
 

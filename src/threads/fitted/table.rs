@@ -130,11 +130,11 @@ impl FittedTable {
             return all_between(&self.unpacked_row(low), &self.unpacked_row(high), t);
         }
         let azimuths = Azimuths::around(phi_o, self.azimuths);
-        let (rows, [to_second, to_third]) = azimuths.triangle([low, high], t, self.rows);
+        let (rows, [of_first, of_second, of_third]) = azimuths.triangle([low, high], t, self.rows);
         let [first, second, third] = rows.map(|row| self.unpacked_row(row));
         // On the way from the first to the second, and from there to the third.
-        let kernels = all_between(&first, &second, to_second / (1.0 - to_third).max(f64::MIN_POSITIVE));
-        let mut kernels = all_between(&kernels, &third, to_third);
+        let kernels = all_between(&first, &second, of_second / (of_first + of_second).max(f64::MIN_POSITIVE));
+        let mut kernels = all_between(&kernels, &third, of_third);
         kernels.iter_mut().for_each(|kernel| kernel.direction.y *= azimuths.side());
         kernels
     }
