@@ -97,7 +97,7 @@ void main() {
     }
     uvec2 tiles = (push.size_px + TILE_SIDE - 1) / TILE_SIDE;
     uint part_count = counters.classes[push.pixel_class].part_count;
-    // With the test at the end of a loop no driver that masks lanes out runs the body once more for none.
+    // The last workgroup may have fewer parts. With the test at the end of a loop no driver that masks lanes out runs the body once more for none.
     uint p = PARTS * gl_WorkGroupID.x + gl_LocalInvocationIndex / PART_PIXELS;
     do {
         uint part = part_list.parts[push.pixel_class * PARTS * tiles.x * tiles.y + min(p, part_count - 1)];

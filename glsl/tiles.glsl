@@ -4,7 +4,7 @@
 // Pixels are packed tile by tile rather than over the whole image, and listed in parts of a tile: then the pixels of a part are
 // the same, in the same order, in every run. On a CPU device the last bit of a lookup depends on the lookups of its neighbours.
 
-// Pixels on the side of a tile; a tile is a workgroup of both passes.
+// Pixels on the side of a tile, which is a workgroup of the pass that lists them.
 const uint TILE_SIDE = 8u;
 const uint TILE_PIXELS = TILE_SIDE * TILE_SIDE;
 

@@ -23,7 +23,7 @@ const NEARLY_FLAT_VARIANCE: f32 = (NEARLY_FLAT_RAD * NEARLY_FLAT_RAD) as f32;
 /// The most where some lobe is so wide that sub-pixels share more than that: 3.6 degrees.
 const WIDEST_VARIANCE: f32 = 4e-3;
 
-/// How many shaders there can be at most: each has two lists of tiles and is compiled. glsl/classify.comp has room for 32.
+/// How many shaders there can be at most: each is compiled twice and has two lists of pixels. glsl/classify.comp has room for 32.
 pub const MAX_SHADERS: usize = 16;
 
 /// What the pass counts: `Counted` in glsl/tiles.glsl. Its buffer goes on with the tiles of each class: interior and edge pixels of each shader.
@@ -103,9 +103,8 @@ pub struct SmoothVariance {
 
 impl SmoothVariance {
     /// What `method` asks for where sub-pixels of some material share a sum up to a deviation of normals, `most_shared` in radians. If they
-    /// never do, nothing that [`SMOOTH_DEG`] allows. So the lists of pixels
-    /// depend on the widest lobe. Pixels that are listed as smooth and share nothing hold up those beside them that do: with 3.6 degrees for
-    /// all lobes shading by 16 threads of GGX 0.12 took 1.3 times as long on a dragon.
+    /// never do, nothing that [`SMOOTH_DEG`] allows. Pixels that are listed as smooth and share nothing hold up those beside them that do: with
+    /// 3.6 degrees for all wide lobes, shading a dragon of GGX 0.12 by 16 threads took 1.3 times as long.
     ///
     /// Small bright sources light a curved surface from a low angle here and not at all there: under these only nearly flat pixels are smooth.
     pub fn of(method: Method, environment: &Environment, most_shared: f64) -> Self {
