@@ -156,7 +156,7 @@ pub fn classify<'a>(
     let [columns, rows] = region.tile_px;
     let tile_count = u64::from(width.div_ceil(columns)) * u64::from(height.div_ceil(rows));
     let tile_pixels = u64::from(columns * rows);
-    // Kept: as long as nothing moves, other light and other materials are shaded by the same lists.
+    // Kept: as long as nothing moves, other light and other materials that let as many pixels share a sum are shaded by the same lists.
     let class_count = 2 * classify.shader_count as usize;
     let mut counters = graph.kept_buffer("counters", BufferDesc { size_bytes: Counters::arguments_of(class_count) });
     graph.clear_buffer("clear_counters", &mut counters);
