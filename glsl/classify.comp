@@ -153,7 +153,7 @@ void main() {
     if (k < CLASSES && listed[k] > 0) {
         uint parts = (listed[k] + PART_PIXELS - 1) / PART_PIXELS;
         uint others = atomicAdd(counters.classes[k].part_count, parts);
-        uint first = k * PARTS * tile_counts().x * tile_counts().y + others;
+        uint first = first_part(k, tile_counts()) + others;
         uint slot = first_slot(k);
         for (uint part = 0; part < parts; ++part) {
             uint before = part * PART_PIXELS;

@@ -100,7 +100,7 @@ void main() {
     // The last workgroup may have fewer parts. With the test at the end of a loop no driver that masks lanes out runs the body once more for none.
     uint p = PARTS * gl_WorkGroupID.x + gl_LocalInvocationIndex / PART_PIXELS;
     do {
-        uint part = part_list.parts[push.pixel_class * PARTS * tiles.x * tiles.y + min(p, part_count - 1)];
+        uint part = part_list.parts[first_part(push.pixel_class, tiles) + min(p, part_count - 1)];
         uint place_in_part = gl_LocalInvocationIndex % PART_PIXELS;
         if (p < part_count && place_in_part < part_pixel_count(part)) {
             uint tile = part_tile(part);

@@ -47,6 +47,11 @@ struct Counted {
 // The limit on workgroups that every device has; beyond it a workgroup takes more than PARTS.
 const uint MAX_GROUPS = 65535u;
 
+// Where the parts of a class start in the list of a picture of so many columns and rows of tiles.
+uint first_part(uint pixel_class, uvec2 tiles) {
+    return pixel_class * PARTS * tiles.x * tiles.y;
+}
+
 // A listed part of a tile: the tile's index, row by row (a picture of 16384 x 16384 pixels has 2^22), the part's first slot among the pixels of the
 // tile, and how many it has (1 to PART_PIXELS).
 uint pack_part(uint tile, uint first_slot, uint pixel_count) {

@@ -154,15 +154,19 @@ fn the_screenshot_shows_picture_and_panel_and_only_what_has_changed_runs() {
     );
     ended.expect_success();
     let of_picture = ["geometry_cache", "classify", "shade", "background", "tone_map"];
-    let mut made: Vec<Vec<_>> = ended
+    let made: Vec<Vec<_>> = ended
         .frames()
         .map(|frame| frame.into_iter().filter(|pass| of_picture.contains(pass)).collect::<Vec<_>>())
         .filter(|passes| !passes.is_empty())
         .collect();
-    // The first picture, the brighter one, the other material, whose lobe lets other pixels share a sum, and the same in another colour, which
-    // may have drafts first: geometry once, its classes twice.
-    made.dedup();
-    assert_eq!(made, [&of_picture[..], &of_picture[4..], &of_picture[1..], &of_picture[2..]]);
+    // The first picture, the brighter one, and the other material, whose lobe lets other pixels share a sum: geometry once, its classes twice.
+    let (before, recoloured) = made.split_at_checked(3).expect("three pictures");
+    assert_eq!(before, [&of_picture[..], &of_picture[4..], &of_picture[1..]]);
+    // The same in another colour, which may have a draft first.
+    assert!(
+        (1..=2).contains(&recoloured.len()) && recoloured.iter().all(|passes| *passes == of_picture[2..]),
+        "{made:?}"
+    );
     let window = viewer.picture("window.png");
     assert_eq!((window.width, window.height), (460, 240));
     let distinct = |columns: std::ops::Range<u32>| {

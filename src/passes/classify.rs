@@ -108,13 +108,12 @@ impl SmoothVariance {
     ///
     /// Small bright sources light a curved surface from a low angle here and not at all there: under these only nearly flat pixels are smooth.
     pub fn of(method: Method, environment: &Environment, most_shared: f64) -> Self {
-        let is_wide = most_shared.powi(2) > f64::from(NEARLY_FLAT_VARIANCE) && !environment.has_small_sources();
-        let (of_normals, of_tangents) = match method.shares_surface() {
-            false => (1.0, 1.0),
-            true if is_wide => ((most_shared.powi(2) as f32).min(WIDEST_VARIANCE), NEARLY_FLAT_VARIANCE),
-            true => (NEARLY_FLAT_VARIANCE, NEARLY_FLAT_VARIANCE),
-        };
-        Self { of_normals, of_tangents }
+        if !method.shares_surface() {
+            return Self { of_normals: 1.0, of_tangents: 1.0 };
+        }
+        let most_shared = if environment.has_small_sources() { 0.0 } else { most_shared.powi(2) as f32 };
+        let of_normals = most_shared.clamp(NEARLY_FLAT_VARIANCE, WIDEST_VARIANCE);
+        Self { of_normals, of_tangents: NEARLY_FLAT_VARIANCE }
     }
 }
 

@@ -43,8 +43,8 @@ pub fn pixels_have_own(brdf: &Brdf) -> bool {
 /// so far apart that their errors do not cancel err more; with more, all others do. So it is more for narrow lobes, which are those of isotropic
 /// BRDFs whose pixels have no threads of their own. Of 40 measured materials in three maps at 80 x 60, with 16 threads, narrow
 /// lobes on a dragon have 0.0020, 0.0019, 0.0018, 0.0017 and 0.0017 with 0.4, 0.7, 1.5, 2 and 3, on a sphere 0.00155, 0.00157, 0.00161,
-/// 0.00164 and 0.00169, the worst 0.0063, 0.0053, 0.0047, 0.0038 and 0.0039 (from one start of the first row); wide ones hardly change on a dragon, and on a sphere have 0.00098 with
-/// 0.7, 0.00102 and 0.00104 with 1.5 and 3.
+/// 0.00164 and 0.00169, the worst 0.0063, 0.0053, 0.0047, 0.0038 and 0.0039 (from one start of the first row); wide ones hardly change on a
+/// dragon, and on a sphere have 0.00098 with 0.7, 0.00102 and 0.00104 with 1.5 and 3.
 pub fn share_of_sets(azimuths: usize, pixels_have_own: bool) -> f32 {
     if azimuths == 1 && !pixels_have_own { 2.0 } else { 0.7 }
 }
