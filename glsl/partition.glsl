@@ -25,7 +25,7 @@ vec4 shade_pixel(uvec2 pixel, bool interior) {
             ++covered;
             Surface surface = surface_of_subpixel(subpixel, texel);
             surface.normal_variance = normal_variance;
-            sum += estimate(surface, materials[geometry_material(texel)], interior ? j : 0, stride);
+            sum += estimate(surface, material_of(texel), interior ? j : 0, stride);
         }
     }
     return vec4(interior ? sum : sum / float(subpixel_count), float(covered) / float(subpixel_count));

@@ -49,8 +49,15 @@ layout(push_constant) uniform Push {
     float intensity;        // of the environment: apart from radiance_scale, since the product of the two may be infinite
 } push;
 
+layout(constant_id = 8) const uint HAS_ONE_MATERIAL = 0; // 1: the scene has no other
+
 #include "material.glsl"
 #include "brdf_models.glsl"
+
+// What is seen in a texel of the geometry cache is made of it.
+Material material_of(uvec2 texel) {
+    return materials[HAS_ONE_MATERIAL != 0 ? 0 : geometry_material(texel)];
+}
 
 vec3 to_environment(vec3 d) {
     return turned_back(push.rotation, d);

@@ -33,7 +33,7 @@ vec4 shade_pixel(uvec2 pixel, bool interior) {
     if (interior) {
         surface = mean_surface(pixel);
         uvec2 texel = texelFetch(geometry, ivec2(pixel * SUBPIXELS), 0).xy;
-        parts = needs_subpixels(surface, materials[geometry_material(texel)]) ? parts : 1;
+        parts = needs_subpixels(surface, material_of(texel)) ? parts : 1;
     }
     bool shares = interior && parts == 1;
     vec4 sum = vec4(0.0);
@@ -45,7 +45,7 @@ vec4 shade_pixel(uvec2 pixel, bool interior) {
             if (!shares) {
                 surface = surface_of_subpixel(place, texel);
             }
-            Material material = materials[geometry_material(texel)];
+            Material material = material_of(texel);
             uint set_count = 1;
             if (!shares) {
                 material.threads = material.subpixel_threads;

@@ -75,6 +75,7 @@ fn shade_constants(prepared: &Prepared, materials: &[PreparedMaterial], needs: O
     let mut constants = vec![
         ("SUBPIXELS", view.subpixels),
         ("HAS_TANGENTS", has_tangents.into()),
+        ("HAS_ONE_MATERIAL", (prepared.materials.len() == 1).into()),
         ("MODELS_USED", models_used(lobes, method.evaluates_brdf(environment))),
     ];
     if method.has_pattern() {

@@ -230,7 +230,10 @@ void add_source(inout AtSources sum, Source source, float clear, Surface surface
         vec2 above = risen(w_i.z, part_deviation);
         if (above.x > 0.0) {
             vec3 power = weights.x * weights.y * above.x * source.power.rgb;
-            w_i = normalize(vec3(w_i.xy, above.y));
+            // Most light has risen as a whole.
+            if (above.y != w_i.z) {
+                w_i = normalize(vec3(w_i.xy, above.y));
+            }
             sum.f_cos += power * brdf_at(surface, material, w_i, w_o);
             sum.cosine += power;
         }
@@ -257,7 +260,7 @@ AtSources at_sources(Surface surface, Material material, Lobe lobe) {
     return sum;
 }
 
-// Between which rows a view is, of the table's words where these start: two of an isotropic BRDF, three of an anisotropic one, which are
+// Between which rows a view is, of the table's elements where these start: two of an isotropic BRDF, three of an anisotropic one, which are
 // the corners of a triangle of view angles and azimuths.
 struct Rows {
     uvec3 start;
@@ -269,14 +272,14 @@ struct Rows {
 // Rows stand at multiples of 90 degrees / row_count; beyond the last one it holds.
 Rows rows_at(Surface surface, ThreadTable table) {
     float row = min(surface.theta_o * (float(table.row_count) / radians(90.0)), float(table.row_count - 1));
-    uint below = table.first + uint(row) * words_a_row(table);
-    uint above = below + (uint(row) + 1 < table.row_count ? words_a_row(table) : 0);
+    uint below = table.first + uint(row) * elements_a_row(table);
+    uint above = below + (uint(row) + 1 < table.row_count ? elements_a_row(table) : 0);
     float t = fract(row);
     Rows rows = Rows(uvec3(below, above, below), vec3(1.0 - t, t, 0.0), 1.0, variance_of_pixel(surface.normal_variance));
     if (HAS_TANGENTS != 0 && table.azimuth_count > 1) {
         vec2 folded = fold_azimuth(surface.phi_o, table.azimuth_count);
         uint before = min(uint(folded.x), table.azimuth_count - 2);
-        uint an_azimuth = table.row_count * words_a_row(table);
+        uint an_azimuth = table.row_count * elements_a_row(table);
         rows.start += before * an_azimuth;
         rows.start.z = rows.start.y + an_azimuth;
         float towards_next = folded.x - float(before);
@@ -306,7 +309,10 @@ Kernel kernel_at(Rows rows, uint k) {
         kernel.weight += rows.share.z * c.weight;
         kernel.place.y *= rows.side;
     }
-    kernel.level = level_within_pixel(kernel.level, rows.added_variance);
+    // The normal of a sub-pixel has no variance.
+    if (IS_INTERIOR != 0) {
+        kernel.level = level_within_pixel(kernel.level, rows.added_variance);
+    }
     return kernel;
 }
 

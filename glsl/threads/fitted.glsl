@@ -3,9 +3,10 @@
 #include "packing.glsl"
 
 // Azimuth by azimuth of the view, and row by row of theta_o: the albedo as three floats, then thread by thread three words: direction
-// (its place on the stereographic map, 2 x 16 bits), level and red weight, green and blue weight (half floats).
+// (its place on the stereographic map, 2 x 16 bits), level and red weight, green and blue weight (half floats). A fourth word is 0: GPUs load
+// what is aligned to 16 bytes at once.
 layout(set = 0, binding = 7, std430) readonly buffer Threads {
-    uint threads[];
+    uvec4 threads[];
 };
 
 struct Kernel {
@@ -14,19 +15,19 @@ struct Kernel {
     vec3 weight;
 };
 
-uint words_a_row(ThreadTable table) {
-    return 3 * (table.count + 1);
+uint elements_a_row(ThreadTable table) {
+    return table.count + 1;
 }
 
 // Thread k of the row that starts at `row`.
 Kernel unpack_kernel(uint row, uint k) {
-    uint at = row + 3 * (k + 1);
-    vec2 level_red = unpackHalf2x16(threads[at + 1]);
-    vec2 green_blue = unpackHalf2x16(threads[at + 2]);
-    vec2 place = STEREOGRAPHIC_EXTENT * unpackSnorm2x16(threads[at]);
+    uvec4 words = threads[row + 1 + k];
+    vec2 place = STEREOGRAPHIC_EXTENT * unpackSnorm2x16(words.x);
+    vec2 level_red = unpackHalf2x16(words.y);
+    vec2 green_blue = unpackHalf2x16(words.z);
     return Kernel(place, level_red.x, vec3(level_red.y, green_blue));
 }
 
 vec3 unpack_albedo(uint row) {
-    return vec3(uintBitsToFloat(threads[row]), uintBitsToFloat(threads[row + 1]), uintBitsToFloat(threads[row + 2]));
+    return uintBitsToFloat(threads[row].xyz);
 }

@@ -7,7 +7,7 @@ use crate::graph::{BufferDesc, BufferHandle, FrameGraph, ImageDesc, ImageHandle}
 use crate::memo::Keyed;
 use crate::method::Method;
 use crate::scene::Pattern;
-use crate::threads::{FittedTable, SliceTable, SplitSum, ThreadTable, Threads};
+use crate::threads::{FittedTable, SliceTable, SplitSum, Threads};
 use crate::vulkan::{self, Bound, Buffer, ComputePipeline, Device, Sampler, SamplerKind};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
@@ -66,7 +66,7 @@ impl DeviceMaterials {
     ) -> Result<Self> {
         let lookups = method.lookups();
         let mut records = Vec::new();
-        let mut threads = ThreadWords { words: Vec::new(), finest_level };
+        let mut threads = DeviceThreads { elements: Vec::new(), finest_level };
         let mut slices: Vec<f32> = Vec::new();
         let [phi_d, theta_d, _] = merl::DEVICE_TABLE_SIZE;
         let mut measured = BrdfAtlas::new([phi_d, theta_d]);
@@ -101,7 +101,7 @@ impl DeviceMaterials {
         let optional = |name, contents: &[u8]| (!contents.is_empty()).then(|| storage(name, contents)).transpose();
         Ok(Self {
             records: storage("materials", bytemuck::cast_slice(&records))?,
-            threads: optional("threads", bytemuck::cast_slice(&threads.words))?,
+            threads: optional("threads", bytemuck::cast_slice(&threads.elements))?,
             slices: optional("slices", bytemuck::cast_slice(&slices))?,
             slices_name: if lookups.split_sum { "SplitSums" } else { "Slices" },
             measured_tables: measured.upload(device, "measured BRDFs")?,
@@ -121,13 +121,13 @@ impl DeviceMaterials {
 }
 
 /// The shader's buffer of threads.
-struct ThreadWords {
-    words: Vec<u32>,
+struct DeviceThreads {
+    elements: Vec<[u32; 4]>,
     /// Level 0 of the blurred environment on the scale of kernels, if that is looked up.
     finest_level: Option<f32>,
 }
 
-impl ThreadWords {
+impl DeviceThreads {
     /// Those of whole pixels, and of sub-pixels that do not share a sum.
     fn add(&mut self, threads: &Threads) -> [ThreadTableRecord; 2] {
         match threads {
@@ -137,8 +137,8 @@ impl ThreadWords {
                 [of_pixels, of_subpixels.unwrap_or(of_pixels)]
             }
             Threads::Paper(table) => {
-                let first = (self.words.len() / ThreadTable::DEVICE_ELEMENT_WORDS) as u32;
-                self.words.extend(table.device_words());
+                let first = self.elements.len() as u32;
+                self.elements.extend(table.device_elements());
                 let (count, row_count) = (table.count as u32, table.rows as u32);
                 [ThreadTableRecord { first, count, row_count, ..ThreadTableRecord::NONE }; 2]
             }
@@ -147,8 +147,8 @@ impl ThreadWords {
 
     fn add_kernels(&mut self, table: &FittedTable) -> ThreadTableRecord {
         let used = table.used();
-        let first = self.words.len() as u32;
-        self.words.extend(used.device_words());
+        let first = self.elements.len() as u32;
+        self.elements.extend(used.device_elements());
         ThreadTableRecord {
             first,
             count: used.count() as u32,

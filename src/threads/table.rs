@@ -81,16 +81,13 @@ impl ThreadTable {
         interpolate(&self.row(low)[thread], &self.row(high)[thread], t)
     }
 
-    /// Words of an element of the shader's buffer: a vec4.
-    pub const DEVICE_ELEMENT_WORDS: usize = 4;
-
     /// The buffer of the shader. Row by row: the albedo, then the threads as [`Sample::device_vector`].
-    pub fn device_words(&self) -> Vec<u32> {
+    pub fn device_elements(&self) -> Vec<[u32; 4]> {
         let row = |(row, [red, green, blue]): (usize, &[f32; 3])| {
             let albedo = Vec4::new(*red, *green, *blue, 0.0);
             std::iter::once(albedo).chain(self.row(row).iter().map(Sample::device_vector))
         };
-        self.albedo.iter().enumerate().flat_map(row).flat_map(|vector| vector.to_array()).map(f32::to_bits).collect()
+        self.albedo.iter().enumerate().flat_map(row).map(|vector| vector.to_array().map(f32::to_bits)).collect()
     }
 
     /// Words of a row in a file, besides its threads.

@@ -14,7 +14,7 @@
 //! | what the edit does to all rows | `edit` |
 //! | what a fit leaves, under other lights | [`validation_error`] |
 //! | where kernels give way to the BRDF beside lamps | [`GivingWay`] |
-//! | as stored and looked up, 12 bytes a thread and row | [`FittedTable`] |
+//! | as stored, 12 bytes a thread and row, and looked up, 16 | [`FittedTable`] |
 pub mod answers;
 pub mod cells;
 mod directions;

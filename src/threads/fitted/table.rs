@@ -1,4 +1,5 @@
-//! Fitted threads as they are stored, uploaded and looked up: twelve bytes a thread and row. In shaders: glsl/threads/fitted.glsl.
+//! Fitted threads as they are stored, uploaded and looked up: twelve bytes a thread and row, sixteen on the device. In shaders:
+//! glsl/threads/fitted.glsl.
 use std::f64::consts::FRAC_PI_2;
 
 use glam::{DVec3, Vec2, Vec3};
@@ -246,11 +247,11 @@ impl UsedThreads<'_> {
     }
 
     /// The buffer of the shader. Row by row: the albedo, then their kernels.
-    pub fn device_words(&self) -> Vec<u32> {
+    pub fn device_elements(&self) -> Vec<[u32; 4]> {
         let row = |(row, albedo): (usize, &[f32; 3])| {
             let kernels = self.threads.iter().map(move |&(thread, _)| self.table.row(row)[thread].0);
             std::iter::once(albedo.map(f32::to_bits)).chain(kernels)
         };
-        self.table.albedo.iter().enumerate().flat_map(row).flatten().collect()
+        self.table.albedo.iter().enumerate().flat_map(row).map(|[x, y, z]| [x, y, z, 0]).collect()
     }
 }
