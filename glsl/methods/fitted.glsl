@@ -260,10 +260,11 @@ AtSources at_sources(Surface surface, Material material, Lobe lobe) {
     return sum;
 }
 
-// Between which rows a view is, of the table's elements where these start: two of an isotropic BRDF, three of an anisotropic one, which are
-// the corners of a triangle of view angles and azimuths.
+// Between which rows a view is, of the buffer's elements those with their albedos: two of an isotropic BRDF, three of an anisotropic one, which
+// are the corners of a triangle of view angles and azimuths.
 struct Rows {
-    uvec3 start;
+    uvec3 albedo;
+    uint row_count; // so many elements further on is the first thread, and then each next one
     vec3 share; // of each in what is between them, 1 together; the third has none of an isotropic BRDF
     float side; // 1, or -1 where the view is the mirror image of one that there are rows for
     float added_variance; // of the kernels, by the pixel's normals
@@ -272,19 +273,20 @@ struct Rows {
 // Rows stand at multiples of 90 degrees / row_count; beyond the last one it holds.
 Rows rows_at(Surface surface, ThreadTable table) {
     float row = min(surface.theta_o * (float(table.row_count) / radians(90.0)), float(table.row_count - 1));
-    uint below = table.first + uint(row) * elements_a_row(table);
-    uint above = below + (uint(row) + 1 < table.row_count ? elements_a_row(table) : 0);
+    uint below = table.first + uint(row);
+    uint above = below + uint(uint(row) + 1 < table.row_count);
     float t = fract(row);
-    Rows rows = Rows(uvec3(below, above, below), vec3(1.0 - t, t, 0.0), 1.0, variance_of_pixel(surface.normal_variance));
+    uvec3 albedo = uvec3(below, above, below);
+    Rows rows = Rows(albedo, table.row_count, vec3(1.0 - t, t, 0.0), 1.0, variance_of_pixel(surface.normal_variance));
     if (HAS_TANGENTS != 0 && table.azimuth_count > 1) {
         vec2 folded = fold_azimuth(surface.phi_o, table.azimuth_count);
         uint before = min(uint(folded.x), table.azimuth_count - 2);
-        uint an_azimuth = table.row_count * elements_a_row(table);
-        rows.start += before * an_azimuth;
-        rows.start.z = rows.start.y + an_azimuth;
+        uint an_azimuth = elements_an_azimuth(table);
+        rows.albedo += before * an_azimuth;
+        rows.albedo.z = rows.albedo.y + an_azimuth;
         float towards_next = folded.x - float(before);
         if (towards_next > t) {
-            rows.start.y = rows.start.x + an_azimuth;
+            rows.albedo.y = rows.albedo.x + an_azimuth;
         }
         rows.share = vec3(1.0 - max(t, towards_next), abs(t - towards_next), min(t, towards_next));
         rows.side = folded.y;
@@ -294,8 +296,9 @@ Rows rows_at(Surface surface, ThreadTable table) {
 
 // Thread k, in the shading frame, blurred by the normals of the pixel.
 Kernel kernel_at(Rows rows, uint k) {
-    Kernel a = unpack_kernel(rows.start.x, k);
-    Kernel b = unpack_kernel(rows.start.y, k);
+    uvec3 elements = rows.albedo + (k + 1) * rows.row_count;
+    Kernel a = unpack_kernel(elements.x);
+    Kernel b = unpack_kernel(elements.y);
     vec2 share = rows.share.xy;
     Kernel kernel = Kernel(
         share.x * a.place + share.y * b.place,
@@ -303,7 +306,7 @@ Kernel kernel_at(Rows rows, uint k) {
         share.x * a.weight + share.y * b.weight
     );
     if (HAS_TANGENTS != 0) {
-        Kernel c = unpack_kernel(rows.start.z, k);
+        Kernel c = unpack_kernel(elements.z);
         kernel.place += rows.share.z * c.place;
         kernel.level += rows.share.z * c.level;
         kernel.weight += rows.share.z * c.weight;
@@ -322,9 +325,9 @@ vec3 looks_towards(Kernel kernel, Surface surface) {
 }
 
 vec3 albedo_at(Rows rows) {
-    vec3 albedo = rows.share.x * unpack_albedo(rows.start.x) + rows.share.y * unpack_albedo(rows.start.y);
+    vec3 albedo = rows.share.x * unpack_albedo(rows.albedo.x) + rows.share.y * unpack_albedo(rows.albedo.y);
     if (HAS_TANGENTS != 0) {
-        albedo += rows.share.z * unpack_albedo(rows.start.z);
+        albedo += rows.share.z * unpack_albedo(rows.albedo.z);
     }
     return albedo;
 }

@@ -2,9 +2,9 @@
 #include "azimuths.glsl"
 #include "packing.glsl"
 
-// Azimuth by azimuth of the view, and row by row of theta_o: the albedo as three floats, then thread by thread three words: direction
-// (its place on the stereographic map, 2 x 16 bits), level and red weight, green and blue weight (half floats). A fourth word is 0: GPUs load
-// what is aligned to 16 bytes at once.
+// Azimuth by azimuth of the view: the albedo of each row of theta_o as three floats, then thread by thread its rows, each three words: direction
+// (its place on the stereographic map, 2 x 16 bits), level and red weight, green and blue weight (half floats). Pixels that look the same thread up
+// together, each between two rows, so find it in few lines of a cache. A fourth word is 0: GPUs load what is aligned to 16 bytes at once.
 layout(set = 0, binding = 7, std430) readonly buffer Threads {
     uvec4 threads[];
 };
@@ -15,19 +15,18 @@ struct Kernel {
     vec3 weight;
 };
 
-uint elements_a_row(ThreadTable table) {
-    return table.count + 1;
+uint elements_an_azimuth(ThreadTable table) {
+    return table.row_count * (table.count + 1);
 }
 
-// Thread k of the row that starts at `row`.
-Kernel unpack_kernel(uint row, uint k) {
-    uvec4 words = threads[row + 1 + k];
+Kernel unpack_kernel(uint element) {
+    uvec4 words = threads[element];
     vec2 place = STEREOGRAPHIC_EXTENT * unpackSnorm2x16(words.x);
     vec2 level_red = unpackHalf2x16(words.y);
     vec2 green_blue = unpackHalf2x16(words.z);
     return Kernel(place, level_red.x, vec3(level_red.y, green_blue));
 }
 
-vec3 unpack_albedo(uint row) {
-    return uintBitsToFloat(threads[row].xyz);
+vec3 unpack_albedo(uint element) {
+    return uintBitsToFloat(threads[element].xyz);
 }

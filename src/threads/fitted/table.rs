@@ -246,12 +246,15 @@ impl UsedThreads<'_> {
         self.threads.iter().rposition(is_sharp).map_or(0, |last| last + 1)
     }
 
-    /// The buffer of the shader. Row by row: the albedo, then their kernels.
+    /// The buffer of the shader. Azimuth by azimuth: the albedo of each row, then thread by thread its kernels of all rows.
     pub fn device_elements(&self) -> Vec<[u32; 4]> {
-        let row = |(row, albedo): (usize, &[f32; 3])| {
-            let kernels = self.threads.iter().map(move |&(thread, _)| self.table.row(row)[thread].0);
-            std::iter::once(albedo.map(f32::to_bits)).chain(kernels)
+        let FittedTable { rows, azimuths, .. } = *self.table;
+        let of_azimuth = |azimuth: usize| {
+            let rows = azimuth * rows..(azimuth + 1) * rows;
+            let albedos = self.table.albedo[rows.clone()].iter().map(|albedo| albedo.map(f32::to_bits));
+            let kernels_of = move |thread: usize| rows.clone().map(move |row| self.table.row(row)[thread].0);
+            albedos.chain(self.threads.iter().flat_map(move |&(thread, _)| kernels_of(thread)))
         };
-        self.table.albedo.iter().enumerate().flat_map(row).map(|[x, y, z]| [x, y, z, 0]).collect()
+        (0..azimuths).flat_map(of_azimuth).map(|[x, y, z]| [x, y, z, 0]).collect()
     }
 }
