@@ -316,7 +316,7 @@ mod tests {
             (format!("{triangle}f 1//-9223372036854775808 2 3"), "no normal -9223372036854775808"),
             (format!("{triangle}f 1//99999999999999999999 2 3"), "no normal 99999999999999999999"),
             (format!("{triangle}f 1/1/x 2 3"), "no normal x"),
-            (format!("{triangle}f"), "invalid polygon"),
+            (format!("{triangle}f"), "face without corners"),
             (format!("{triangle}v 1 2"), "position parse error"),
             (format!("{triangle}v 1 2 x"), "position parse error"),
             (format!("{triangle}vn 1 2"), "normal parse error"),

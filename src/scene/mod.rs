@@ -15,6 +15,7 @@ mod file;
 pub mod mesh;
 mod parameter;
 mod pattern;
+mod polygon;
 mod tangent_rule;
 mod texture_tangents;
 

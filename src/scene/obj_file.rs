@@ -7,6 +7,7 @@ use std::path::Path;
 use glam::{DVec3, Vec2, Vec3};
 
 use super::Mesh;
+use super::polygon::triangles_of;
 use crate::error::{Error, Result};
 use crate::file_format::FileFormat;
 
@@ -38,7 +39,7 @@ fn parse_textured(path: &Path, bytes: &[u8]) -> Result<TexturedMesh> {
 }
 
 /// Reads all triangles and polygons as one mesh; objects, groups, materials and lines are ignored, and so are texture coordinates if they are
-/// not wanted. Polygons become fans. Where a normal is missing, zero or not finite, the mean normal of the
+/// not wanted. Polygons become triangles. Where a normal is missing, zero or not finite, the mean normal of the
 /// faces that share the position takes its place, weighted by their angles there. Degenerate triangles are dropped.
 fn parse_parts(path: &Path, bytes: &[u8], is_textured: bool) -> Result<TexturedMesh> {
     // Names in old files are in any encoding; the numbers are ASCII in all of them.
@@ -83,16 +84,19 @@ fn joined_lines(text: &str) -> Cow<'_, str> {
     joined.into()
 }
 
-/// The triangles in the text of an OBJ, each corner with an index into the positions and one into the normals; a corner
+/// The faces in the text of an OBJ, each corner with an index into the positions and one into the normals; a corner
 /// without a normal has one of length 0. If `is_textured` each has an index into the texture coordinates too, which are NaN where it has
 /// none. The error is what is wrong.
 fn read_obj(text: &str, is_textured: bool) -> Result<tobj::Mesh, String> {
-    let options = tobj::LoadOptions { triangulate: true, ..Default::default() };
+    let options = tobj::LoadOptions::default();
     let no_materials = |_: &Path| Ok(Default::default());
     let (models, _) = tobj::load_obj_buf(&mut geometry_lines(text, is_textured)?.as_bytes(), &options, no_materials)
         .map_err(|cause| format!("is not a sound OBJ: {cause}"))?;
     // Without o, g and usemtl there is one model.
     let mesh = models.into_iter().next().map(|model| model.mesh).unwrap_or_default();
+    if mesh.face_arities.contains(&0) {
+        return Err("has a face without corners".into());
+    }
     match vectors(&mesh.positions).into_iter().find(|position| !position.is_finite()) {
         Some(position) => Err(format!("has a vertex that is not finite, {position}")),
         None => Ok(mesh),
@@ -171,8 +175,8 @@ fn clean(obj: &tobj::Mesh) -> (TexturedMesh, usize) {
     let mut mean_normals = vec![DVec3::ZERO; positions.len()];
     let mut vertices = HashMap::new();
     let (mut mesh, mut uvs, mut dropped, mut missing) = (Mesh::default(), Vec::new(), 0, Vec::new());
-    let triangles = obj.indices.as_chunks::<3>().0.iter().zip(obj.normal_indices.as_chunks::<3>().0);
-    for (number, (triangle, triangle_normals)) in triangles.enumerate() {
+    for corners in triangles(obj, &positions) {
+        let triangle = corners.map(|corner| obj.indices[corner]);
         let [a, b, c] = triangle.map(|position| positions[position as usize].as_dvec3());
         let area = (b - a).cross(c - a);
         let longest = (b - a).length_squared().max((c - a).length_squared()).max((c - b).length_squared());
@@ -185,9 +189,10 @@ fn clean(obj: &tobj::Mesh) -> (TexturedMesh, usize) {
         for (&position, [at, next, before]) in triangle.iter().zip([[a, b, c], [b, c, a], [c, a, b]]) {
             mean_normals[position as usize] += (next - at).angle_between(before - at) * face_normal;
         }
-        for (corner, (&position, &normal)) in triangle.iter().zip(triangle_normals).enumerate() {
+        for (corner, position) in corners.into_iter().zip(triangle) {
+            let normal = obj.normal_indices[corner];
             let normal = normal_at(normal).map(|direction| (normal, direction));
-            let uv = obj.texcoord_indices.get(3 * number + corner).copied();
+            let uv = obj.texcoord_indices.get(corner).copied();
             let index = *vertices.entry((position, normal.map(|(index, _)| index), uv)).or_insert_with(|| {
                 uvs.extend(uv.map(|uv| Vec2::from_slice(&obj.texcoords[2 * uv as usize..])));
                 if normal.is_none() {
@@ -205,6 +210,22 @@ fn clean(obj: &tobj::Mesh) -> (TexturedMesh, usize) {
         mesh.normals[vertex] = mean_normals[position as usize].try_normalize().unwrap_or(DVec3::Y).as_vec3();
     }
     (TexturedMesh { mesh, uvs }, dropped)
+}
+
+/// The triangles that the faces of `obj` consist of, as places of their corners in its indices. Faces of fewer than three corners have none.
+fn triangles(obj: &tobj::Mesh, positions: &[Vec3]) -> Vec<[usize; 3]> {
+    // No numbers of corners are given if all faces are triangles.
+    if obj.face_arities.is_empty() {
+        return (0..obj.indices.len() / 3).map(|face| std::array::from_fn(|corner| 3 * face + corner)).collect();
+    }
+    let mut next = 0;
+    let triangles_of_face = |&arity: &u32| {
+        let first = next;
+        next += arity as usize;
+        let polygon = obj.indices[first..next].iter().map(|&position| positions[position as usize].as_dvec3());
+        triangles_of(&polygon.collect::<Vec<_>>()).into_iter().map(move |corners| corners.map(|corner| first + corner))
+    };
+    obj.face_arities.iter().flat_map(triangles_of_face).collect()
 }
 
 /// Every three numbers as a vector.
