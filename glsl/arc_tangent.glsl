@@ -21,10 +21,10 @@ float acute_angle(float y, float x, float hypotenuse) {
     return y > x ? HALF_PI - angle : angle;
 }
 
-// The angle in [0, 180 degrees] of this sine, not negative, and cosine: atan2 in Rust, which errs by a unit in the last place.
-float angle_of(float sine, float cosine) {
-    float angle = acute_angle(sine, abs(cosine), 1.0);
-    return cosine < 0.0 ? 2.0 * HALF_PI - angle : angle;
+// The same in [0, 180 degrees], of x of either sign: atan2 in Rust, which errs by a unit in the last place.
+float angle_of(float y, float x, float hypotenuse) {
+    float angle = acute_angle(y, abs(x), hypotenuse);
+    return x < 0.0 ? 2.0 * HALF_PI - angle : angle;
 }
 
 #endif

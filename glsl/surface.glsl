@@ -26,7 +26,7 @@ Surface make_surface(vec3 n, vec3 w_o) {
     Surface surface;
     surface.frame = mat3(x, cross(n, x), n);
     surface.w_o = w_o;
-    surface.theta_o = angle_of(sin_theta_o, cos_theta_o);
+    surface.theta_o = angle_of(sin_theta_o, cos_theta_o, 1.0);
     surface.normal_variance = 0.0;
     surface.phi_o = vec2(1.0, 0.0);
     return surface;
