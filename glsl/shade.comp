@@ -16,6 +16,7 @@ layout(constant_id = 0) const uint SUBPIXELS = 2; // per axis
 layout(constant_id = 5) const uint HAS_TANGENTS = 0; // 0: no material of the scene needs them
 // 0: pixels at edges, whose sub-pixels share nothing. A driver that masks lanes out would have each of them pay for what interior ones share.
 layout(constant_id = 7) const uint IS_INTERIOR = 1;
+layout(constant_id = 8) const uint HAS_ONE_MATERIAL = 0; // 1: the scene has no other
 
 layout(set = 0, binding = 0) uniform utexture2D geometry;
 layout(set = 0, binding = 1, std430) readonly buffer Counters {
@@ -48,8 +49,6 @@ layout(push_constant) uniform Push {
     float finest_level;     // the level of a kernel that is level 0 of the blurred environment
     float intensity;        // of the environment: apart from radiance_scale, since the product of the two may be infinite
 } push;
-
-layout(constant_id = 8) const uint HAS_ONE_MATERIAL = 0; // 1: the scene has no other
 
 #include "material.glsl"
 #include "brdf_models.glsl"

@@ -260,11 +260,11 @@ AtSources at_sources(Surface surface, Material material, Lobe lobe) {
     return sum;
 }
 
-// Between which rows a view is, of the buffer's elements those with their albedos: two of an isotropic BRDF, three of an anisotropic one, which
-// are the corners of a triangle of view angles and azimuths.
+// Between which rows a view is: two of an isotropic BRDF, three of an anisotropic one, which are the corners of a triangle of view angles
+// and azimuths.
 struct Rows {
-    uvec3 albedo;
-    uint row_count; // so many elements further on is the first thread, and then each next one
+    uvec3 albedo;   // the buffer's elements with their albedos
+    uint row_count; // of each azimuth
     vec3 share; // of each in what is between them, 1 together; the third has none of an isotropic BRDF
     float side; // 1, or -1 where the view is the mirror image of one that there are rows for
     float added_variance; // of the kernels, by the pixel's normals
@@ -296,9 +296,8 @@ Rows rows_at(Surface surface, ThreadTable table) {
 
 // Thread k, in the shading frame, blurred by the normals of the pixel.
 Kernel kernel_at(Rows rows, uint k) {
-    uvec3 elements = rows.albedo + (k + 1) * rows.row_count;
-    Kernel a = unpack_kernel(elements.x);
-    Kernel b = unpack_kernel(elements.y);
+    Kernel a = unpack_kernel(rows.albedo.x, rows.row_count, k);
+    Kernel b = unpack_kernel(rows.albedo.y, rows.row_count, k);
     vec2 share = rows.share.xy;
     Kernel kernel = Kernel(
         share.x * a.place + share.y * b.place,
@@ -306,7 +305,7 @@ Kernel kernel_at(Rows rows, uint k) {
         share.x * a.weight + share.y * b.weight
     );
     if (HAS_TANGENTS != 0) {
-        Kernel c = unpack_kernel(elements.z);
+        Kernel c = unpack_kernel(rows.albedo.z, rows.row_count, k);
         kernel.place += rows.share.z * c.place;
         kernel.level += rows.share.z * c.level;
         kernel.weight += rows.share.z * c.weight;

@@ -19,14 +19,15 @@ uint elements_an_azimuth(ThreadTable table) {
     return table.row_count * (table.count + 1);
 }
 
-Kernel unpack_kernel(uint element) {
-    uvec4 words = threads[element];
+// Thread k of a row of which the albedo is this element, one of so many rows of an azimuth.
+Kernel unpack_kernel(uint albedo, uint row_count, uint k) {
+    uvec4 words = threads[albedo + (k + 1) * row_count];
     vec2 place = STEREOGRAPHIC_EXTENT * unpackSnorm2x16(words.x);
     vec2 level_red = unpackHalf2x16(words.y);
     vec2 green_blue = unpackHalf2x16(words.z);
     return Kernel(place, level_red.x, vec3(level_red.y, green_blue));
 }
 
-vec3 unpack_albedo(uint element) {
-    return uintBitsToFloat(threads[element].xyz);
+vec3 unpack_albedo(uint albedo) {
+    return uintBitsToFloat(threads[albedo].xyz);
 }
