@@ -27,4 +27,10 @@ float angle_of(float y, float x, float hypotenuse) {
     return x < 0.0 ? 2.0 * HALF_PI - angle : angle;
 }
 
+// The same in [-180, 180 degrees], of y of either sign, too; 0 if all are 0.
+float azimuth_of(float y, float x, float hypotenuse) {
+    float angle = angle_of(abs(y), x, hypotenuse);
+    return y < 0.0 ? -angle : angle;
+}
+
 #endif

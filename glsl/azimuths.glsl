@@ -1,4 +1,5 @@
 // The azimuths of the view for which an anisotropic BRDF has rows. Twin: src/threads/azimuths.rs.
+#include "arc_tangent.glsl"
 
 // From one azimuth of the view to the next, in radians.
 const float AZIMUTH_STEP = radians(5.0);
@@ -8,7 +9,7 @@ const float AZIMUTH_STEP = radians(5.0);
 vec2 fold_azimuth(vec2 phi_o, uint count) {
     float last = float(count - 1);
     float period = max(last, radians(180.0) / AZIMUTH_STEP);
-    float at = atan(phi_o.y, phi_o.x) / AZIMUTH_STEP;
+    float at = azimuth_of(phi_o.y, phi_o.x, length(phi_o)) / AZIMUTH_STEP;
     at -= period * floor(at / period);
     return at > last ? vec2(max(period - at, 0.0), -1.0) : vec2(min(at, last), 1.0);
 }

@@ -1,6 +1,7 @@
 // A texel of the geometry cache: what shading needs of a sub-pixel, in 8 bytes.
 // The view vector follows from the sub-pixel's place on the image, so it is not stored.
 // Twin: src/geometry_texel.rs.
+#include "arc_tangent.glsl"
 #include "packing.glsl"
 #include "tangent.glsl"
 
@@ -30,7 +31,8 @@ vec3 geometry_normal(uvec2 texel) {
 uvec2 with_tangent(uvec2 texel, vec3 tangent) {
     vec3 n = geometry_normal(texel);
     vec3 x = any_tangent(n);
-    float angle = atan(dot(tangent, cross(n, x)), dot(tangent, x));
+    vec2 along = vec2(dot(tangent, x), dot(tangent, cross(n, x)));
+    float angle = azimuth_of(along.y, along.x, length(along));
     uint steps = uint(round((angle / radians(360.0) + 0.5) * TANGENT_STEPS)) + 1u;
     return uvec2(texel.x, texel.y | steps << 16);
 }

@@ -115,8 +115,7 @@ struct SliceCell {
 
 SliceCell slice_cell(vec3 h) {
     float sin_theta_h = length(h.xy);
-    // atan(0, 0) is undefined; at the pole all azimuths meet.
-    float phi = sin_theta_h > 0.0 ? atan(h.y, h.x) : 0.0;
+    float phi = azimuth_of(h.y, h.x, sin_theta_h);
     float x = sqrt(acute_angle(sin_theta_h, h.z, 1.0) / radians(90.0));
     uint ring = min(uint(x * float(SLICE_RINGS)), SLICE_RINGS - 1);
     uint azimuth = min(uint(max(phi / radians(360.0) + 0.5, 0.0) * float(SLICE_AZIMUTHS)), SLICE_AZIMUTHS - 1);

@@ -11,7 +11,7 @@ vec3 turned_back(vec2 rotation, vec3 d) {
 // The place of a direction, of any length, in the map: from -z towards +x, -0.5 to 0.5 from side to side, and from +y, 0 to 1 from top to bottom.
 vec2 lat_long(vec3 d) {
     float from_axis = length(d.xz);
-    float phi = angle_of(abs(d.x), -d.z, from_axis);
-    return vec2((d.x < 0.0 ? -phi : phi) / radians(360.0), angle_of(from_axis, d.y, length(d)) / radians(180.0));
+    float phi = azimuth_of(d.x, -d.z, from_axis);
+    return vec2(phi / radians(360.0), angle_of(from_axis, d.y, length(d)) / radians(180.0));
 }
 #endif
