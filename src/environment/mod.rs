@@ -10,6 +10,7 @@ pub mod cube;
 mod ggx_pyramid;
 mod irradiance;
 mod light_map;
+mod lights;
 mod load;
 mod procedural;
 pub mod pyramid;

@@ -2,6 +2,7 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
+use super::lights::{Light, Shape, windows_and_bulbs, with_lights};
 use super::{Environment, RepairCounts};
 use crate::error::{Error, Result};
 
@@ -17,7 +18,7 @@ const SUN_RADIANCE: DVec3 = DVec3::new(7600.0, 6500.0, 5000.0);
 
 /// The names that [`Environment::builtin`] takes.
 pub fn builtin_names() -> &'static [&'static str] {
-    &["sky", "studio", "sun", "white"]
+    &["sky", "studio", "sun", "lamps-10", "lamps-70", "lamps-500", "white"]
 }
 
 impl Environment {
@@ -26,8 +27,11 @@ impl Environment {
     pub fn builtin(name: &str) -> Result<Self> {
         match name {
             "sky" => Ok(procedural(name, SIZE, sky)),
-            "sun" => Ok(with_sun(procedural(name, SIZE, sky))),
+            "sun" => Ok(with_lights(procedural(name, SIZE, sky), &[sun()])),
             "studio" => Ok(procedural(name, SIZE, studio)),
+            "lamps-10" => Ok(with_lights(procedural(name, SIZE, hall), &windows_and_bulbs(10))),
+            "lamps-70" => Ok(with_lights(procedural(name, SIZE, hall), &windows_and_bulbs(70))),
+            "lamps-500" => Ok(with_lights(procedural(name, SIZE, hall), &windows_and_bulbs(500))),
             "white" => Ok(procedural(name, (4, 2), |_| DVec3::ONE)),
             _ => Err(Error::input(
                 format!("environment `{name}`"),
@@ -63,31 +67,14 @@ fn sky(direction: DVec3) -> DVec3 {
     ground.lerp(air + glow, smoothstep(-0.06, 0.01, height))
 }
 
-/// Adds the sun to a sky: each pixel gets the share of its solid angle that the disc covers.
-fn with_sun(mut environment: Environment) -> Environment {
-    const SUBPIXELS: usize = 16;
-    let sun = SUN_DIRECTION.normalize();
-    let cos_radius = SUN_RADIUS_DEG.to_radians().cos();
-    // Pixels whose centre is farther than this hold nothing of it.
-    let cos_reach = (SUN_RADIUS_DEG.to_radians() + 2.0 * std::f64::consts::PI / environment.height as f64).cos();
-    for i in 0..environment.texels.len() {
-        let (column, row) = ((i % environment.width) as f64, (i / environment.width) as f64);
-        if environment.direction(column, row).dot(sun) < cos_reach {
-            continue;
-        }
-        let offset = |index: usize| (index as f64 + 0.5) / SUBPIXELS as f64 - 0.5;
-        let (mut covered, mut all) = (0.0, 0.0);
-        for sample in 0..SUBPIXELS * SUBPIXELS {
-            let direction =
-                environment.direction(column + offset(sample % SUBPIXELS), row + offset(sample / SUBPIXELS));
-            let sin_theta = direction.x.hypot(direction.z);
-            all += sin_theta;
-            covered += if direction.dot(sun) > cos_radius { sin_theta } else { 0.0 };
-        }
-        let radiance = super::to_dvec3(&environment.texels[i]) + SUN_RADIANCE * (covered / all);
-        environment.texels[i] = radiance.as_vec3().to_array();
-    }
-    environment
+/// The sun of `sun`.
+fn sun() -> Light {
+    Light { centre: SUN_DIRECTION.normalize(), shape: Shape::Disc(SUN_RADIUS_DEG.to_radians()), radiance: SUN_RADIANCE }
+}
+
+/// Evening in a hall: what its lamps leave.
+fn hall(direction: DVec3) -> DVec3 {
+    DVec3::new(0.05, 0.045, 0.04).lerp(DVec3::new(0.16, 0.17, 0.19), smoothstep(-0.6, 0.9, direction.y))
 }
 
 /// A dark room, and in it a large warm key light, a cool strip, a rim light and the glow of the ceiling.

@@ -1,0 +1,145 @@
+//! Lights of the built-in environments that are as small as pixels or have edges: each pixel gets the share of its solid angle that they
+//! cover.
+use std::f64::consts::{PI, TAU};
+
+use glam::{DVec3, dvec3};
+use rayon::prelude::*;
+
+use super::{Environment, to_dvec3};
+
+/// Light of one radiance around a direction.
+pub(super) struct Light {
+    /// Unit.
+    pub centre: DVec3,
+    pub shape: Shape,
+    /// Linear Rec. 709.
+    pub radiance: DVec3,
+}
+
+pub(super) enum Shape {
+    /// All within this angle, in radians, of the centre.
+    Disc(f64),
+    /// An upright rectangle that faces the origin: half its width and height on the plane at distance 1.
+    Window([f64; 2]),
+}
+
+impl Light {
+    /// Cosine of the angle from the centre within which all of it is.
+    fn cos_reach(&self) -> f64 {
+        match self.shape {
+            Shape::Disc(radius) => radius.cos(),
+            Shape::Window([x, y]) => 1.0 / (1.0 + x * x + y * y).sqrt(),
+        }
+    }
+
+    fn covers(&self, direction: DVec3) -> bool {
+        let along = direction.dot(self.centre);
+        match self.shape {
+            Shape::Disc(radius) => along > radius.cos(),
+            Shape::Window([half_width, half_height]) => {
+                let right = self.centre.cross(DVec3::Y).normalize_or(DVec3::X);
+                let up = right.cross(self.centre);
+                along > 0.0
+                    && direction.dot(right).abs() < half_width * along
+                    && direction.dot(up).abs() < half_height * along
+            }
+        }
+    }
+}
+
+/// Adds lights to an environment.
+pub(super) fn with_lights(mut environment: Environment, lights: &[Light]) -> Environment {
+    const SUBPIXELS: usize = 16;
+    // Pixels whose centre is farther than this from what a light covers hold nothing of it.
+    let half_pixel = TAU / environment.height as f64;
+    let cos_reaches: Vec<f64> =
+        lights.iter().map(|light| (light.cos_reach().acos() + half_pixel).min(PI).cos()).collect();
+    let added = (0..environment.texels.len()).into_par_iter().map(|i| {
+        let (column, row) = ((i % environment.width) as f64, (i / environment.width) as f64);
+        let centre = environment.direction(column, row);
+        let near = lights.iter().zip(&cos_reaches).filter(|(light, reach)| centre.dot(light.centre) > **reach);
+        let offset = |index: usize| (index as f64 + 0.5) / SUBPIXELS as f64 - 0.5;
+        near.map(|(light, _)| {
+            let (mut covered, mut all) = (0.0, 0.0);
+            for sample in 0..SUBPIXELS * SUBPIXELS {
+                let direction =
+                    environment.direction(column + offset(sample % SUBPIXELS), row + offset(sample / SUBPIXELS));
+                let sin_theta = direction.x.hypot(direction.z);
+                all += sin_theta;
+                covered += if light.covers(direction) { sin_theta } else { 0.0 };
+            }
+            light.radiance * (covered / all)
+        })
+        .sum::<DVec3>()
+    });
+    let added: Vec<DVec3> = added.collect();
+    for (texel, light) in environment.texels.iter_mut().zip(added) {
+        *texel = (to_dvec3(texel) + light).as_vec3().to_array();
+    }
+    environment
+}
+
+/// So many windows and bulbs of all sizes and colours, all around: what cuts most light out as sources, and leaves the rest of it to kernels.
+/// The more there are, the smaller, so that they shed about as much light.
+pub(super) fn windows_and_bulbs(count: usize) -> Vec<Light> {
+    // Powers of the inverse of the root of x^7 = x + 1: steps by which points fill a cube of six dimensions evenly, like the golden ratio's
+    // in one (Roberts 2018, "The Unreasonable Effectiveness of Quasirandom Sequences").
+    let steps: [f64; 6] = std::array::from_fn(|i| 1.112_775_684_278_705_5_f64.powi(-(i as i32 + 1)));
+    let smaller = (10.0 / count as f64).powf(0.4);
+    let light = |index: usize| {
+        let [height, turn, size, aspect, colour, brightness] =
+            steps.map(|step| (0.5 + (index as f64 + 1.0) * step).fract());
+        let from_to = |from: f64, to: f64, t: f64| from * (to / from).powf(t);
+        let y = 1.0 - 2.0 * height;
+        let (sin, cos) = (TAU * turn).sin_cos();
+        let across = (1.0 - y * y).sqrt();
+        let warm_to_cool = dvec3(1.0, 0.72, 0.42).lerp(dvec3(0.72, 0.88, 1.1), colour);
+        // Every third is a bulb.
+        let (shape, radiance) = if index % 3 == 2 {
+            (Shape::Disc(smaller * from_to(0.2, 3.0, size).to_radians()), from_to(2000.0, 100.0, size))
+        } else {
+            let side = smaller * from_to(0.03, 0.4, size);
+            let stretch = from_to(0.4, 2.5, aspect).sqrt();
+            (Shape::Window([side * stretch, side / stretch]), from_to(40.0, 8.0, size))
+        };
+        let radiance = warm_to_cool * radiance * from_to(0.25, 4.0, brightness);
+        Light { centre: dvec3(across * cos, y, across * sin), shape, radiance }
+    };
+    (0..count).map(light).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::environment::RepairCounts;
+
+    #[test]
+    fn a_window_sheds_the_light_of_its_solid_angle_wherever_it_is() {
+        let [x, y] = [0.3_f64, 0.05];
+        let solid_angle_sr = 4.0 * (x * y / ((1.0 + x * x) * (1.0 + y * y)).sqrt()).asin();
+        for centre in [DVec3::X, DVec3::Y, DVec3::new(0.3, -0.8, 0.5).normalize()] {
+            let black = Environment::new("black".into(), 256, 128, vec![[0.0; 3]; 256 * 128], RepairCounts::default());
+            let light = Light { centre, shape: Shape::Window([x, y]), radiance: dvec3(1.0, 2.0, 3.0) };
+            let shed = with_lights(black, &[light]).mean_radiance() * 4.0 * PI / solid_angle_sr;
+            // 16 x 16 samples a pixel of an edge.
+            assert!((shed / dvec3(1.0, 2.0, 3.0) - 1.0).abs().max_element() < 4e-3, "{centre}: {shed}");
+        }
+    }
+
+    #[test]
+    fn lights_are_as_many_as_asked_for_apart_and_bright() {
+        for count in [10, 500] {
+            let lights = windows_and_bulbs(count);
+            assert_eq!(lights.len(), count);
+            for (i, light) in lights.iter().enumerate() {
+                assert!(
+                    light.centre.is_normalized() && light.radiance.min_element() > 0.5,
+                    "{count}: {}",
+                    light.centre
+                );
+                let nearest = lights[..i].iter().map(|other| other.centre.distance(light.centre)).fold(2.0, f64::min);
+                assert!(nearest > 0.1 / (count as f64).sqrt(), "{count}: {nearest}");
+            }
+        }
+    }
+}
