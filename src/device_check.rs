@@ -5,7 +5,7 @@ use crate::Result;
 use crate::environment::{Pyramid, cube};
 use crate::error::Error;
 use crate::passes::{Answers, Questions, Volume, WayAround, ask};
-use crate::vulkan::{Device, PipelineCache};
+use crate::vulkan::{Device, PipelineCache, VulkanError};
 use glam::{Vec3, Vec4};
 use half::f16;
 use serde::{Deserialize, Serialize};
@@ -42,9 +42,8 @@ impl Verdict {
             Self::Right => Ok(None),
             Self::RightBy(way_around) => Ok(Some(*way_around)),
             Self::Wrong(fault) => {
-                let problem = format!("does not compute as Vulkan promises: {fault}");
-                let remedy = "update its driver or choose another with --device";
-                Err(Error::input(&device.description().name, problem, remedy))
+                let device = device.description().name.clone();
+                Err(VulkanError::Faulty { device, fault: fault.to_string() }.into())
             }
         }
     }

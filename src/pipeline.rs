@@ -5,6 +5,7 @@ use crate::memo::{Held, Keyed, Round};
 use crate::output::ExrHeader;
 use crate::passes::*;
 use crate::prepare::Prepared;
+use crate::progress::Observer;
 use crate::scene::Mesh;
 use crate::specialise::{ShadersOfMaterials, classify_constants};
 use crate::steps::{
@@ -165,6 +166,14 @@ impl DeviceScene {
     /// # Errors
     /// Whatever Vulkan refuses.
     pub fn render(&self, wanted: Wanted, repeat: u32) -> Result<Rendering> {
+        self.render_watched(wanted, repeat, &())
+    }
+
+    /// [`render`](Self::render), watched by `observer`, which can stop it between frames.
+    ///
+    /// # Errors
+    /// As there; [`Error::Cancelled`].
+    pub fn render_watched(&self, wanted: Wanted, repeat: u32, observer: &dyn Observer) -> Result<Rendering> {
         let mut graph = FrameGraph::new();
         let region = match wanted.geometry {
             true => Region::whole(&self.view, self.classify.tile_px()),
@@ -185,6 +194,7 @@ impl DeviceScene {
         let mut frame_ms = Vec::new();
         let mut passes: Vec<Vec<PassTime>> = Vec::new();
         for _ in 0..repeat.max(1) {
+            observer.check()?;
             let start = std::time::Instant::now();
             passes.push(executable.execute_timed(&self.device, &mut frames)?);
             frame_ms.push(start.elapsed().as_secs_f64() * 1e3);

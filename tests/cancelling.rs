@@ -7,7 +7,7 @@ use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 use threadlight::low_level::brdf::Brdf;
 use threadlight::low_level::evaluate::reference::{ReferenceSettings, STAGES, progressive, reference};
-use threadlight::low_level::pipeline::render_geometry;
+use threadlight::low_level::pipeline::{Wanted, render_geometry};
 use threadlight::low_level::prepare::Prepared;
 use threadlight::low_level::progress::Observer;
 use threadlight::low_level::scene::{MaterialSource, Scene, Source};
@@ -143,6 +143,21 @@ fn the_first_stages_of_a_large_reference_come_soon() {
         println!("{:?} after {:?}: within {:.1e}", estimate.stage, start.elapsed(), estimate.error_estimate);
     })
     .unwrap();
+    gpu.finish();
+}
+
+#[test]
+fn repeated_frames_stop_between_two() {
+    let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
+    let gpu = Validated::new();
+    let prepared = ready(&sphere(MaterialSource::Builtin("gold".into()), "white", 1, (48, 36)));
+    let renderer = gpu.renderer(&prepared);
+    let time = time_to_stop(Duration::from_millis(500), |flag| {
+        renderer.render_watched(Wanted { radiance: true, ..Wanted::default() }, u32::MAX, flag).map(drop)
+    });
+    println!("frames, cancelled: {time:?}");
+    assert!(time < SOON, "cancelled: {time:?}");
+    drop(renderer);
     gpu.finish();
 }
 

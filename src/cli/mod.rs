@@ -71,6 +71,16 @@ impl Arguments {
     }
 }
 
+/// An error if the validation layer has said anything.
+fn none_of(messages: &[String]) -> anyhow::Result<()> {
+    match messages.first() {
+        Some(first) => {
+            anyhow::bail!("validation: {} messages, the first: {}", messages.len(), first.replace('\n', " "))
+        }
+        None => Ok(()),
+    }
+}
+
 /// What is wrong with the command line, on one line: clap's error and its tips, without the usage.
 pub fn mistake(error: &clap::Error) -> String {
     let text = error.to_string();

@@ -2,7 +2,7 @@
 use super::progress::TerminalProgress;
 use super::rendered::{ReferenceStats, Rendered, Stats};
 use super::scene_flags::{MachineFlags, SceneFlags};
-use super::{number, say};
+use super::{none_of, number, say};
 use anyhow::Context;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::value_parser;
@@ -16,6 +16,7 @@ use threadlight::low_level::method::Method;
 use threadlight::low_level::output::{self, Format};
 use threadlight::low_level::pipeline::{DeviceScene, Rendering, Wanted};
 use threadlight::low_level::prepare::prepare;
+use threadlight::low_level::progress::Observer;
 use threadlight::low_level::scene::Scene;
 use threadlight::low_level::steps::FitThreads;
 use threadlight::low_level::vulkan::{Device, Instance};
@@ -91,10 +92,7 @@ impl Render {
             let text = serde_json::to_string_pretty(&Stats::new(&rendered, messages.len())).context("--stats")? + "\n";
             output::write_whole(path, text.as_bytes())?;
         }
-        if let Some(first) = messages.first() {
-            anyhow::bail!("validation: {} messages, the first: {}", messages.len(), first.replace('\n', " "));
-        }
-        Ok(())
+        none_of(&messages)
     }
 
     /// The scene, where there is something to write and a place for it, and no flag is of no use.
@@ -105,7 +103,7 @@ impl Render {
         }
         output::check_all_writable(self.output.iter().chain(&self.stats))?;
         let scene = self.scene.scene()?;
-        output::check_not_read(self.output.iter().chain(&self.stats), self.scene.scene.iter().chain(&scene.files()))?;
+        output::check_not_read(self.output.iter().chain(&self.stats), &self.scene.files(&scene))?;
         let method = Method::from_name(&scene.shading.method)?;
         let is_reference = method == Method::Reference;
         let useless = [
@@ -162,8 +160,10 @@ impl Render {
             progress.finish();
             let radiance = format == Some(Format::Exr);
             let wanted = Wanted { radiance, display: !radiance, ..Wanted::default() };
-            (renderer.render(wanted, self.repeat)?, None)
+            (renderer.render_watched(wanted, self.repeat, &progress)?, None)
         };
+        // What was stopped during its last frame is not written either.
+        progress.check()?;
         progress.finish();
         // Those of the last attempt, where there were several.
         let threads = round.asked(FitThreads::NAME);

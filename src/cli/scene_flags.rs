@@ -107,6 +107,11 @@ impl SceneFlags {
         lay(&self.rotation, &mut scene.environment.rotation_deg);
         Ok(scene)
     }
+
+    /// All files that are read for `scene`, which is what these flags name.
+    pub fn files(&self, scene: &Scene) -> Vec<PathBuf> {
+        self.scene.iter().cloned().chain(scene.files()).collect()
+    }
 }
 
 /// `640x480`.

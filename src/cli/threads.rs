@@ -65,6 +65,7 @@ impl Threads {
         self.plot.as_deref().map_or(Ok(()), output::check_png)?;
         output::check_all_writable(self.output.iter().chain(&self.plot))?;
         let source = MaterialSource::named(&self.material);
+        output::check_not_read(self.output.iter().chain(&self.plot), &source.files())?;
         let name = match &source {
             MaterialSource::File(path) => stem(path),
             _ => self.material.clone(),

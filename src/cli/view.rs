@@ -1,4 +1,5 @@
 //! `threadlight view`: a window to look at a scene and change it.
+use super::none_of;
 use super::scene_flags::{MachineFlags, SceneFlags};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::value_parser;
@@ -91,9 +92,7 @@ impl ViewArguments {
         if let Some((path, stats)) = self.stats.as_deref().zip(stats) {
             output::write_whole(path, serde_json::to_string_pretty(&stats)?.as_bytes())?;
         }
-        if let Some(first) = messages.first() {
-            anyhow::bail!("validation: {} messages, the first: {}", messages.len(), first.replace('\n', " "));
-        }
+        none_of(&messages)?;
         // Whoever sits before the window has been told.
         if let Some((replay, first)) = self.replay.as_deref().zip(failures.first()) {
             let problem = format!("{} of what it asks for could not be done, the first: {first}", failures.len());

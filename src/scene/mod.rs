@@ -123,6 +123,14 @@ impl Source {
     pub fn named(name: &str, builtin_names: &[&str]) -> Self {
         if builtin_names.contains(&name) { Self::Builtin(name.into()) } else { Self::File(name.into()) }
     }
+
+    /// The file that it is read from, if it is.
+    pub fn file(&self) -> Option<&PathBuf> {
+        match self {
+            Self::File(path) => Some(path),
+            Self::Builtin(_) => None,
+        }
+    }
 }
 
 impl std::fmt::Display for Source {
@@ -208,6 +216,15 @@ impl MaterialSource {
             Self::Builtin(text.to_owned())
         }
     }
+
+    /// The files that it is read from, those of bases under coats included.
+    pub fn files(&self) -> Vec<PathBuf> {
+        match self {
+            Self::File(path) => [vec![path.clone()], base_files_of(path)].concat(),
+            Self::Model { parameters, .. } => base_files(parameters),
+            Self::Builtin(_) | Self::Custom(_) => Vec::new(),
+        }
+    }
 }
 
 /// `[[object]]`: a mesh at its place, of one material.
@@ -263,16 +280,8 @@ impl Scene {
     /// The files that it names: of its environment, its meshes and its materials, with those under their coats.
     pub fn files(&self) -> Vec<PathBuf> {
         let sources = std::iter::once(&self.environment.source).chain(self.objects.iter().map(|object| &object.mesh));
-        let of_sources = sources.filter_map(|source| match source {
-            Source::File(path) => Some(path.clone()),
-            Source::Builtin(_) => None,
-        });
-        let of_material = |material: &MaterialSettings| match &material.source {
-            MaterialSource::File(path) => [vec![path.clone()], base_files_of(path)].concat(),
-            MaterialSource::Model { parameters, .. } => base_files(parameters),
-            MaterialSource::Builtin(_) | MaterialSource::Custom(_) => Vec::new(),
-        };
-        of_sources.chain(self.materials.iter().flat_map(of_material)).collect()
+        let of_materials = self.materials.iter().flat_map(|material| material.source.files());
+        sources.filter_map(Source::file).cloned().chain(of_materials).collect()
     }
 
     /// Names of the materials that objects have, each once, in the order in which objects name them first.

@@ -2,7 +2,7 @@
 use super::deletion::{Deletions, Garbage};
 use super::error::{Result, VulkanError, call};
 use super::instance::Instance;
-use super::physical_device::{Candidate, DeviceDescription, candidates};
+use super::physical_device::{Candidate, DeviceDescription, candidates, named};
 #[cfg(feature = "viewer")]
 use super::surface::Surface;
 use ash::{ext, khr, vk};
@@ -71,7 +71,8 @@ pub(super) fn choose(mut candidates: Vec<Candidate>, asked: Option<&str>) -> Res
     if let Some(asked) = asked {
         let list = candidates.iter().map(|c| format!("{} \"{}\"", c.description.index, c.description.name));
         let available = list.collect::<Vec<_>>().join(", ");
-        candidates.retain(|candidate| candidate.description.answers_to(asked));
+        let meant = named(candidates.iter().map(|candidate| &candidate.description), asked);
+        candidates.retain(|candidate| meant.contains(&candidate.description.index));
         if candidates.is_empty() {
             return Err(VulkanError::NoSuchDevice { asked: asked.to_owned(), available });
         }

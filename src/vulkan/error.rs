@@ -46,6 +46,16 @@ pub enum VulkanError {
         /// What is missing.
         feature: String,
     },
+    /// The device computes wrongly.
+    #[error(
+        "{device}: does not compute as Vulkan promises: {fault}; update its driver or choose another with --device"
+    )]
+    Faulty {
+        /// Device name.
+        device: String,
+        /// What is wrong with its answers.
+        fault: String,
+    },
     /// The driver tells nothing of the shaders that it compiles.
     #[error(
         "{device}: its driver does not say what shaders compile to (it lacks VK_KHR_pipeline_executable_properties); choose another with --device"

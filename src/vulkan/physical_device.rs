@@ -49,23 +49,24 @@ pub struct DeviceDescription {
 }
 
 impl DeviceDescription {
-    /// Whether `--device asked` means this device: its index, or part of its name or its driver's, in any case.
-    pub(super) fn answers_to(&self, asked: &str) -> bool {
+    /// Whether `asked` is part of its name or of its driver's, in any case.
+    fn is_called(&self, asked: &str) -> bool {
         let asked = asked.to_lowercase();
-        // It is a part of every name.
-        if asked.is_empty() {
-            return false;
-        }
-        match asked.parse::<usize>() {
-            Ok(index) => index == self.index,
-            Err(_) => {
-                let driver = self.driver.to_lowercase();
+        // What is empty is a part of every name.
+        !asked.is_empty()
+            && (self.name.to_lowercase().contains(&asked)
+                || self.driver.to_lowercase().contains(&asked)
                 // Mesa's software driver calls itself llvmpipe; everybody else calls it lavapipe.
-                self.name.to_lowercase().contains(&asked)
-                    || driver.contains(&asked)
-                    || (asked == "lavapipe" && driver.starts_with("llvmpipe"))
-            }
-        }
+                || (asked == "lavapipe" && self.driver.to_lowercase().starts_with("llvmpipe")))
+    }
+}
+
+/// Which of the devices `--device asked` means: the one of that index, or else those of which it is part of the name, as `4090` may be.
+pub(super) fn named<'a>(devices: impl Iterator<Item = &'a DeviceDescription> + Clone, asked: &str) -> Vec<usize> {
+    let of_index = asked.parse().ok().filter(|&index: &usize| devices.clone().any(|device| device.index == index));
+    match of_index {
+        Some(index) => vec![index],
+        None => devices.filter(|device| device.is_called(asked)).map(|device| device.index).collect(),
     }
 }
 
@@ -99,10 +100,10 @@ pub(super) fn candidates(instance: &Instance) -> Result<Vec<Candidate>> {
     if physical_devices.is_empty() {
         return Err(VulkanError::NoDriver);
     }
-    physical_devices.into_iter().enumerate().map(|(index, physical)| candidate(instance, index, physical)).collect()
+    Ok(physical_devices.into_iter().enumerate().map(|(index, physical)| candidate(instance, index, physical)).collect())
 }
 
-fn candidate(instance: &Instance, index: usize, physical: vk::PhysicalDevice) -> Result<Candidate> {
+fn candidate(instance: &Instance, index: usize, physical: vk::PhysicalDevice) -> Candidate {
     let mut driver = vk::PhysicalDeviceDriverProperties::default();
     let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut driver);
     // SAFETY: `physical` comes from this instance.
@@ -113,7 +114,7 @@ fn candidate(instance: &Instance, index: usize, physical: vk::PhysicalDevice) ->
     if properties.api_version < vk::API_VERSION_1_2 {
         lacks.push("Vulkan 1.2");
     }
-    let extensions = extensions(instance, physical, &name, &mut lacks)?;
+    let extensions = extensions(instance, physical, &name, &mut lacks);
     let (queue_family, timestamp_valid_bits) = queue_family(instance, physical, &mut lacks);
     let description = DeviceDescription {
         index,
@@ -123,7 +124,7 @@ fn candidate(instance: &Instance, index: usize, physical: vk::PhysicalDevice) ->
         api_version: version_text(properties.api_version),
         lacks,
     };
-    Ok(Candidate {
+    Candidate {
         description,
         physical,
         properties,
@@ -131,7 +132,7 @@ fn candidate(instance: &Instance, index: usize, physical: vk::PhysicalDevice) ->
         timestamp_valid_bits,
         driver: driver.driver_id,
         extensions,
-    })
+    }
 }
 
 /// The extensions to enable: of those that are wanted, the ones that there are. Needed ones that there are not go to `lacks`.
@@ -140,8 +141,13 @@ fn extensions(
     physical: vk::PhysicalDevice,
     name: &str,
     lacks: &mut Vec<&'static str>,
-) -> Result<Vec<&'static CStr>> {
-    let available = available_extensions(instance, physical, name)?;
+) -> Vec<&'static CStr> {
+    // A driver that fails here does not keep others from being used.
+    let available = available_extensions(instance, physical, name).unwrap_or_else(|error| {
+        tracing::warn!("{error}");
+        lacks.push("a driver that tells its extensions");
+        Vec::new()
+    });
     let has = |wanted: &CStr| contains(&available, wanted);
     // These are asked for even where Vulkan 1.3 has them in its core: their entry points are the same ones.
     let needed = [
@@ -157,7 +163,7 @@ fn extensions(
         wanted.push(khr::swapchain::NAME);
     }
     wanted.retain(|extension| has(extension));
-    Ok(wanted)
+    wanted
 }
 
 fn available_extensions(
@@ -206,4 +212,38 @@ fn version_text(version: u32) -> String {
 /// A name in a fixed-size array of the driver's; empty if it is not terminated.
 fn text<E>(name: std::result::Result<&CStr, E>) -> String {
     name.map(|name| name.to_string_lossy().into_owned()).unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_indices_where_there_is_one_and_else_parts_of_names() {
+        let device = |index, name: &str, driver: &str| DeviceDescription {
+            index,
+            name: name.into(),
+            driver: driver.into(),
+            kind: DeviceKind::of(vk::PhysicalDeviceType::OTHER),
+            api_version: "1.3.0".into(),
+            lacks: Vec::new(),
+        };
+        let devices = [
+            device(0, "NVIDIA GeForce RTX 4090", "NVIDIA (580.1)"),
+            device(1, "llvmpipe (LLVM 15.0.6, 256 bits)", "llvmpipe (Mesa 22.3.6)"),
+        ];
+        for (asked, meant) in [
+            ("0", &[0][..]),
+            ("1", &[1]),
+            ("4090", &[0]),
+            ("rtx", &[0]),
+            ("15.0", &[1]),
+            ("lavapipe", &[1]),
+            ("580", &[0]),
+            ("7", &[]),
+            ("", &[]),
+        ] {
+            assert_eq!(named(devices.iter(), asked), meant, "{asked:?}");
+        }
+    }
 }

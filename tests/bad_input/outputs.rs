@@ -34,6 +34,11 @@ fn what_a_command_reads_it_does_not_write() {
     for name in ["light.exr", "a.png", "b.png", "a.toml", "a.binary"] {
         fs::write(folder.path().join(name), "precious").unwrap();
     }
+    fs::write(
+        folder.path().join("coat.toml"),
+        "model = 'layered'\nbase = 'base.png'\ncoat = { alpha = 0.1, ior = 1.5 }\n",
+    )
+    .unwrap();
     for (arguments, name) in [
         ("render --environment light.exr -o ./light.exr", "./light.exr"),
         ("render scene.toml -o light.exr", "light.exr"),
@@ -42,6 +47,16 @@ fn what_a_command_reads_it_does_not_write() {
         ("compare a.png b.png --difference out/../b.png", "out/../b.png"),
         ("materials fit a.toml --model ggx -o a.toml", "a.toml"),
         ("materials export a.binary -o ./a.binary", "./a.binary"),
+        ("materials plot a.svg -o a.svg", "a.svg"),
+        ("threads coat.toml -o out/../coat.toml", "out/../coat.toml"),
+        ("threads coat.toml --plot base.png", "base.png"),
+        ("bench fit --materials gold,coat.toml --json coat.toml", "coat.toml"),
+        ("bench together --materials coat.toml --json base.png", "base.png"),
+        ("bench error --materials scene.toml --json scene.toml", "scene.toml"),
+        ("bench speed --environments light.exr --json light.exr", "light.exr"),
+        ("bench rounding --scene scene.toml --json light.exr", "light.exr"),
+        ("bench gallery --plot out --compare coat.toml --json coat.toml", "coat.toml"),
+        ("bench shaders scene.toml --json scene.toml", "scene.toml"),
     ] {
         refuses(&folder, arguments, &[&format!("{name}: is read by the same command")]);
     }

@@ -96,6 +96,13 @@ impl CasesArguments {
         Ok(cases)
     }
 
+    /// All files that are read for `cases`, which are what these arguments name.
+    pub fn files(&self, cases: &Cases) -> Vec<PathBuf> {
+        let of_scenes = cases.scenes.iter().flat_map(|(_, scene)| scene.files());
+        let named = self.environments.iter().chain(&self.scene).map(PathBuf::from);
+        of_scenes.chain(named).chain(files_of_materials(&self.materials, &cases.materials)).collect()
+    }
+
     /// What measurements ask for what they need.
     pub fn memo(&self) -> Memo {
         Memo::new(cache_folder(self.no_cache).as_deref())
@@ -153,6 +160,11 @@ pub fn named_materials(flag: &str, texts: &[String]) -> Result<Vec<(String, Mate
     Ok(materials)
 }
 
+/// All files that are read for `materials`, which are what `texts` name.
+pub fn files_of_materials(texts: &[String], materials: &[(String, MaterialSource)]) -> Vec<PathBuf> {
+    texts.iter().map(PathBuf::from).chain(materials.iter().flat_map(|(_, source)| source.files())).collect()
+}
+
 /// The environments that `texts` name, with their names.
 pub fn named_environments(flag: &str, texts: &[String]) -> Result<Vec<(String, Source)>> {
     let source = |text| Source::named(text, environment::builtin_names());
@@ -205,34 +217,42 @@ impl TruthArguments {
 
 /// Where measurements are written, besides the terminal.
 #[derive(clap::Args)]
-pub struct OutputArguments {
+pub struct JsonArgument {
     /// Write all measurements as JSON.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
+}
+
+impl JsonArgument {
+    /// Says before the work begins if the file cannot be written, or is one that the command has `read`.
+    pub fn check(&self, read: &[PathBuf]) -> Result<()> {
+        self.json.as_deref().map_or(Ok(()), output::check_writable)?;
+        output::check_not_read(&self.json, read)
+    }
+
+    pub fn write(&self, measurements: &impl serde::Serialize) -> anyhow::Result<()> {
+        let Some(path) = &self.json else { return Ok(()) };
+        let text = serde_json::to_string_pretty(measurements).context("--json")? + "\n";
+        Ok(output::write_whole(path, text.as_bytes())?)
+    }
+}
+
+/// The same, with pictures.
+#[derive(clap::Args)]
+pub struct OutputArguments {
+    #[command(flatten)]
+    pub json: JsonArgument,
     /// Folder for plots or pictures; made if it is not there.
     #[arg(long, value_name = "DIR")]
     pub plot: Option<PathBuf>,
 }
 
 impl OutputArguments {
-    /// Says what cannot be written before the work begins.
-    pub fn check(&self) -> Result<()> {
-        self.json.as_deref().map_or(Ok(()), output::check_writable)?;
+    /// Says before the work begins what cannot be written.
+    pub fn check(&self, read: &[PathBuf]) -> Result<()> {
+        self.json.check(read)?;
         self.plot.as_deref().map_or(Ok(()), check_folder)
     }
-
-    pub fn write_json(&self, measurements: &impl serde::Serialize) -> anyhow::Result<()> {
-        write_json(self.json.as_deref(), measurements)
-    }
-}
-
-/// Writes `measurements` where --json says, if it is given.
-pub fn write_json(path: Option<&Path>, measurements: &impl serde::Serialize) -> anyhow::Result<()> {
-    if let Some(path) = path {
-        let text = serde_json::to_string_pretty(measurements).context("--json")? + "\n";
-        output::write_whole(path, text.as_bytes())?;
-    }
-    Ok(())
 }
 
 /// An error if `folder` is none, or cannot be made or written to.

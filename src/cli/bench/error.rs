@@ -65,14 +65,13 @@ pub struct BenchError {
 
 impl BenchError {
     pub fn run(self) -> anyhow::Result<()> {
-        // Whatever is wrong with the command is said before the work begins.
-        self.output.check()?;
         let mut cases = self.cases.cases(&Defaults {
             materials: vec!["gold"],
             methods: Method::ALL.iter().copied().filter(|method| method.runs_on_gpu()).collect(),
             counts: &[1, 4, 16, 32, 64, 100, 512],
             size: None,
         })?;
+        self.output.check(&self.cases.files(&cases))?;
         cases.shard = self.shard.unwrap_or(Shard::WHOLE);
         cases.check_shard()?;
         let sweep = Sweep {
@@ -108,7 +107,7 @@ pub(super) fn write(rows: &[Row], reference_error: Option<f64>, output: &OutputA
 
 /// Writes the JSON and the plots of `rows` that `output` asks for.
 pub(super) fn write_files(rows: &[Row], output: &OutputArguments) -> anyhow::Result<()> {
-    output.write_json(&rows)?;
+    output.json.write(&rows)?;
     if let Some(folder) = &output.plot {
         let expectations = plots::expectation_chart(rows);
         plots::write(&plots::error_charts(rows).into_iter().chain(expectations).collect::<Vec<_>>(), folder)?;

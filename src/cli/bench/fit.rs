@@ -1,14 +1,12 @@
 //! `threadlight bench fit`: what fitted threads cost to make, and what error is left.
-use super::arguments::{named_materials, once, write_json};
+use super::arguments::{JsonArgument, files_of_materials, named_materials, once};
 use crate::cli::nameable;
 use crate::cli::progress::TerminalProgress;
 use clap::value_parser;
 use std::io::Write;
-use std::path::PathBuf;
 use threadlight::low_level::evaluate::fit::{self, Fits};
 use threadlight::low_level::evaluate::tables;
 use threadlight::low_level::memo::Memo;
-use threadlight::low_level::output;
 use threadlight::low_level::threads::fitted::MAX_COUNT;
 
 const EXAMPLES: &str = "\
@@ -39,15 +37,14 @@ pub struct BenchFit {
     /// Fit this often; times are medians.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = value_parser!(u32).range(1..))]
     repeat: u32,
-    /// Write all measurements as JSON.
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    #[command(flatten)]
+    json: JsonArgument,
 }
 
 impl BenchFit {
     pub fn run(self) -> anyhow::Result<()> {
-        self.json.as_deref().map_or(Ok(()), output::check_writable)?;
         let materials = named_materials("--materials", &self.materials)?;
+        self.json.check(&files_of_materials(&self.materials, &materials))?;
         let fits = Fits { materials, counts: once("--counts", self.counts)?, repeat: self.repeat };
         let progress = TerminalProgress::of("bench fit", "fits")?;
         let mut found = Vec::new();
@@ -55,7 +52,7 @@ impl BenchFit {
         progress.finish();
         if !found.is_empty() {
             write!(std::io::stdout().lock(), "{}", tables::text(&[fit::tables(&found)]))?;
-            write_json(self.json.as_deref(), &found)?;
+            self.json.write(&found)?;
         }
         Ok(result?)
     }

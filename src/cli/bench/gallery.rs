@@ -1,5 +1,7 @@
 //! `threadlight bench gallery`: pictures beside each other, of materials and of methods.
-use super::arguments::{CasesArguments, Defaults, OutputArguments, QUICK_TOLERANCE, TruthArguments, named_materials};
+use super::arguments::{
+    CasesArguments, Defaults, OutputArguments, QUICK_TOLERANCE, TruthArguments, files_of_materials, named_materials,
+};
 use crate::cli::progress::TerminalProgress;
 use clap::value_parser;
 use std::io::Write;
@@ -45,7 +47,7 @@ pub struct BenchGallery {
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "gold")]
     compare: Vec<String>,
     /// Draw all materials, and compare no methods.
-    #[arg(long)]
+    #[arg(long, conflicts_with_all = ["compare", "reference_tolerance", "reference_on", "json"])]
     materials_only: bool,
     /// Threads or samples of the pictures of all materials, 1 to 1024.
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = value_parser!(u32).range(1..=MAX_COUNT as i64))]
@@ -63,7 +65,6 @@ impl BenchGallery {
                 Error::input("bench gallery", "has nowhere to put pictures", "name a folder with --plot DIR").into()
             );
         };
-        self.output.check()?;
         let materials = self.cases.cases(&Defaults {
             materials: Brdf::builtin_names().collect(),
             methods: vec![Method::Fitted, Method::Paper, Method::Importance, Method::Filtered],
@@ -72,6 +73,7 @@ impl BenchGallery {
         })?;
         let estimator = Estimator { variant: materials.methods[0], count: self.threads };
         let compared = named_materials("--compare", &self.compare)?;
+        self.output.check(&[self.cases.files(&materials), files_of_materials(&self.compare, &compared)].concat())?;
         let sweep = Sweep {
             cases: Cases { materials: compared, ..materials.clone() },
             repeat: 3,
@@ -96,7 +98,7 @@ impl BenchGallery {
         sheets.extend(gallery::comparison_sheets(&measured));
         sheets.extend(gallery::side_by_side_sheets(&measured));
         write_pictures(&sheets, folder)?;
-        self.output.write_json(&measured.rows)?;
+        self.output.json.write(&measured.rows)?;
         write!(std::io::stdout().lock(), "{}", tables::text(&tables::error_tables(&measured.rows)))?;
         Ok(())
     }

@@ -1,16 +1,15 @@
 //! `threadlight bench live`: what drafts of threads cost and are worth while a parameter is dragged.
-use super::arguments::{QUICK_TOLERANCE, write_json};
+use super::arguments::{JsonArgument, QUICK_TOLERANCE};
+use crate::cli::none_of;
 use crate::cli::number;
 use crate::cli::progress::TerminalProgress;
 use crate::cli::scene_flags::{MachineFlags, SceneFlags};
 use clap::value_parser;
 use std::io::Write;
-use std::path::PathBuf;
 use threadlight::low_level::evaluate::live::{self, Drag};
 use threadlight::low_level::evaluate::reference::ReferenceSettings;
 use threadlight::low_level::evaluate::tables;
 use threadlight::low_level::memo::Memo;
-use threadlight::low_level::output;
 use threadlight::low_level::scene::Scene;
 use threadlight::low_level::vulkan::{Device, Instance};
 use threadlight::{Error, Result};
@@ -55,15 +54,14 @@ pub struct BenchLive {
     /// Estimated error of the reference, RMS of display values.
     #[arg(long, value_name = "X", default_value_t = QUICK_TOLERANCE, value_parser = number(f64::MIN_POSITIVE..=1.0, "a positive number up to 1"))]
     reference_tolerance: f64,
-    /// Write all measurements as JSON.
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    #[command(flatten)]
+    json: JsonArgument,
 }
 
 impl BenchLive {
     pub fn run(self) -> anyhow::Result<()> {
-        self.json.as_deref().map_or(Ok(()), output::check_writable)?;
         let mut scene = self.scene.scene()?;
+        self.json.check(&self.scene.files(&scene))?;
         if self.scene.scene.is_none() && self.scene.size.is_none() {
             (scene.image.width, scene.image.height) = (80, 60);
         }
@@ -71,19 +69,23 @@ impl BenchLive {
         let [from, to] = [("--from", &self.from), ("--to", &self.to)].map(|(flag, text)| numbers(flag, text));
         let values = between(&from?, &to?, self.steps)?;
         let drag = Drag { scene, material: material.to_owned(), key: key.to_owned(), values };
-        let instance = Instance::new(self.machine.validate)?;
-        let device = Device::new(&instance, self.machine.device.as_deref())?;
+        let instance = Instance::new(self.machine.validate).map_err(Error::from)?;
+        let messages = instance.messages();
+        let device = Device::new(&instance, self.machine.device.as_deref()).map_err(Error::from)?;
+        drop(instance);
         let memo = Memo::new(self.machine.cache().as_deref());
         let settings = ReferenceSettings { tolerance: self.reference_tolerance, ..ReferenceSettings::default() };
         let progress = TerminalProgress::of("bench live", "pictures")?;
         let mut found = Vec::new();
         let result = live::run(&drag, &settings, &device, &memo, &progress, &mut found);
+        drop(device);
         progress.finish();
         if !found.is_empty() {
             write!(std::io::stdout().lock(), "{}", tables::text(&[live::table(&drag, &found)]))?;
-            write_json(self.json.as_deref(), &found)?;
+            self.json.write(&found)?;
         }
-        Ok(result?)
+        result?;
+        none_of(&messages.all())
     }
 }
 

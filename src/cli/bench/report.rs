@@ -64,18 +64,21 @@ pub struct BenchReport {
 
 impl BenchReport {
     pub fn run(self) -> anyhow::Result<()> {
-        self.output.check()?;
         self.folder.as_deref().map_or(Ok(()), check_folder)?;
         let files = self.from.iter().map(|path| Ok((path.as_path(), read_rows(path)?))).collect::<Result<Vec<_>>>()?;
         let earlier = merged(files)?;
         // Without a folder there are earlier rows: clap sees to that.
-        let Some(folder) = &self.folder else { return error::write(&earlier, None, &self.output) };
+        let Some(folder) = &self.folder else {
+            self.output.check(&self.from)?;
+            return error::write(&earlier, None, &self.output);
+        };
         let cases = self.cases.cases(&Defaults {
             materials: vec!["gold", "red-plastic"],
             methods: vec![Method::Fitted, Method::Paper, Method::Importance, Method::Filtered],
             counts: &[1, 4, 16, 64],
             size: Some((160, 120)),
         })?;
+        self.output.check(&[self.cases.files(&cases), self.from.clone()].concat())?;
         let only_first = first_place(&cases);
         let sweep = Sweep {
             cases: if earlier.is_empty() { cases.clone() } else { only_first.clone() },

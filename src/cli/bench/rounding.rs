@@ -1,11 +1,9 @@
 //! `threadlight bench rounding`: what each rounding of a device costs.
-use super::arguments::{CasesArguments, Defaults, write_json};
+use super::arguments::{CasesArguments, Defaults, JsonArgument};
 use crate::cli::progress::TerminalProgress;
 use std::io::Write;
-use std::path::PathBuf;
 use threadlight::low_level::evaluate::{rounding, tables};
 use threadlight::low_level::method::Method;
-use threadlight::low_level::output;
 
 const EXAMPLES: &str = "\
 Without --materials gold and clay are measured; without --methods, fitted; without --counts, 16; without --size, 80x60.
@@ -30,20 +28,19 @@ The JSON is a list of rows with these fields, in this order:
 pub struct BenchRounding {
     #[command(flatten)]
     cases: CasesArguments,
-    /// Write all measurements as JSON.
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    #[command(flatten)]
+    json: JsonArgument,
 }
 
 impl BenchRounding {
     pub fn run(self) -> anyhow::Result<()> {
-        self.json.as_deref().map_or(Ok(()), output::check_writable)?;
         let cases = self.cases.cases(&Defaults {
             materials: vec!["gold", "clay"],
             methods: vec![Method::Fitted],
             counts: &[16],
             size: Some((80, 60)),
         })?;
+        self.json.check(&self.cases.files(&cases))?;
         let (device, memo) = (self.cases.open_device()?, self.cases.memo());
         let progress = TerminalProgress::of("bench rounding", "pictures")?;
         let mut found = Vec::new();
@@ -51,7 +48,7 @@ impl BenchRounding {
         progress.finish();
         if !found.is_empty() {
             write!(std::io::stdout().lock(), "{}", tables::text(&[rounding::tables(&found)]))?;
-            write_json(self.json.as_deref(), &found)?;
+            self.json.write(&found)?;
         }
         Ok(result?)
     }

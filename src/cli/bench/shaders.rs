@@ -1,15 +1,13 @@
 //! `threadlight bench shaders`: what a driver's compiler makes of the shaders that a scene needs.
-use super::arguments::write_json;
+use super::arguments::JsonArgument;
 use crate::cli::cache_folder;
 use crate::cli::progress::TerminalProgress;
 use crate::cli::scene_flags::SceneFlags;
 use std::io::Write;
-use std::path::PathBuf;
 use threadlight::Error;
 use threadlight::low_level::evaluate::{shaders, tables};
 use threadlight::low_level::memo::Memo;
 use threadlight::low_level::method::Method;
-use threadlight::low_level::output;
 use threadlight::low_level::vulkan::{CompilingDevice, Instance};
 
 const EXAMPLES: &str = "\
@@ -44,15 +42,14 @@ pub struct BenchShaders {
     /// Neither read nor write cached threads and blurred environments.
     #[arg(long)]
     no_cache: bool,
-    /// Write all that the driver tells as JSON.
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    #[command(flatten)]
+    json: JsonArgument,
 }
 
 impl BenchShaders {
     pub fn run(self) -> anyhow::Result<()> {
-        self.json.as_deref().map_or(Ok(()), output::check_writable)?;
         let scene = self.scene.scene()?;
+        self.json.check(&self.scene.files(&scene))?;
         let methods = match &self.scene.method {
             Some(name) => vec![Method::from_name(name)?],
             None => Method::ALL.iter().copied().filter(|method| method.runs_on_gpu()).collect(),
@@ -68,7 +65,7 @@ impl BenchShaders {
             let about = device.description();
             let name = format!("{}, {}", about.name, about.driver);
             write!(std::io::stdout().lock(), "{}", tables::text(&[shaders::table(&name, &costs)]))?;
-            write_json(self.json.as_deref(), &costs)?;
+            self.json.write(&costs)?;
         }
         Ok(result?)
     }

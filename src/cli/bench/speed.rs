@@ -58,13 +58,13 @@ pub struct BenchSpeed {
 
 impl BenchSpeed {
     pub fn run(self) -> anyhow::Result<()> {
-        self.output.check()?;
         let cases = self.cases.cases(&Defaults {
             materials: vec!["gold"],
             methods: vec![Method::Fitted, Method::Paper],
             counts: &[16, 32, 64, 100, 200, 512],
             size: None,
         })?;
+        self.output.check(&self.cases.files(&cases))?;
         let speed = Speed { cases, threads: self.threads, repeat: self.repeat };
         let device = self.cases.open_device()?;
         let memo = self.cases.memo();
@@ -76,7 +76,7 @@ impl BenchSpeed {
             let mut sections = tables::frame_tables(&timings);
             sections.extend(tables::growth_tables(&timings));
             write!(std::io::stdout().lock(), "{}", tables::text(&sections))?;
-            self.output.write_json(&timings)?;
+            self.output.json.write(&timings)?;
             if let Some(folder) = &self.output.plot {
                 plots::write(&plots::speed_charts(&timings), folder)?;
             }

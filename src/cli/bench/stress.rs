@@ -1,14 +1,13 @@
 //! `threadlight bench stress`: hard cases, and whether the device shades them as the CPU does.
-use super::arguments::write_json;
+use super::arguments::JsonArgument;
+use crate::cli::none_of;
 use crate::cli::progress::TerminalProgress;
 use crate::cli::scene_flags::MachineFlags;
 use std::io::Write;
-use std::path::PathBuf;
 use threadlight::Error;
 use threadlight::low_level::evaluate::stress::{self, Extent, Stressed};
 use threadlight::low_level::evaluate::tables;
 use threadlight::low_level::memo::Memo;
-use threadlight::low_level::output;
 use threadlight::low_level::vulkan::{Device, Instance};
 
 const EXAMPLES: &str = "\
@@ -42,14 +41,13 @@ pub struct BenchStress {
     /// Only the cases whose names have this in them, or another TEXT of another --only.
     #[arg(long, value_name = "TEXT")]
     only: Vec<String>,
-    /// Write all measurements as JSON.
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    #[command(flatten)]
+    json: JsonArgument,
 }
 
 impl BenchStress {
     pub fn run(self) -> anyhow::Result<()> {
-        self.json.as_deref().map_or(Ok(()), output::check_writable)?;
+        self.json.check(&[])?;
         let instance = Instance::new(self.machine.validate).map_err(Error::from)?;
         let messages = instance.messages();
         let device = Device::new(&instance, self.machine.device.as_deref()).map_err(Error::from)?;
@@ -62,13 +60,11 @@ impl BenchStress {
         progress.finish();
         if !found.is_empty() {
             write!(std::io::stdout().lock(), "{}", tables::text(&[stress::tables(&found)]))?;
-            write_json(self.json.as_deref(), &found)?;
+            self.json.write(&found)?;
         }
         result?;
         let broken = found.iter().filter(|case: &&Stressed| case.is_broken()).count();
         anyhow::ensure!(broken == 0, "bench stress: {broken} of {} cases break a bound", found.len());
-        let messages = messages.all();
-        anyhow::ensure!(messages.is_empty(), "validation: {} messages, the first: {}", messages.len(), messages[0]);
-        Ok(())
+        none_of(&messages.all())
     }
 }

@@ -1,5 +1,5 @@
 //! `threadlight bench together`: what many materials in one picture cost, beside each alone.
-use super::arguments::{named_environments, named_materials, open_device, write_json};
+use super::arguments::{JsonArgument, files_of_materials, named_environments, named_materials, open_device};
 use crate::cli::progress::TerminalProgress;
 use crate::cli::scene_flags::parse_size;
 use crate::cli::{cache_folder, nameable};
@@ -10,7 +10,6 @@ use threadlight::low_level::brdf::Brdf;
 use threadlight::low_level::evaluate::tables;
 use threadlight::low_level::evaluate::together::{self, Together};
 use threadlight::low_level::memo::Memo;
-use threadlight::low_level::output;
 use threadlight::low_level::threads::fitted::MAX_COUNT;
 
 const EXAMPLES: &str = "\
@@ -54,14 +53,12 @@ pub struct BenchTogether {
     /// Neither read nor write cached threads, blurred environments and pipelines.
     #[arg(long)]
     no_cache: bool,
-    /// Write all measurements as JSON.
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    #[command(flatten)]
+    json: JsonArgument,
 }
 
 impl BenchTogether {
     pub fn run(self) -> anyhow::Result<()> {
-        self.json.as_deref().map_or(Ok(()), output::check_writable)?;
         let materials = match self.materials.as_slice() {
             [] => Brdf::builtin_names().map(str::to_owned).collect(),
             named => named.to_vec(),
@@ -73,6 +70,9 @@ impl BenchTogether {
             size: self.size,
             repeat: self.repeat,
         };
+        let environments = self.environments.iter().map(PathBuf::from);
+        let read: Vec<_> = environments.chain(files_of_materials(&self.materials, &together.materials)).collect();
+        self.json.check(&read)?;
         let device = open_device(self.device.as_deref())?;
         let progress = TerminalProgress::of("bench together", "pictures")?;
         let memo = Memo::new(cache_folder(self.no_cache).as_deref());
@@ -81,7 +81,7 @@ impl BenchTogether {
         progress.finish();
         if !found.is_empty() {
             write!(std::io::stdout().lock(), "{}", tables::text(&together::tables(&found)))?;
-            write_json(self.json.as_deref(), &found)?;
+            self.json.write(&found)?;
         }
         Ok(result?)
     }

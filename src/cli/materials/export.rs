@@ -31,7 +31,7 @@ impl Export {
             }
         }
         output::check_writable(&self.output)?;
-        output::check_not_read([&self.output], [&PathBuf::from(&self.named.material)])?;
+        self.named.check_is_not(&self.output)?;
         let brdf = self.named.load()?;
         if !brdf.is_isotropic() {
             let remedy = "export an isotropic material";

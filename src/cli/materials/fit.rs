@@ -31,7 +31,7 @@ impl Fit {
             return Err(Error::in_file(&self.output, "is no material file", "end its name in .toml").into());
         }
         output::check_writable(&self.output)?;
-        output::check_not_read([&self.output], [&PathBuf::from(&self.named.material)])?;
+        self.named.check_is_not(&self.output)?;
         let fits = fit(&*self.named.load()?, &self.model)?;
         let mut out = std::io::stdout().lock();
         for fit in &fits {

@@ -24,6 +24,7 @@ impl Plot {
             return Err(Error::in_file(&self.output, "is no SVG", "end its name in .svg").into());
         }
         output::check_writable(&self.output)?;
+        self.named.check_is_not(&self.output)?;
         let name = stem(Path::new(&self.named.material));
         let svg = material_plot::svg(&*self.named.load()?, &name, &self.output)?;
         Ok(output::write_whole(&self.output, svg.as_bytes())?)
