@@ -119,8 +119,10 @@ impl Renderer {
     /// # Errors
     /// A material that there is not; a number of threads that is not from 1 to 128.
     pub fn threads(&self, material: impl Into<MaterialSource>, count: usize) -> Result<Threads> {
+        let material = material.into();
+        material.files().iter().for_each(|path| self.memo.look_again(path));
         let round = self.memo.round(&());
-        let (brdf, _) = in_own_axes(&round.ask(&LoadMaterial(&material.into()))?);
+        let (brdf, _) = in_own_axes(&round.ask(&LoadMaterial(&material))?);
         let settings = ThreadSettings { count, ..Default::default() };
         let settings = settings.for_picture(&*round.ask(&FindLobe(&brdf))?, ImageSettings::default().subpixels);
         Ok((*round.ask(&FitThreads { brdf: &brdf, settings })?).clone())

@@ -197,10 +197,11 @@ fn prepare_by(scene: &Scene, round: &Round, ask_threads: &AskThreads) -> Result<
     let sampling = Sampling { count, seed: scene.shading.seed, pattern };
     let (meshes, objects) = place_meshes(scene, round)?;
     let environment = round.ask(&LoadEnvironment(&scene.environment.source))?;
-    for object in &objects {
-        check_size(&meshes[object.mesh].0, world_sphere(&meshes, object))?;
+    let spheres = world_spheres(&meshes, &objects);
+    for (object, &sphere) in objects.iter().zip(&spheres) {
+        check_size(&meshes[object.mesh].0, sphere)?;
     }
-    let view = view_of(scene, bounding_sphere(&meshes, &objects))?;
+    let view = view_of(scene, bounding_sphere(&spheres))?;
     check_materials(scene)?;
     let mut materials = Vec::new();
     for name in scene.used_materials() {
@@ -325,7 +326,7 @@ pub fn view_of(scene: &Scene, (centre, radius): (DVec3, f64)) -> Result<View> {
 impl Prepared {
     /// Centre and radius of a sphere that holds all objects.
     pub fn bounding_sphere(&self) -> (DVec3, f64) {
-        bounding_sphere(&self.meshes, &self.objects)
+        bounding_sphere(&world_spheres(&self.meshes, &self.objects))
     }
 
     /// Gives objects the tangents that their materials need, and no others: to be called when materials were changed.
@@ -417,9 +418,10 @@ pub(crate) fn check_count(method: Method, count: u32, subpixels: u32) -> Result<
     Err(Error::input("threads", problem, remedy))
 }
 
-/// Centre and radius of a sphere in world space that holds `object`.
-fn world_sphere(meshes: &[NamedMesh], object: &PlacedMesh) -> (DVec3, f64) {
-    object.placed_sphere(meshes[object.mesh].1.bounding_sphere())
+/// Centre and radius of a sphere in world space for each object, that holds it.
+fn world_spheres(meshes: &[NamedMesh], objects: &[PlacedMesh]) -> Vec<(DVec3, f64)> {
+    let of_meshes: Vec<_> = meshes.iter().map(|(_, mesh)| mesh.bounding_sphere()).collect();
+    objects.iter().map(|object| object.placed_sphere(of_meshes[object.mesh])).collect()
 }
 
 /// An error for objects so large, small or far off that single precision, in which the GPU computes, would not hold areas
@@ -436,9 +438,8 @@ fn check_size(mesh: &str, (center, radius): (DVec3, f64)) -> Result<()> {
     Err(Error::input(mesh, format!("is {size:.2e} in size and reaches {reach:.2e} from the origin"), remedy))
 }
 
-/// A sphere around the bounding spheres of all objects: centre of their box, and the radius that reaches the farthest.
-fn bounding_sphere(meshes: &[NamedMesh], objects: &[PlacedMesh]) -> (DVec3, f64) {
-    let spheres: Vec<_> = objects.iter().map(|object| world_sphere(meshes, object)).collect();
+/// A sphere around `spheres`: centre of their box, and the radius that reaches the farthest.
+fn bounding_sphere(spheres: &[(DVec3, f64)]) -> (DVec3, f64) {
     let low = spheres.iter().fold(DVec3::INFINITY, |low, (center, radius)| low.min(*center - *radius));
     let high = spheres.iter().fold(DVec3::NEG_INFINITY, |high, (center, radius)| high.max(*center + *radius));
     let middle = (low + high) / 2.0;

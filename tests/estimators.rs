@@ -15,7 +15,7 @@ use threadlight::low_level::output::write_exr;
 use threadlight::low_level::pipeline::{DeviceScene, Rendering, Wanted};
 use threadlight::low_level::prepare::Prepared;
 use threadlight::low_level::scene::{
-    Background, MaterialSettings, MaterialSource, ObjectSettings, Pattern, Scene, Source,
+    Background, MAX_SAMPLES, MAX_SUBPIXELS, MaterialSettings, MaterialSource, ObjectSettings, Pattern, Scene, Source,
 };
 use threadlight::low_level::shading::{CpuShader, Surface};
 
@@ -195,6 +195,25 @@ fn anisotropic_models_are_the_same_in_glsl() {
         // SwiftShader: 3.3e-4 and 3.5e-3 for the narrowest lobe.
         let bounds = bounds(&gpu, (4e-4, 4e-3));
         assert!(differences.len() > 100 && median < bounds.0 && most < bounds.1, "{text}: {median} {most}");
+    }
+    gpu.finish();
+}
+
+/// Drivers may end long loops early: lavapipe does after 65535 turns in all.
+#[test]
+fn all_of_the_most_samples_are_taken() {
+    let gpu = Validated::new();
+    for method in Method::ALL.iter().filter(|method| method.runs_on_gpu() && method.threads().is_none()) {
+        // Most sub-pixels make most turns.
+        let count = method.max_count(MAX_SUBPIXELS).min(MAX_SAMPLES);
+        let white = Source::Builtin("white".into());
+        let mut scene = scene(model("model = 'lambert'\nreflectance = 0.6"), white, *method, count, (5, 4));
+        scene.image.subpixels = MAX_SUBPIXELS;
+        let rendering = render(&gpu, &ready(&scene));
+        for [r, g, b, alpha] in rendering.radiance.into_iter().filter(|pixel| pixel[3] > 0.0) {
+            let off = [r, g, b].map(|value| (value / alpha - 0.6).abs()).into_iter().fold(0.0, f32::max);
+            assert!(off < 0.03, "{} of {}: {off}", count, method.name());
+        }
     }
     gpu.finish();
 }

@@ -221,6 +221,20 @@ fn files_count_by_content() {
 }
 
 #[test]
+fn what_a_seed_does_not_change_is_not_made_again() {
+    let gpu = Validated::new();
+    for (method, made) in [("fitted", &[][..]), ("gaussian", &[]), ("paper", &["threads", "upload of materials"])] {
+        let mut scene = small();
+        scene.shading.method = method.into();
+        let (first, _) = ask(&gpu, &scene);
+        scene.shading.seed = 7;
+        assert_eq!(ask(&gpu, &scene).1, made, "{method}");
+        drop(first);
+    }
+    gpu.finish();
+}
+
+#[test]
 fn a_mesh_file_and_a_builtin_of_its_name_are_two() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("sphere.obj");

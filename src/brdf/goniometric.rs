@@ -102,7 +102,6 @@ impl std::fmt::Debug for Goniometric {
 
 impl Model for Goniometric {
     const HAS_PARAMETERS: bool = false;
-    const IS_RECIPROCAL: bool = false;
 
     fn evaluate(&self, w_i: DVec3, w_o: DVec3) -> DVec3 {
         let Axes { thetas, azimuths, turns } = self.axes;
@@ -126,6 +125,10 @@ impl Model for Goniometric {
             }
         }
         if sum.w > 0.0 { sum.truncate().as_dvec3() / f64::from(sum.w) } else { DVec3::ZERO }
+    }
+
+    fn is_reciprocal(&self) -> bool {
+        false
     }
 
     fn from_parameters(_: &mut Parameters) -> Result<Self> {

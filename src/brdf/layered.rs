@@ -5,7 +5,7 @@
 //!
 //! ```text
 //! f = F D G / (4 cos theta_i cos theta_o)
-//!     + 1/n^2 T_i A_i T_o A_o (f_base(w_i', w_o') (1 + k_i k_o) + h_i h_o / N)
+//!     + 1/n^2 (f_base(w_i', w_o') (T_i A_i T_o A_o + k_i k_o) + h_i h_o)
 //! ```
 //!
 //! - The first line is what the upper side reflects: GGX facets, exact Fresnel (Walter et al. 2007). T(theta) = 1 - its albedo there, so
@@ -17,8 +17,7 @@
 //!   rest. Its energy from each angle is that of all orders for isotropic bases, less 0.5 %: `interreflection.rs` sums them in the mean over
 //!   azimuth. For a diffuse base that is Saunderson's correction (1942), f = T_i T_o reflectance / (n^2 pi (1 - reflectance r)), r the coat's reflectance
 //!   for diffuse light from within. What is lost is the direction. In the mirror direction the sum says by which factor later light raises the
-//!   lobe: that is 1 + k k. What then lacks leaves evenly: h_i h_o / N, with N such that the integral is what lacks, in the manner of Kulla and
-//!   Conty (2017). Both are exact for a diffuse base and for a mirror; between them a lobe of later light is taken for the base's
+//!   lobe: that is k k. What then lacks leaves evenly: h h, of which the integral is what lacks, in the manner of Kulla and Conty (2017). Both are exact for a diffuse base and for a mirror; between them a lobe of later light is taken for the base's
 //!   own lobe and a haze.
 //!
 //! Reciprocal as the base is. Energy is at most 1.002, or at most that of the base where the base reflects more than it receives.
@@ -79,6 +78,10 @@ impl Model for Layered {
         let haze = interreflection.haze(w_i.z) * interreflection.haze(w_o.z);
         let below = self.base.evaluate(inner_i, inner_o) * (once + later) + haze;
         self.coat.reflection(w_i, w_o) + below / (self.coat.ior * self.coat.ior)
+    }
+
+    fn is_reciprocal(&self) -> bool {
+        self.base.is_reciprocal()
     }
 
     fn from_parameters(parameters: &mut Parameters) -> Result<Self> {

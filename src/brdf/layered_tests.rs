@@ -172,6 +172,17 @@ fn it_is_reciprocal_and_finite() {
 }
 
 #[test]
+fn tables_of_it_know_whether_its_base_is_reciprocal() {
+    let measured = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/rgl/whole_turn_rgb.bsdf");
+    for (base, is_reciprocal) in [("gold", true), (measured, false)] {
+        let coated = brdf(&format!("model = 'layered'; base = '{base}'; coat = {{ alpha = 0.1, ior = 1.5 }}"));
+        assert_eq!(coated.is_reciprocal(), is_reciprocal, "{base}");
+        let Brdf::Layered(layered) = &coated else { panic!("a coat") };
+        assert_eq!(layered.base.is_reciprocal(), is_reciprocal, "{base}");
+    }
+}
+
+#[test]
 fn a_base_is_a_name_a_file_or_a_table() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name);

@@ -53,15 +53,17 @@ pub trait Model: Sized {
     /// Whether material and scene files can have its parameters.
     const HAS_PARAMETERS: bool = true;
 
-    /// Whether f stays what it is when light and view change places. Measurements are reciprocal only approximately.
-    const IS_RECIPROCAL: bool = true;
-
     /// f(w_i, w_o) in 1/sr, linear Rec. 709, for unit vectors with both z positive.
     fn evaluate(&self, w_i: DVec3, w_o: DVec3) -> DVec3;
 
     /// [`Self::evaluate`] for several `w_i`: faster where their memory accesses can overlap.
     fn evaluate_all(&self, w_i: &[DVec3], w_o: DVec3) -> Vec<DVec3> {
         w_i.iter().map(|&w_i| self.evaluate(w_i, w_o)).collect()
+    }
+
+    /// Whether f stays what it is when light and view change places. Measurements are reciprocal only approximately.
+    fn is_reciprocal(&self) -> bool {
+        true
     }
 
     /// Reads the model's parameters from a table; unknown keys are reported by the caller.
@@ -111,7 +113,7 @@ macro_rules! brdf_models {
 
             /// Whether f stays what it is when light and view change places.
             pub fn is_reciprocal(&self) -> bool {
-                match self { $(Brdf::$Model(_) => $Model::IS_RECIPROCAL,)+ }
+                match self { $(Brdf::$Model(model) => model.is_reciprocal(),)+ }
             }
 
             /// Name of this BRDF's model: one of [`Brdf::MODELS`].

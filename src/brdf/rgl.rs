@@ -280,7 +280,6 @@ impl std::fmt::Debug for Rgl {
 
 impl Model for Rgl {
     const HAS_PARAMETERS: bool = false;
-    const IS_RECIPROCAL: bool = false;
 
     fn evaluate(&self, w_i: DVec3, w_o: DVec3) -> DVec3 {
         let tables = &*self.tables;
@@ -306,6 +305,10 @@ impl Model for Rgl {
             value *= tables.normals.at(u_h) / (4.0 * tables.projected_area.at(u(theta_o, phi_a)));
         }
         value / w_i.z.max(MIN_COS_THETA_I)
+    }
+
+    fn is_reciprocal(&self) -> bool {
+        false
     }
 
     fn from_parameters(_: &mut Parameters) -> Result<Self> {

@@ -10,8 +10,7 @@ use crate::memo::Round;
 use crate::method::Method;
 use crate::pipeline::{DeviceScene, Wanted, render_geometry};
 use crate::prepare::{Prepared, check_count, prepare};
-use crate::scene::Scene;
-use crate::threads::MAX_COUNT;
+use crate::scene::{MAX_SAMPLES, Scene};
 use crate::vulkan::Device;
 
 /// Pixels that are looked at. Errors gather in a part of a picture, at rims and highlights, say a tenth of it: of 50 normal numbers
@@ -107,10 +106,9 @@ pub fn prepare_within(scene: &Scene, most: f64, device: &Arc<Device>, round: &Ro
 
 /// Powers of two and half as much again.
 fn counts() -> impl Iterator<Item = u32> {
-    let most = MAX_COUNT as u32;
     std::iter::once(1)
-        .chain((1..=most.ilog2()).flat_map(|power| [1 << power, 3 << (power - 1)]))
-        .filter(move |count| *count <= most)
+        .chain((1..=MAX_SAMPLES.ilog2()).flat_map(|power| [1 << power, 3 << (power - 1)]))
+        .filter(|count| *count <= MAX_SAMPLES)
 }
 
 #[cfg(test)]
@@ -118,10 +116,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn counts_rise_to_the_most_that_there_are() {
+    fn counts_rise_to_the_most_that_any_method_has() {
         let counts: Vec<_> = counts().collect();
         assert_eq!(counts[..9], [1, 2, 3, 4, 6, 8, 12, 16, 24]);
-        assert!(counts.windows(2).all(|pair| pair[0] < pair[1]) && counts.last() == Some(&(MAX_COUNT as u32)));
+        assert!(counts.windows(2).all(|pair| pair[0] < pair[1]) && counts.last() == Some(&8192));
     }
 
     #[test]

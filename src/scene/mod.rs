@@ -2,7 +2,7 @@
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
-use glam::{DMat3, DQuat, EulerRot, Mat4, Quat, Vec3};
+use glam::{DQuat, EulerRot, Mat4, Quat, Vec3};
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize};
 
@@ -188,7 +188,7 @@ pub struct MaterialSettings {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum MaterialSource {
-    /// A measured one on the disk.
+    /// Read from the disk: measured, or a model with its parameters.
     File(PathBuf),
     /// One that the program names.
     Builtin(String),
@@ -315,13 +315,6 @@ impl Default for EnvironmentSettings {
     }
 }
 
-impl EnvironmentSettings {
-    /// Takes a direction in the world to the direction in the environment's own picture that is seen there.
-    pub fn environment_from_world(&self) -> DMat3 {
-        DMat3::from_rotation_y(-self.rotation_deg.to_radians())
-    }
-}
-
 impl Default for ShadingSettings {
     fn default() -> Self {
         Self { method: DEFAULT_METHOD.into(), threads: None, pattern: Pattern::default(), seed: 0 }
@@ -352,7 +345,6 @@ impl ObjectSettings {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use glam::DVec3;
 
     #[test]
     fn a_file_called_like_a_built_in_is_never_taken_for_it() {
@@ -380,13 +372,5 @@ mod tests {
         assert!(object.transform().transform_point3(Vec3::X).distance(Vec3::new(12.0, 0.0, 0.0)) < 1e-5);
         // y: about z to -x, which x leaves, about y to z.
         assert!(object.transform().transform_point3(Vec3::Y).distance(Vec3::new(10.0, 0.0, 2.0)) < 1e-5);
-    }
-
-    #[test]
-    fn turning_the_environment_takes_z_towards_x() {
-        let turned = EnvironmentSettings { rotation_deg: 90.0, ..EnvironmentSettings::default() };
-        // What the picture has at +Z is now seen towards +X.
-        assert!((turned.environment_from_world() * DVec3::X - DVec3::Z).length() < 1e-15);
-        assert_eq!(EnvironmentSettings::default().environment_from_world(), DMat3::IDENTITY);
     }
 }

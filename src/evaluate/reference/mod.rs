@@ -108,7 +108,7 @@ impl ReferenceImage {
             return self.radiance.clone();
         }
         let View { camera, width, height, .. } = prepared.view;
-        let to_environment = to_environment(&prepared.view);
+        let to_environment = to_environment(prepared.view.rotation_deg);
         let pixels = self.radiance.iter().enumerate().map(|(pixel, &[r, g, b, coverage])| {
             if coverage >= 1.0 {
                 return [r, g, b, coverage];
@@ -150,9 +150,9 @@ pub fn tone_map(radiance: &[[f32; 4]], view: &View) -> Vec<u8> {
     radiance.iter().flat_map(pixel).collect()
 }
 
-/// Takes directions in the world to directions in the environment's own picture.
-fn to_environment(view: &View) -> DMat3 {
-    DMat3::from_rotation_y(-view.rotation_deg.to_radians())
+/// Takes directions in the world to directions in the own picture of an environment that is rotated by so many degrees.
+fn to_environment(rotation_deg: f64) -> DMat3 {
+    DMat3::from_rotation_y(-rotation_deg.to_radians())
 }
 
 /// The reference of `prepared`, for the geometry that `device` rasterises. The observer of `round` hears of rows of pixels, or of frames.
@@ -258,7 +258,7 @@ impl Integrator<'_> {
     pub fn points(&self, view: &View, geometry: &[[u32; 2]], x: usize, y: usize) -> Vec<Point> {
         let side = view.subpixels as usize;
         let [width, height] = view.cache_size();
-        let to_environment = to_environment(view);
+        let to_environment = to_environment(view.rotation_deg);
         let subpixels = (0..side).flat_map(|v| (0..side).map(move |u| (x * side + u, y * side + v)));
         subpixels
             .filter_map(|(u, v)| {

@@ -326,3 +326,10 @@ fn the_picture_is_the_same_on_any_number_of_threads_and_can_be_cancelled() {
     let cancelled = Integrator::new(&map, 1.0, [&brdf], 2).image(&view, &geometry, 1e-2, &Impatient);
     assert!(matches!(cancelled, Err(Error::Cancelled)));
 }
+
+#[test]
+fn turning_the_environment_takes_z_towards_x() {
+    // What the picture has at +Z is now seen towards +X.
+    assert!((to_environment(90.0) * DVec3::X - DVec3::Z).length() < 1e-15);
+    assert_eq!(to_environment(0.0), glam::DMat3::IDENTITY);
+}
