@@ -27,7 +27,7 @@ vec3 geometry_normal(uvec2 texel) {
     return octahedral_decode(unpackSnorm2x16(texel.x));
 }
 
-// The texel with a unit tangent, to 5e-5 rad.
+// The texel with a unit tangent; steps are 1e-4 rad.
 uvec2 with_tangent(uvec2 texel, vec3 tangent) {
     vec3 n = geometry_normal(texel);
     vec3 x = any_tangent(n);

@@ -4,6 +4,7 @@
 // Twin: src/shading/importance_sampling.rs; the table: src/threads/slice_table.rs.
 #include "arc_tangent.glsl"
 #include "azimuths.glsl"
+#include "circle.glsl"
 #include "pi.glsl"
 
 const uint SLICE_ROWS = 90;     // theta_o = row 90 deg / SLICE_ROWS
@@ -74,7 +75,7 @@ vec3 to_view(SliceRows rows, vec3 h) {
 // sin^2(theta_h / 2) at the inner edge of a ring: even steps of it are even steps of solid angle, without cancellation.
 float ring_edge(uint ring) {
     float x = float(ring) / float(SLICE_RINGS);
-    float s = sin(radians(45.0) * x * x);
+    float s = acute_sine(radians(45.0) * x * x);
     return s * s;
 }
 
@@ -155,8 +156,7 @@ DirectionSample sample_brdf(SliceRows rows, vec3 w_o, uvec4 bits) {
     vec3 w_i;
     vec3 h;
     if (u.x < DIFFUSE_SHARE) {
-        float phi = radians(360.0) * u.z;
-        w_i = vec3(sqrt(u.y) * vec2(cos(phi), sin(phi)), sqrt(1.0 - u.y));
+        w_i = vec3(sqrt(u.y) * on_circle(u.z), sqrt(1.0 - u.y));
         h = normalize(w_i + w_o);
     } else {
         bool is_above = u.x - DIFFUSE_SHARE < rows.t * (1.0 - DIFFUSE_SHARE);

@@ -2,6 +2,7 @@
 // by luminance times solid angle, then a point under its bilinear weight. Summed over pixels the density is then itself
 // bilinear: exactly the alpha channel of the map, which is zero only where the light is.
 // Twin: src/shading/light_sampling.rs.
+#include "circle.glsl"
 #include "environment_map.glsl"
 
 // Walker's alias table over the pixels, as built by Vose (1991).
@@ -31,9 +32,9 @@ vec3 sample_light(uvec4 bits) {
     // Beyond the poles the pixel's row is clamped; folding the tent back there gives just that weight.
     float y = abs(float(pixel / uint(size.x)) + 0.5 + tent(u.w)) / float(size.y);
     y = y > 1.0 ? 2.0 - y : y;
-    float phi = radians(360.0) * x;
+    vec2 around = on_circle(x);
     float theta = radians(180.0) * y;
-    return vec3(sin(theta) * sin(phi), cos(theta), -sin(theta) * cos(phi));
+    return vec3(sin(theta) * around.y, cos(theta), -sin(theta) * around.x);
 }
 
 // Density in 1/sr of sample_light at `d`, where the map holds `texel`. Within 1e-7 rad of a pole it would have no bound.

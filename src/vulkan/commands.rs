@@ -249,8 +249,10 @@ impl Commands {
         use vk::{BufferUsageFlags as B, DescriptorType as D, ImageLayout as L, ImageUsageFlags as I};
         let write =
             vk::WriteDescriptorSet::default().dst_set(set).dst_binding(declared.index).descriptor_type(declared.kind);
-        let of_buffer = |buffer: &Buffer, usage| {
+        let limits = self.device.limits();
+        let of_buffer = |buffer: &Buffer, usage, most_bytes: u32| {
             buffer.check(&self.device, usage, 0)?;
+            buffer.check_is_seen(most_bytes)?;
             Ok([vk::DescriptorBufferInfo::default().buffer(buffer.raw).range(vk::WHOLE_SIZE)])
         };
         let of_image = |image: &Image, usage, layout| {
@@ -260,11 +262,11 @@ impl Commands {
         let (buffers, images);
         let write = match (bound, declared.kind) {
             (Bound::Buffer(buffer), D::STORAGE_BUFFER) => {
-                buffers = of_buffer(buffer, B::STORAGE_BUFFER)?;
+                buffers = of_buffer(buffer, B::STORAGE_BUFFER, limits.max_storage_buffer_range)?;
                 write.buffer_info(&buffers)
             }
             (Bound::Buffer(buffer), D::UNIFORM_BUFFER) => {
-                buffers = of_buffer(buffer, B::UNIFORM_BUFFER)?;
+                buffers = of_buffer(buffer, B::UNIFORM_BUFFER, limits.max_uniform_buffer_range)?;
                 write.buffer_info(&buffers)
             }
             (Bound::Image(image), D::STORAGE_IMAGE) => {

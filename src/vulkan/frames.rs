@@ -6,6 +6,21 @@ use super::error::{Result, VulkanError, call};
 use ash::vk;
 use std::sync::Arc;
 
+/// Descriptor sets that a frame may bind, one for each draw and dispatch: two for each shader of materials, and far more than there are passes
+/// besides. Running out is an error that says so.
+const MAX_SETS: u32 = 64;
+
+/// Most descriptors of a kind that a shader declares.
+const MOST_OF_A_KIND: u32 = 8;
+
+const DESCRIPTOR_KINDS: [vk::DescriptorType; 5] = [
+    vk::DescriptorType::STORAGE_BUFFER,
+    vk::DescriptorType::UNIFORM_BUFFER,
+    vk::DescriptorType::COMBINED_IMAGE_SAMPLER,
+    vk::DescriptorType::SAMPLED_IMAGE,
+    vk::DescriptorType::STORAGE_IMAGE,
+];
+
 /// How long one pass took on the GPU.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PassTime {
@@ -156,17 +171,9 @@ impl Slot {
             call("vkAllocateCommandBuffers", name, || unsafe { device.raw.allocate_command_buffers(&info) })?[0];
         device.set_name(slot.commands, name);
 
-        // Room for far more passes than a frame has; running out is an error that says so.
-        let (sets, each) = (64, 128);
-        let sizes = [
-            vk::DescriptorType::STORAGE_BUFFER,
-            vk::DescriptorType::UNIFORM_BUFFER,
-            vk::DescriptorType::COMBINED_IMAGE_SAMPLER,
-            vk::DescriptorType::SAMPLED_IMAGE,
-            vk::DescriptorType::STORAGE_IMAGE,
-        ]
-        .map(|kind| vk::DescriptorPoolSize::default().ty(kind).descriptor_count(each));
-        let info = vk::DescriptorPoolCreateInfo::default().max_sets(sets).pool_sizes(&sizes);
+        let sizes = DESCRIPTOR_KINDS
+            .map(|kind| vk::DescriptorPoolSize::default().ty(kind).descriptor_count(MAX_SETS * MOST_OF_A_KIND));
+        let info = vk::DescriptorPoolCreateInfo::default().max_sets(MAX_SETS).pool_sizes(&sizes);
         // SAFETY: plain creation.
         slot.descriptor_pool =
             call("vkCreateDescriptorPool", name, || unsafe { device.raw.create_descriptor_pool(&info, None) })?;
@@ -211,6 +218,24 @@ impl Drop for Slot {
         self.device.delete_later(Garbage::DescriptorPool(self.descriptor_pool));
         if let Some(queries) = self.queries {
             self.device.delete_later(Garbage::QueryPool(queries));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::vulkan::compiled;
+
+    #[test]
+    fn a_frame_has_descriptors_for_every_shader() {
+        for shader in compiled::ALL {
+            let interface = shader.reflect().unwrap();
+            for binding in interface.bindings.values() {
+                assert!(DESCRIPTOR_KINDS.contains(&binding.kind), "{}: {:?}", shader.name(), binding.kind);
+                let alike = interface.bindings.values().filter(|other| other.kind == binding.kind).count();
+                assert!(alike <= MOST_OF_A_KIND as usize, "{}: {alike} {:?}", shader.name(), binding.kind);
+            }
         }
     }
 }

@@ -184,6 +184,19 @@ impl Buffer {
         Ok(())
     }
 
+    /// An error for one of which shaders, which see `most_bytes` of a buffer, would not see all.
+    pub(super) fn check_is_seen(&self, most_bytes: u32) -> Result<()> {
+        if self.size_bytes <= u64::from(most_bytes) {
+            return Ok(());
+        }
+        let problem = format!(
+            "it has {} bytes, and shaders of this device see {most_bytes} of a buffer; \
+             a smaller --size, fewer --subpixels or fewer materials need less",
+            self.size_bytes
+        );
+        Err(VulkanError::unfit(&self.name, problem))
+    }
+
     /// What memory it needs.
     pub(crate) fn requirements(&self) -> vk::MemoryRequirements {
         // SAFETY: plain query of a live buffer.
