@@ -7,6 +7,7 @@
 //! | [`method`] | every equation, symbol by symbol, with the file and function that holds it |
 //! | [`architecture`] | the way of a scene to pixels, the memo, the frame graph, how to add each kind of thing |
 //! | [`results`] | all measurements, with the commands that made them |
+//! | [`tried`] | what was measured on the way: what each choice is worth, and what was left out |
 //! | [`limits`] | what it does not do, and where it is weak |
 //!
 //! A file is named by its path, `src/threads/cones.rs`; a function, type or constant in it by path and name,
@@ -27,6 +28,9 @@ pub mod architecture {}
 #[doc = include_str!("results.md")]
 #[doc = include_str!("../../assets/error_over_time.svg")]
 pub mod results {}
+
+#[doc = include_str!("tried.md")]
+pub mod tried {}
 
 #[doc = include_str!("limits.md")]
 pub mod limits {}
