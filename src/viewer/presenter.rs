@@ -72,7 +72,7 @@ fn declare_window<'a>(
     panel: &'a UiFrame,
     [width, height]: [u32; 2],
 ) -> WindowFrame {
-    let desc = ImageDesc { format: Swapchain::FORMAT, width, height };
+    let desc = ImageDesc { format: painter.format(), width, height };
     let window = graph.import_image("window", desc, None, Some(Access::Present));
     let nowhere = Area { left: 0, top: 0, width, height };
     let frame =
@@ -100,11 +100,12 @@ impl Presenter {
     /// # Errors
     /// No memory left, or a window that cannot be presented to.
     pub fn new(device: &Arc<Device>, surface: Surface, mode: PresentMode) -> Result<Self> {
+        let swapchain = Swapchain::new(device, surface, mode, FRAMES)?;
         Ok(Self {
             store: Store::default(),
-            painter: UiPainter::new(device, Swapchain::FORMAT, FRAMES)?,
+            painter: UiPainter::new(device, swapchain.format(), FRAMES)?,
             frames: Frames::new(device, "window", FRAMES)?,
-            swapchain: Swapchain::new(device, surface, mode, FRAMES)?,
+            swapchain,
             device: device.clone(),
         })
     }
@@ -180,9 +181,12 @@ impl Presenter {
             let lookups: Vec<u64> = texels(Some(&lookups));
             (counters.first().copied().unwrap_or_default(), lookups.first().copied().unwrap_or_default())
         });
-        let screenshot = screenshot.map(|bgra| {
-            let rgba = texels::<[u8; 4]>(Some(&bgra)).into_iter().flat_map(|[b, g, r, _]| [r, g, b, 255]);
-            (rgba.collect(), [width, height])
+        let screenshot = screenshot.map(|image| {
+            let opaque = |texel| {
+                let [r, g, b] = self.swapchain.rgb8(texel);
+                [r, g, b, 255]
+            };
+            (texels(Some(&image)).into_iter().flat_map(opaque).collect(), [width, height])
         });
         Ok(Some(Drawn { passes, ran, counted, screenshot }))
     }

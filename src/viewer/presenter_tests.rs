@@ -34,7 +34,7 @@ impl Stage {
         let prepared = prepare(&scene, &round).expect("a scene that can be prepared");
         Self {
             renderer: DeviceScene::new(&device, &prepared, &round).expect("a renderer"),
-            painter: UiPainter::new(&device, Swapchain::FORMAT, FRAMES).expect("a painter"),
+            painter: UiPainter::new(&device, Swapchain::FORMATS[0], FRAMES).expect("a painter"),
             panel: UiFrame::default(),
         }
     }

@@ -52,7 +52,11 @@ impl ImageShape {
     /// Bytes of a texel, of the formats whose texels go to buffers or come from there.
     fn texel_bytes(&self) -> Option<u64> {
         match self.format {
-            vk::Format::R8G8B8A8_UNORM | vk::Format::B8G8R8A8_UNORM => Some(4),
+            vk::Format::R8G8B8A8_UNORM
+            | vk::Format::B8G8R8A8_UNORM
+            | vk::Format::A8B8G8R8_UNORM_PACK32
+            | vk::Format::A2R10G10B10_UNORM_PACK32
+            | vk::Format::A2B10G10R10_UNORM_PACK32 => Some(4),
             vk::Format::R32G32_UINT | vk::Format::R16G16B16A16_SFLOAT => Some(8),
             vk::Format::R32G32B32A32_SFLOAT => Some(16),
             _ => None,

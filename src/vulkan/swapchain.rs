@@ -72,6 +72,7 @@ pub struct Swapchain {
     /// `None` while there is nothing to draw on: a window without area, a lost surface.
     current: Option<Current>,
     surface: Surface,
+    format: vk::Format,
     mode: PresentMode,
     /// For each frame in flight, signalled when the image that it draws is free.
     free: Vec<vk::Semaphore>,
@@ -92,8 +93,14 @@ struct Current {
 }
 
 impl Swapchain {
-    /// The format of the images.
-    pub const FORMAT: vk::Format = vk::Format::B8G8R8A8_UNORM;
+    /// Formats of images that take display values as they are, what most windows have first.
+    pub(crate) const FORMATS: [vk::Format; 5] = [
+        vk::Format::B8G8R8A8_UNORM,
+        vk::Format::R8G8B8A8_UNORM,
+        vk::Format::A8B8G8R8_UNORM_PACK32,
+        vk::Format::A2R10G10B10_UNORM_PACK32,
+        vk::Format::A2B10G10R10_UNORM_PACK32,
+    ];
 
     /// A swapchain of `surface` for so many frames in flight; it has images from the first turn on.
     ///
@@ -106,9 +113,22 @@ impl Swapchain {
             feature: "VK_KHR_swapchain".to_owned(),
         })?;
         let free = (0..frames).map(|_| semaphore(device, "image is free")).collect::<Result<_>>()?;
-        let mut swapchain = Self { current: None, surface, mode, free, next: 0, device: device.clone(), functions };
+        let format = Self::FORMATS[0];
+        let mut swapchain =
+            Self { current: None, surface, format, mode, free, next: 0, device: device.clone(), functions };
+        swapchain.format = swapchain.available_format()?;
         swapchain.mode = swapchain.available(mode)?;
         Ok(swapchain)
+    }
+
+    /// The format of the images, one of [`Self::FORMATS`].
+    pub(crate) fn format(&self) -> vk::Format {
+        self.format
+    }
+
+    /// Red, green and blue of a texel of its images.
+    pub(crate) fn rgb8(&self, texel: [u8; 4]) -> [u8; 3] {
+        rgb8(self.format, texel)
     }
 
     /// How frames reach the screen.
@@ -218,12 +238,11 @@ impl Swapchain {
             self.discard();
             return Ok(false);
         }
-        self.check_format()?;
         let usage = Self::USAGE & capabilities.supported_usage_flags;
         let raw = self.create(&capabilities, extent, usage)?;
         // SAFETY: plain query of the swapchain just made.
         let images = unsafe { self.functions.get_swapchain_images(raw) };
-        let shape = ImageShape::plane(Self::FORMAT, extent.width, extent.height);
+        let shape = ImageShape::plane(self.format, extent.width, extent.height);
         let mut current = Current { raw, images: Vec::new(), drawn: Vec::new(), stale: false };
         let filled = images.during("vkGetSwapchainImagesKHR", "window").and_then(|images| {
             for image in images {
@@ -260,8 +279,8 @@ impl Swapchain {
         let info = vk::SwapchainCreateInfoKHR::default()
             .surface(self.surface.raw)
             .min_image_count((capabilities.min_image_count + 1).min(most))
-            .image_format(Self::FORMAT)
-            .image_color_space(vk::ColorSpaceKHR::SRGB_NONLINEAR)
+            .image_format(self.format)
+            .image_color_space(COLOR_SPACE)
             .image_extent(extent)
             .image_array_layers(1)
             .image_usage(usage)
@@ -296,19 +315,29 @@ impl Swapchain {
         })
     }
 
-    /// An error where the window cannot be given display values as they are.
-    fn check_format(&self) -> Result<()> {
+    /// The first of the formats that the window has; an error where it cannot be given display values as they are.
+    fn available_format(&self) -> Result<vk::Format> {
         let Surface { raw, functions, .. } = &self.surface;
         // SAFETY: the device is of the surface's instance, as was checked when this was made.
-        let formats = unsafe { functions.get_physical_device_surface_formats(self.device.physical, *raw) }
+        let of_window = unsafe { functions.get_physical_device_surface_formats(self.device.physical, *raw) }
             .during("vkGetPhysicalDeviceSurfaceFormatsKHR", "window")?;
-        if formats.iter().any(|format| format.format == Self::FORMAT) {
-            return Ok(());
-        }
-        Err(VulkanError::Unsuitable {
+        let has = |wanted: &vk::Format| {
+            let is_it = |has: &vk::SurfaceFormatKHR| (has.format, has.color_space) == (*wanted, COLOR_SPACE);
+            of_window.iter().any(is_it) && self.can_be_blitted_to(*wanted)
+        };
+        Self::FORMATS.into_iter().find(has).ok_or_else(|| VulkanError::Unsuitable {
             device: self.device.description().name.clone(),
-            feature: format!("windows of format {:?}", Self::FORMAT),
+            feature: format!("windows of one of the formats {:?}", Self::FORMATS),
         })
+    }
+
+    /// Whether a picture can be blitted into images of `format`, and a panel drawn over it.
+    fn can_be_blitted_to(&self, format: vk::Format) -> bool {
+        // SAFETY: plain query of the device's own physical device.
+        let properties =
+            unsafe { self.device.instance.raw.get_physical_device_format_properties(self.device.physical, format) };
+        let needed = vk::FormatFeatureFlags::BLIT_DST | vk::FormatFeatureFlags::COLOR_ATTACHMENT;
+        properties.optimal_tiling_features.contains(needed)
     }
 
     /// `wanted` where the device has it for this window, else the one that every device has.
@@ -358,10 +387,47 @@ impl Drop for Swapchain {
     }
 }
 
+/// Display values are what the window system shows as they are.
+const COLOR_SPACE: vk::ColorSpaceKHR = vk::ColorSpaceKHR::SRGB_NONLINEAR;
+
+/// Red, green and blue of a texel of `format`, one of [`Swapchain::FORMATS`].
+fn rgb8(format: vk::Format, texel: [u8; 4]) -> [u8; 3] {
+    let word = u32::from_le_bytes(texel);
+    let of_10_bits = |low: u32| (((word >> low & 0x3ff) * 255 + 511) / 1023) as u8;
+    match format {
+        vk::Format::B8G8R8A8_UNORM => [texel[2], texel[1], texel[0]],
+        vk::Format::A2R10G10B10_UNORM_PACK32 => [20, 10, 0].map(of_10_bits),
+        vk::Format::A2B10G10R10_UNORM_PACK32 => [0, 10, 20].map(of_10_bits),
+        _ => [texel[0], texel[1], texel[2]],
+    }
+}
+
 fn semaphore(device: &Device, name: &str) -> Result<vk::Semaphore> {
     // SAFETY: plain creation; destroyed with the swapchain.
     let raw = unsafe { device.raw.create_semaphore(&vk::SemaphoreCreateInfo::default(), None) }
         .during("vkCreateSemaphore", name)?;
     device.set_name(raw, name);
     Ok(raw)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn texels_of_every_format_are_read_as_red_green_and_blue() {
+        let [r, g, b] = [255_u32, 128, 0];
+        let to_10_bits = |value: u32| (value * 1023 + 127) / 255;
+        let packed =
+            |[low, middle, high]: [u32; 3]| to_10_bits(low) | to_10_bits(middle) << 10 | to_10_bits(high) << 20;
+        for (format, word) in Swapchain::FORMATS.into_iter().zip([
+            b | g << 8 | r << 16,
+            r | g << 8 | b << 16,
+            r | g << 8 | b << 16,
+            packed([b, g, r]),
+            packed([r, g, b]),
+        ]) {
+            assert_eq!(rgb8(format, (word | 3 << 30).to_le_bytes()), [r, g, b].map(|value| value as u8), "{format:?}");
+        }
+    }
 }

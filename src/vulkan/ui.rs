@@ -25,10 +25,16 @@ pub struct UiPainter {
     /// The textures as they are: see [`UiPainter::update`].
     textures: HashMap<TextureId, ColorImage>,
     command_pool: vk::CommandPool,
+    format: vk::Format,
     device: Arc<Device>,
 }
 
 impl UiPainter {
+    /// That of what it draws on.
+    pub(crate) fn format(&self) -> vk::Format {
+        self.format
+    }
+
     /// Compiles its shaders for colour targets of `format` that hold display values, and so many frames in flight.
     ///
     /// # Errors
@@ -51,7 +57,7 @@ impl UiPainter {
         let command_pool =
             unsafe { device.raw.create_command_pool(&info, None) }.during("vkCreateCommandPool", "panel")?;
         device.set_name(command_pool, "panel");
-        Ok(Self { renderer, textures: HashMap::new(), command_pool, device: device.clone() })
+        Ok(Self { renderer, textures: HashMap::new(), command_pool, format, device: device.clone() })
     }
 
     /// Brings the textures (glyphs, above all) up to date, before the frame that needs them is recorded.
