@@ -168,8 +168,19 @@ impl Parameters {
     pub(super) fn take(&mut self, key: &str, what: &str, domain: Domain, help: &'static str) -> Result<Value> {
         let middle = self.fills.then(|| domain.middle());
         self.read.push(Parameter { key: key.into(), help, domain, default: None });
-        self.table.remove(key).or(middle).ok_or_else(|| Error::input(key, "is missing", format!("give {what}")))
+        self.table.remove(key).or(middle).ok_or_else(|| {
+            let remedy = match self.table.keys().find(|given| is_misspelt(given, key)) {
+                Some(given) => format!("rename `{given}`, or give {what}"),
+                None => format!("give {what}"),
+            };
+            Error::input(key, "is missing", remedy)
+        })
     }
+}
+
+/// Whether `given` is `key` but for a letter in four: other parameters, of which one may begin as another, are farther from each other.
+fn is_misspelt(given: &str, key: &str) -> bool {
+    strsim::damerau_levenshtein(given, key) * 4 <= key.len() && !given.starts_with(key)
 }
 
 /// The error about a key in the table `key`.

@@ -1,4 +1,5 @@
 //! The progress bar of a long computation, and Ctrl-C as the way out of it.
+use super::say;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -25,6 +26,7 @@ impl TerminalProgress {
             if flag.swap(true, Ordering::Relaxed) {
                 std::process::exit(130);
             }
+            say(format_args!("stopping after what runs now; Ctrl-C again stops at once"));
         })?;
         let style =
             ProgressStyle::with_template(&format!("{{prefix}} {{wide_bar}} {{pos}}/{{len}} {units}, {{eta}} left"))?;

@@ -35,10 +35,10 @@ pub struct SceneFlags {
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     pub size: Option<(u32, u32)>,
     /// Factor on radiance before display.
-    #[arg(long, value_name = "X", value_parser = number(EXPOSURE, "a finite number that is not negative"))]
+    #[arg(long, value_name = "X", value_parser = number(EXPOSURE, "a finite number from 0 to 3.4e38"))]
     pub exposure: Option<f64>,
     /// Display values are radiance to the power of 1/X.
-    #[arg(long, value_name = "X", value_parser = number(GAMMA, "a finite number above 0"))]
+    #[arg(long, value_name = "X", value_parser = number(GAMMA, "a number above 0, from 1.2e-38 to 3.4e38"))]
     pub gamma: Option<f64>,
     /// What is seen behind the objects.
     #[arg(long, value_name = "environment|none", value_parser = background(), hide_possible_values = true)]
@@ -79,6 +79,9 @@ impl SceneFlags {
             Some(path) => Scene::load(path)?,
             None => Scene::default(),
         };
+        if let (Some(path), None) = (&self.scene, &self.method) {
+            Method::from_name(&scene.shading.method).map_err(|error| error.within(path.display()))?;
+        }
         if let Some(material) = &self.material {
             scene.use_material(material, MaterialSource::named(material));
         }

@@ -101,7 +101,7 @@ pub fn prepare_within(scene: &Scene, most: f64, device: &Arc<Device>, round: &Ro
     let (count, rms) = reached;
     let problem =
         format!("{most:e} is not reached: {count} threads or samples of \"{}\" have {rms:.1e}", method.name());
-    Err(Error::input("--error", problem, "allow more, or use --method fitted, mis or reference"))
+    Err(Error::input("--error", problem, "allow a larger error, or use --method reference, which has --tolerance"))
 }
 
 /// Powers of two and half as much again.

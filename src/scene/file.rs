@@ -9,10 +9,11 @@ use toml::Spanned;
 
 use super::{
     Camera, DEFAULT_MATERIAL, EXPOSURE, EnvironmentSettings, GAMMA, INTENSITY, ImageSettings, MAX_SAMPLES, MAX_SIZE_PX,
-    MAX_SUBPIXELS, MaterialSettings, MaterialSource, ObjectSettings, Scene, ShadingSettings, Source, TangentRule,
+    MAX_SUBPIXELS, MaterialSettings, MaterialSource, ObjectSettings, Scene, ShadingSettings, Source, TangentRule, mesh,
     three_numbers,
 };
 use crate::brdf::{Brdf, change_base_files, has_model, resolve_base_files};
+use crate::environment;
 use crate::error::{Error, Result};
 use crate::file_format::{self, FileFormat, FileKind, text};
 use crate::output::write_whole;
@@ -72,7 +73,7 @@ impl TryFrom<RawEnvironmentKeys> for EnvironmentKeys {
     fn try_from(keys: RawEnvironmentKeys) -> Result<Self, String> {
         let source = match (keys.file, keys.builtin) {
             (Some(file), None) => Source::File(file),
-            (None, Some(name)) => Source::Builtin(name),
+            (None, Some(name)) => builtin("environment", name, environment::builtin_names())?,
             (None, None) => EnvironmentSettings::default().source,
             (Some(_), Some(_)) => return Err("[environment] takes `file` or `builtin`, not both".into()),
         };
@@ -225,7 +226,13 @@ fn material(mut table: toml::Table) -> Result<MaterialSettings, String> {
     let name = name.ok_or("a [[material]] needs a `name`")?;
     let source = match (file, builtin, model) {
         (Some(file), None, None) => MaterialSource::File(file.into()),
-        (None, Some(builtin), None) => MaterialSource::Builtin(builtin),
+        (None, Some(builtin), None) => match Brdf::builtin_names().any(|known| known == builtin) {
+            true => MaterialSource::Builtin(builtin),
+            false => {
+                let known = Brdf::builtin_names().collect::<Vec<_>>().join(", ");
+                return Err(format!("no material `{builtin}` is built in; these are: {known}"));
+            }
+        },
         (None, None, Some(model)) => MaterialSource::Model { model, parameters: std::mem::take(&mut table) },
         (None, None, None) if Brdf::builtin_names().any(|known| known == name) => MaterialSource::Builtin(name.clone()),
         (None, None, None) => {
@@ -246,7 +253,7 @@ fn material(mut table: toml::Table) -> Result<MaterialSettings, String> {
 fn object(keys: ObjectKeys, first_material: &str) -> Result<ObjectSettings, String> {
     let mesh = match (keys.mesh, keys.builtin) {
         (Some(file), None) => Source::File(file),
-        (None, Some(name)) => Source::Builtin(name),
+        (None, Some(name)) => builtin("mesh", name, mesh::builtin_names())?,
         _ => return Err("an [[object]] needs exactly one of `mesh` and `builtin`".into()),
     };
     Ok(ObjectSettings {
@@ -257,6 +264,14 @@ fn object(keys: ObjectKeys, first_material: &str) -> Result<ObjectSettings, Stri
         scale: keys.scale,
         tangent: keys.tangent,
     })
+}
+
+/// The built-in `what` of this name.
+fn builtin(what: &str, name: String, known: &[&str]) -> Result<Source, String> {
+    match known.contains(&name.as_str()) {
+        true => Ok(Source::Builtin(name)),
+        false => Err(format!("no {what} `{name}` is built in; these are: {}", known.join(", "))),
+    }
 }
 
 fn one() -> f64 {

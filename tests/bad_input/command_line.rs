@@ -18,7 +18,7 @@ fn numbers_out_of_range_name_the_flag_and_the_range() {
         ("--subpixels", "5", "1..=4"),
         ("--exposure", "NaN", "finite"),
         ("--exposure", "inf", "finite"),
-        ("--exposure", "-1", "not negative"),
+        ("--exposure", "-1", "from 0"),
         ("--gamma", "0", "above 0"),
         ("--gamma", "nan", "finite"),
         ("--rotation", "inf", "finite"),

@@ -118,6 +118,7 @@ fn galleries_and_reports_that_cannot_be_made_are_refused() {
         ("gallery --plot out --compare gold,gold", &["--compare", "twice"]),
         ("gallery --plot out --materials missing.binary", &["missing.binary"]),
         ("gallery --plot out --materials-only --json out/errors.json", &["--materials-only", "--json"]),
+        ("stress --only nosuchcase", &["--only", "nosuchcase"]),
         ("report", &["<DIR>"]),
         ("report small.png", &["small.png"]),
         ("report absent/report", &["absent/report"]),

@@ -50,6 +50,17 @@ fn hostile_scene_files_are_refused() {
     }
     fs::write(folder.path().join("bad.toml"), "[image]\nwidth = 0").unwrap();
     refuses(&folder, "render bad.toml -o out/image.png", &["bad.toml", "line 2", "1 to 16384"]);
+    // What a file names wrongly is told with the file and what there is.
+    for (text, words) in [
+        ("[environment]\nbuiltin = 'studoi'", &["bad.toml", "line 1", "studio"][..]),
+        ("[[object]]\nbuiltin = 'spher'", &["bad.toml", "line 1", "sphere"]),
+        ("[[material]]\nname = 'm'\nbuiltin = 'golld'", &["bad.toml", "line 1", "gold"]),
+        ("[shading]\nmethod = 'fited'", &["bad.toml", "fitted"]),
+        ("[[material]]\nname = 'm'\nmodel = 'lambert'\nreflectence = 1", &["rename `reflectence`"]),
+    ] {
+        fs::write(folder.path().join("bad.toml"), text).unwrap();
+        refuses(&folder, "render bad.toml -o out/image.png", words);
+    }
     fs::write(folder.path().join("noise.toml"), noise(256)).unwrap();
     fs::create_dir(folder.path().join("folder.toml")).unwrap();
     for name in ["noise.toml", "folder.toml", "missing.toml"] {

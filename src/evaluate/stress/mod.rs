@@ -96,6 +96,15 @@ pub fn run(
         (extent.all || !case.is_slow) && is_named
     };
     let cases: Vec<Case> = cases::cases(folder.path()).into_iter().filter(is_asked).collect();
+    if cases.is_empty() {
+        let asked = extent.only.join(", ");
+        let remedy = if extent.all {
+            "give a part of a name in the table"
+        } else {
+            "give a part of a name in the table, or --all"
+        };
+        return Err(Error::input("--only", format!("no case has {asked} in its name"), remedy));
+    }
     let methods = || Method::ALL.iter().filter(|method| method.runs_on_gpu());
     let methods: Vec<Method> = methods().filter(|method| extent.all || method.threads().is_some()).copied().collect();
     let formats: &[bool] = if extent.all { &[false, true] } else { &[false] };
