@@ -38,7 +38,7 @@ pub struct SceneFlags {
     #[arg(long, value_name = "X", value_parser = number(EXPOSURE, "a finite number from 0 to 3.4e38"))]
     pub exposure: Option<f64>,
     /// Display values are radiance to the power of 1/X.
-    #[arg(long, value_name = "X", value_parser = number(GAMMA, "a number above 0, from 1.2e-38 to 3.4e38"))]
+    #[arg(long, value_name = "X", value_parser = number(GAMMA, "a finite number above 0: 1.2e-38 to 3.4e38"))]
     pub gamma: Option<f64>,
     /// What is seen behind the objects.
     #[arg(long, value_name = "environment|none", value_parser = background(), hide_possible_values = true)]
