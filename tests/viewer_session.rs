@@ -68,6 +68,38 @@ fn an_edited_file_that_is_dropped_again_is_seen_as_it_is_now() {
 }
 
 #[test]
+fn a_file_that_is_shown_and_then_broken_is_told_once_each_time_it_is_opened_and_stays_as_it_was() {
+    let gpu = Validated::new();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("paint.toml");
+    std::fs::write(&path, "model = \"lambert\"\nreflectance = 0.25\n").unwrap();
+    let material = MaterialSource::File(path.clone());
+    let mut viewer = Viewer::new(sphere(material.clone(), "white", 2, (32, 24)), &gpu.device, Memo::default(), || ());
+    wait(&mut viewer);
+    let open = Input::Set(Change::Material(material));
+    let failures = |viewer: &mut Viewer, expected: usize| {
+        viewer.handle(&open);
+        wait(viewer);
+        assert_eq!(viewer.failures.len(), expected, "{:?}", viewer.failures);
+        assert!((red(viewer) - 0.25).abs() < 1e-9 && viewer.session.shown() == viewer.session.wanted());
+    };
+    std::fs::write(&path, "model = \"lambert\"\nreflectance = 7\n").unwrap();
+    failures(&mut viewer, 1);
+    std::fs::remove_file(&path).unwrap();
+    failures(&mut viewer, 2);
+    // All else can be changed.
+    viewer.handle(&Input::Set(Change::Threads(Some(3))));
+    wait(&mut viewer);
+    assert_eq!((viewer.failures.len(), viewer.session.shown().shading.threads), (2, Some(3)));
+    std::fs::write(&path, "model = \"lambert\"\nreflectance = 0.75\n").unwrap();
+    viewer.handle(&open);
+    wait(&mut viewer);
+    assert!((red(&viewer) - 0.75).abs() < 1e-9);
+    drop(viewer);
+    gpu.finish();
+}
+
+#[test]
 fn what_cannot_be_loaded_takes_nothing_else_with_it_not_even_before_the_first_picture() {
     let gpu = Validated::new();
     let scene = sphere(MaterialSource::Builtin("clay".into()), "white", 2, (32, 24));

@@ -43,6 +43,11 @@ impl Files {
         self.lock().values_mut().for_each(|(_, bytes)| *bytes = None);
     }
 
+    /// The file at `path` counts as one of the contents that `key` is of, whatever it has by now.
+    pub fn set_key(&self, path: &Path, key: Key) {
+        self.lock().insert(path.to_owned(), (key, None));
+    }
+
     /// Nothing is known of the file at `path` any more.
     pub fn forget(&self, path: &Path) {
         self.lock().remove(path);
@@ -76,5 +81,7 @@ mod tests {
         files.forget(&a);
         std::fs::remove_file(&a).unwrap();
         assert!(files.key(&a).is_err());
+        files.set_key(&a, one);
+        assert!(files.key(&a).unwrap() == one && files.bytes(&a).is_err());
     }
 }

@@ -158,6 +158,11 @@ impl Memo {
         self.files.forget(path);
     }
 
+    /// The file at `path` counts as it was when its key was `key`, as long as nobody names it again: what it has by now cannot be used.
+    pub fn set_file_key(&self, path: &Path, key: Key) {
+        self.files.set_key(path, key);
+    }
+
     /// How many outputs are in memory.
     pub fn outputs_in_memory(&self) -> usize {
         let known = self.known.lock().unwrap_or_else(PoisonError::into_inner);

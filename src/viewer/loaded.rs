@@ -1,9 +1,10 @@
 //! What frames are made of.
 use crate::Result;
-use crate::memo::Key;
+use crate::memo::{Key, Memo};
 use crate::pipeline::DeviceScene;
 use crate::prepare::{Prepared, view_of};
 use crate::scene::Scene;
+use std::path::PathBuf;
 use std::sync::Arc;
 
 /// All that a scene needs, on the device.
@@ -17,9 +18,18 @@ pub struct Loaded {
     pub key: Option<Key>,
     /// The change that it was asked for by: [`super::latency::Latency::asked`].
     pub change: u64,
+    /// Its files, with the keys of the contents that were loaded.
+    pub files: Vec<(PathBuf, Key)>,
 }
 
 impl Loaded {
+    /// What was `prepared` by means of `memo`, on the device.
+    pub fn new(prepared: Prepared, renderer: DeviceScene, key: Option<Key>, change: u64, memo: &Memo) -> Self {
+        let files = prepared.scene.files().into_iter();
+        let files = files.filter_map(|path| memo.file_key(&path).ok().map(|key| (path, key))).collect();
+        Self { prepared: Arc::new(prepared), renderer: Arc::new(renderer), key, change, files }
+    }
+
     /// Whether some of its threads only stand in for those that are being made.
     pub fn is_draft(&self) -> bool {
         self.prepared.is_draft

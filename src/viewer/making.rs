@@ -91,8 +91,8 @@ impl Viewer {
         let (device, memo, change) = (self.device.clone(), self.memo.clone(), self.changes);
         self.loading.request(move |task| {
             let loaded = |prepared: Prepared, round: &Round| -> Result<Loaded> {
-                let renderer = Arc::new(DeviceScene::new(&device, &prepared, round)?);
-                Ok(Loaded { prepared: Arc::new(prepared), renderer, key, change })
+                let renderer = DeviceScene::new(&device, &prepared, round)?;
+                Ok(Loaded::new(prepared, renderer, key, change, &memo))
             };
             if let Some(before) = before {
                 let round = memo.round(task);
@@ -118,8 +118,7 @@ impl Viewer {
             let round = memo.round(task);
             let prepared = prepare(&scene, &round)?;
             let renderer = crate::vulkan::hot_reload::reload(|| DeviceScene::new(&device, &prepared, &round))?;
-            let (prepared, renderer) = (Arc::new(prepared), Arc::new(renderer));
-            Ok(Loaded { prepared, renderer, key, change })
+            Ok(Loaded::new(prepared, renderer, key, change, &memo))
         });
     }
 
@@ -178,15 +177,29 @@ impl Viewer {
                         return Err(error);
                     }
                     self.latency.failed();
-                    // A draft is still to be finished.
-                    let loaded = self.loaded.as_ref().filter(|loaded| !loaded.is_draft());
-                    self.requested = loaded.and_then(|loaded| loaded.key);
                     self.tell_error(&error);
-                    self.request();
+                    // Else what failed is what is wanted still, and would fail again.
+                    if was_edited {
+                        self.go_back();
+                    }
                 }
             }
         }
         Ok(is_new)
+    }
+
+    /// Asks for what is left to be loaded after something was taken back.
+    fn go_back(&mut self) {
+        if let Some(loaded) = &self.loaded {
+            // What is shown is of files as they were, which may have been edited and opened in vain since.
+            for (path, key) in loaded.files.iter().filter(|(path, _)| !self.session.asks_for(path)) {
+                self.memo.set_file_key(path, *key);
+            }
+        }
+        // A draft is still to be finished.
+        let finished = self.loaded.as_ref().filter(|loaded| !loaded.is_draft());
+        self.requested = finished.and_then(|loaded| loaded.key);
+        self.request();
     }
 
     /// What is shown as a `draft`, with finished threads, which are waited for.
@@ -195,5 +208,51 @@ impl Viewer {
         let prepared = prepare(&draft.prepared.scene, &round)?;
         let renderer = Arc::new(DeviceScene::new(&self.device, &prepared, &round)?);
         Ok(Loaded { prepared: Arc::new(prepared), renderer, ..draft.clone() })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{MaterialSource, Scene, Source};
+    use crate::vulkan::{Device, Instance};
+
+    /// Waits until nothing is being loaded.
+    fn wait(viewer: &mut Viewer) {
+        let start = Instant::now();
+        while viewer.is_loading() {
+            viewer.take_loaded().expect("something to show");
+            assert!(start.elapsed() < Duration::from_secs(60), "it is loaded over and over: {:?}", viewer.failures);
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    }
+
+    #[test]
+    fn a_draft_that_cannot_be_finished_is_told_once_and_stays() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("m.toml");
+        std::fs::write(&path, "model = 'lambert'\nreflectance = 0.5").unwrap();
+        let mut scene = Scene::default();
+        scene.materials[0].source = MaterialSource::File(path.clone());
+        scene.environment.source = Source::Builtin("white".to_owned());
+        scene.shading.threads = Some(1);
+        (scene.image.width, scene.image.height) = (32, 24);
+        let instance = Instance::new(false).expect("an instance");
+        let asked = std::env::var("THREADLIGHT_TEST_DEVICE").ok();
+        let device = Device::new(&instance, asked.as_deref()).expect("a device");
+        let mut viewer = Viewer::new(scene, &device, Memo::default(), || ());
+        wait(&mut viewer);
+        // As if what is shown were a draft of what cannot be made.
+        let loaded = viewer.loaded.take().expect("a picture");
+        let prepared = Arc::new(Prepared { is_draft: true, ..(*loaded.prepared).clone() });
+        viewer.loaded = Some(Loaded { prepared, ..loaded });
+        std::fs::write(&path, "model = 'lambert'\nreflectance = 7").unwrap();
+        viewer.memo.look_again(&path);
+        for _ in 0..3 {
+            viewer.request();
+            wait(&mut viewer);
+            assert_eq!(viewer.failures.len(), 1, "{:?}", viewer.failures);
+        }
+        assert!(viewer.loaded().is_some_and(Loaded::is_draft));
     }
 }

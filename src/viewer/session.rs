@@ -6,6 +6,7 @@
 use super::change::Change;
 use crate::error::Result;
 use crate::scene::{ImageSettings, Scene};
+use std::path::Path;
 
 /// The scene that is asked for, and the one that is seen.
 #[derive(Clone, Debug, PartialEq)]
@@ -39,6 +40,14 @@ impl Session {
     /// What frames show: all of it has been loaded.
     pub fn shown(&self) -> &Scene {
         &self.shown
+    }
+
+    /// Whether something that is not shown yet names the file at `path`.
+    pub fn asks_for(&self, path: &Path) -> bool {
+        self.pending.iter().any(|(_, edit)| match edit {
+            Edit::Change(change) => change.file() == Some(path),
+            Edit::Scene(scene) => scene.files().iter().any(|file| file == path),
+        })
     }
 
     /// Makes a change, whose number is above that of all before.
