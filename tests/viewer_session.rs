@@ -7,10 +7,10 @@ use glam::DVec3;
 use std::time::{Duration, Instant};
 use threadlight::low_level::memo::Memo;
 use threadlight::low_level::prepare::{Prepared, PreparedMaterial};
-use threadlight::low_level::scene::{MaterialSettings, MaterialSource, ObjectSettings, Source};
+use threadlight::low_level::scene::{MaterialSettings, MaterialSource, ObjectSettings, Scene, Source};
 use threadlight::low_level::threads::Threads;
 use threadlight::low_level::viewer::change::Change;
-use threadlight::low_level::viewer::input::Input;
+use threadlight::low_level::viewer::input::{Input, Scroll};
 use threadlight::low_level::viewer::interaction::Viewer;
 
 /// Waits until what is wanted has been loaded.
@@ -193,6 +193,44 @@ fn a_draft_is_finished_though_something_else_cannot_be_loaded_meanwhile() {
     wait(&mut viewer);
     assert!(viewer.notice.as_ref().is_some_and(|notice| notice.is_error));
     assert!(!viewer.loaded().unwrap().is_draft() && (red(&viewer) - 0.75).abs() < 1e-9);
+    drop(viewer);
+    gpu.finish();
+}
+
+/// A scene of which no drafts are made.
+fn quick() -> Scene {
+    let mut scene = sphere(MaterialSource::Builtin("clay".into()), "white", 2, (32, 24));
+    scene.shading.method = "cosine".into();
+    scene
+}
+
+#[test]
+fn another_scene_is_framed_though_the_camera_is_moved_while_it_loads() {
+    let gpu = Validated::new();
+    let folder = tempfile::tempdir().unwrap();
+    let mut viewer = Viewer::new(quick(), &gpu.device, Memo::default(), || ());
+    wait(&mut viewer);
+    let scroll = Input::Scroll(Scroll::Lines(1.0));
+    viewer.handle(&scroll);
+    assert!(viewer.session.wanted().camera.is_some());
+    let mut large = quick();
+    large.objects[0].scale = 100.0;
+    let path = folder.path().join("large.toml");
+    large.save(&path).unwrap();
+    viewer.handle(&Input::Drop(path));
+    assert!(viewer.is_loading());
+    viewer.handle(&scroll);
+    wait(&mut viewer);
+    assert_eq!((viewer.session.shown().objects[0].scale, viewer.session.shown().camera), (100.0, None));
+    // Where only the material is another, what is seen is what was moved.
+    viewer.handle(&Input::Undo);
+    wait(&mut viewer);
+    viewer.handle(&Input::Set(Change::Material(MaterialSource::Builtin("silver".into()))));
+    assert!(viewer.is_loading());
+    let before = viewer.session.shown().camera;
+    viewer.handle(&scroll);
+    assert!(before.is_some() && viewer.session.shown().camera != before);
+    wait(&mut viewer);
     drop(viewer);
     gpu.finish();
 }

@@ -276,7 +276,8 @@ impl Viewer {
     }
 
     pub(super) fn move_camera(&mut self, act: impl FnOnce(&mut Orbit)) -> Result<()> {
-        let Some(loaded) = &self.loaded else { return Ok(()) };
+        // What is still being loaded is to be seen by its own camera, or framed.
+        let Some(loaded) = self.loaded.as_ref().filter(|_| self.session.shows_wanted_objects()) else { return Ok(()) };
         let (centre, radius) = loaded.prepared.bounding_sphere();
         let view = view_of(self.session.shown(), (centre, radius))?;
         let mut orbit = Orbit::new(&view.camera, Bounds { centre, radius });

@@ -5,7 +5,7 @@
 //! nothing, and leaves other changes as they are.
 use super::change::Change;
 use crate::error::Result;
-use crate::scene::{ImageSettings, Scene};
+use crate::scene::{ImageSettings, ObjectSettings, Scene};
 use std::path::Path;
 
 /// The scene that is asked for, and the one that is seen.
@@ -48,6 +48,12 @@ impl Session {
             Edit::Change(change) => change.file() == Some(path),
             Edit::Scene(scene) => scene.files().iter().any(|file| file == path),
         })
+    }
+
+    /// Whether the objects that are wanted are where those are that are seen: else no camera suits both.
+    pub fn shows_wanted_objects(&self) -> bool {
+        let place = |object: &ObjectSettings| (object.mesh.clone(), object.transform());
+        self.wanted.objects.iter().map(place).eq(self.shown.objects.iter().map(place))
     }
 
     /// Makes a change, whose number is above that of all before.
