@@ -205,6 +205,23 @@ fn quick() -> Scene {
 }
 
 #[test]
+fn what_could_not_be_loaded_is_not_asked_for_again_by_undoing_what_came_after() {
+    let gpu = Validated::new();
+    let mut viewer = Viewer::new(quick(), &gpu.device, Memo::default(), || ());
+    wait(&mut viewer);
+    viewer.handle(&Input::Set(Change::Mesh(Source::File("absent.obj".into()))));
+    viewer.handle(&Input::Set(Change::Exposure(2.0)));
+    wait(&mut viewer);
+    assert_eq!((viewer.failures.len(), viewer.session.shown().image.exposure), (1, 2.0));
+    viewer.handle(&Input::Undo);
+    wait(&mut viewer);
+    assert_eq!((viewer.failures.len(), viewer.session.shown().image.exposure), (1, 1.0));
+    assert_eq!(viewer.history.has(), [false, true]);
+    drop(viewer);
+    gpu.finish();
+}
+
+#[test]
 fn another_scene_is_framed_though_the_camera_is_moved_while_it_loads() {
     let gpu = Validated::new();
     let folder = tempfile::tempdir().unwrap();

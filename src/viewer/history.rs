@@ -3,6 +3,7 @@
 //! Camera and size of the picture are not among what is undone: who takes a material back wants to see it from where the other was seen. Only
 //! where a whole scene is taken back does its camera go with it.
 use super::change::Change;
+use super::session::Edit;
 use crate::scene::Scene;
 use std::time::{Duration, Instant};
 
@@ -16,36 +17,53 @@ const KEPT: usize = 1000;
 pub struct History {
     before: Vec<Moment>,
     undone: Vec<Moment>,
-    /// The last change, and when it was made.
-    last: Option<(Change, Instant)>,
+    /// When the last change was made; none if that goes on no more.
+    last: Option<Instant>,
 }
 
 /// A scene as it was.
 #[derive(Clone, Debug)]
 struct Moment {
     scene: Scene,
-    /// Whether another scene took its place, whose camera was another.
-    was_replaced: bool,
+    /// What was done then, or undone.
+    edit: Edit,
+    /// Its number: [`super::session::Session::change`].
+    number: u64,
 }
 
 impl History {
-    /// `change` is about to be made of the scene `before`, or another scene takes its place (none), at the time `now`.
-    pub fn record(&mut self, before: &Scene, change: Option<&Change>, now: Instant) {
-        if matches!(change, Some(Change::Camera(_) | Change::Size(..))) {
+    /// `edit` of this number is about to be made of the scene `before`, at the time `now`.
+    pub fn record(&mut self, before: &Scene, edit: Edit, number: u64, now: Instant) {
+        if matches!(edit, Edit::Change(Change::Camera(_) | Change::Size(..))) {
             return;
         }
-        let goes_on = self.last.as_ref().zip(change).is_some_and(|((last, when), change)| {
-            last.is_undone_by(change) && now.saturating_duration_since(*when) < ONE_MOTION
-        });
-        self.last = change.map(|change| (change.clone(), now));
         self.undone.clear();
-        if goes_on {
+        let last = self.last.replace(now).filter(|last| now.saturating_duration_since(*last) < ONE_MOTION);
+        if let (Some(_), Some(moment), Edit::Change(change)) = (last, self.before.last_mut(), &edit)
+            && matches!(&moment.edit, Edit::Change(last) if last.is_undone_by(change))
+        {
+            (moment.edit, moment.number) = (edit, number);
             return;
         }
         if self.before.len() == KEPT {
             self.before.remove(0);
         }
-        self.before.push(Moment { scene: before.clone(), was_replaced: change.is_none() });
+        self.before.push(Moment { scene: before.clone(), edit, number });
+    }
+
+    /// The edits of these numbers could not be: as if they had never been made.
+    pub fn forget(&mut self, numbers: &[u64]) {
+        let Some(first) = self.before.iter().position(|moment| numbers.contains(&moment.number)) else { return };
+        // It is from after them.
+        self.undone.clear();
+        let mut scene = self.before[first].scene.clone();
+        for Moment { scene: was, edit, number } in self.before.split_off(first) {
+            // The camera stays, as it does where edits are undone.
+            let before = Scene { camera: was.camera, ..scene.clone() };
+            if !numbers.contains(&number) && edit.apply(&mut scene).is_ok() {
+                self.before.push(Moment { scene: before, edit, number });
+            }
+        }
     }
 
     /// The scene before the last thing that changed `wanted`, looked at as that is; none if nothing did.
@@ -65,20 +83,16 @@ impl History {
 }
 
 /// Takes the last scene that is not `wanted` anyway, as what could not be loaded leaves, and puts `wanted` into its place.
-fn step(
-    from: &mut Vec<Moment>,
-    to: &mut Vec<Moment>,
-    last: &mut Option<(Change, Instant)>,
-    wanted: &Scene,
-) -> Option<Scene> {
+fn step(from: &mut Vec<Moment>, to: &mut Vec<Moment>, last: &mut Option<Instant>, wanted: &Scene) -> Option<Scene> {
     *last = None;
-    while let Some(Moment { mut scene, was_replaced }) = from.pop() {
-        if !was_replaced {
+    while let Some(Moment { mut scene, edit, number }) = from.pop() {
+        // Another scene had another camera.
+        if matches!(edit, Edit::Change(_)) {
             scene.camera = wanted.camera;
         }
         (scene.image.width, scene.image.height) = (wanted.image.width, wanted.image.height);
         if scene != *wanted {
-            to.push(Moment { scene: wanted.clone(), was_replaced });
+            to.push(Moment { scene: wanted.clone(), edit, number });
             return Some(scene);
         }
     }
@@ -95,16 +109,19 @@ mod tests {
         history: History,
         scene: Scene,
         now: Instant,
+        /// Of the last edit.
+        number: u64,
     }
 
     impl User {
         fn new() -> Self {
-            Self { history: History::default(), scene: Scene::default(), now: Instant::now() }
+            Self { history: History::default(), scene: Scene::default(), now: Instant::now(), number: 0 }
         }
 
         fn does_after(&mut self, change: &Change, wait: Duration) {
             self.now += wait;
-            self.history.record(&self.scene, Some(change), self.now);
+            self.number += 1;
+            self.history.record(&self.scene, Edit::Change(change.clone()), self.number, self.now);
             change.apply(&mut self.scene).unwrap();
         }
 
@@ -181,8 +198,8 @@ mod tests {
         let mut user = User::new();
         let camera = |x: f64| Some(crate::scene::Camera::framing(glam::DVec3::ONE, x, 1.0));
         user.does(&Change::Camera(camera(1.0)));
-        user.history.record(&user.scene, None, user.now);
         let dropped = Scene { camera: camera(2.0), objects: Vec::new(), ..Scene::default() };
+        user.history.record(&user.scene, Edit::Scene(Box::new(dropped.clone())), 9, user.now);
         let before = std::mem::replace(&mut user.scene, dropped.clone());
         assert!(user.undoes() && user.scene == before);
         assert!(user.redoes() && user.scene == dropped);
@@ -191,10 +208,32 @@ mod tests {
     #[test]
     fn what_could_not_be_loaded_is_nothing_to_undo() {
         let mut user = User::new();
+        let exposed = |exposure: f64, gamma: f64| {
+            let mut scene = Scene::default();
+            (scene.image.exposure, scene.image.gamma) = (exposure, gamma);
+            scene
+        };
         user.does(&Change::Exposure(2.0));
-        let before = user.scene.clone();
         user.does(&Change::Material(MaterialSource::File("broken.binary".into())));
-        user.scene = before;
-        assert!(user.undoes() && user.scene == Scene::default());
+        let broken = user.number;
+        // It has not failed yet.
+        user.does(&Change::Exposure(3.0));
+        user.does(&Change::Gamma(1.5));
+        user.history.forget(&[broken]);
+        user.scene = exposed(3.0, 1.5);
+        for expected in [exposed(3.0, 2.2), exposed(2.0, 2.2), Scene::default()] {
+            assert!(user.undoes() && user.scene == expected, "{:?}", user.scene);
+        }
+        assert!(!user.undoes());
+        for expected in [exposed(2.0, 2.2), exposed(3.0, 2.2), exposed(3.0, 1.5)] {
+            assert!(user.redoes() && user.scene == expected, "{:?}", user.scene);
+        }
+        // What was undone meanwhile is after it.
+        user.does(&Change::Material(MaterialSource::File("broken.binary".into())));
+        user.does(&Change::Exposure(4.0));
+        user.undoes();
+        user.history.forget(&[user.number - 1]);
+        user.scene = exposed(3.0, 1.5);
+        assert!(!user.redoes() && user.undoes() && user.scene == exposed(3.0, 2.2));
     }
 }

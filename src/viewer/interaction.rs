@@ -11,7 +11,7 @@ use super::loaded::Loaded;
 use super::measured::Measured;
 use super::orbit::{Bounds, Orbit, environment_turn_deg};
 use super::plots::Plotter;
-use super::session::Session;
+use super::session::{Edit, Session};
 use crate::memo::{Key, Memo};
 use crate::method::Method;
 use crate::passes::Area;
@@ -178,7 +178,8 @@ impl Viewer {
                     // The window stays as large as it is.
                     (scene.image.width, scene.image.height) = (self.area.width, self.area.height);
                     scene.files().iter().for_each(|path| self.memo.look_again(path));
-                    self.history.record(self.session.wanted(), None, Instant::now());
+                    let edit = Edit::Scene(Box::new(scene.clone()));
+                    self.history.record(self.session.wanted(), edit, self.changes + 1, Instant::now());
                     self.replace(scene);
                     Ok(())
                 }
@@ -262,8 +263,8 @@ impl Viewer {
         }
         let before = self.session.wanted().clone();
         self.session.change(change, self.changes + 1)?;
-        self.history.record(&before, Some(change), Instant::now());
         self.changes += 1;
+        self.history.record(&before, Edit::Change(change.clone()), self.changes, Instant::now());
         self.request();
         Ok(())
     }

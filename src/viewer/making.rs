@@ -172,14 +172,15 @@ impl Viewer {
                 Err(Error::Cancelled) => {}
                 Err(error) => {
                     let memo = self.memo.clone();
-                    let was_edited = self.session.failed(|edit| !can_be_loaded(edit, &memo));
-                    if self.loaded.is_none() && !was_edited {
+                    let taken_back = self.session.failed(|edit| !can_be_loaded(edit, &memo));
+                    if self.loaded.is_none() && taken_back.is_empty() {
                         return Err(error);
                     }
+                    self.history.forget(&taken_back);
                     self.latency.failed();
                     self.tell_error(&error);
                     // Else what failed is what is wanted still, and would fail again.
-                    if was_edited {
+                    if !taken_back.is_empty() {
                         self.go_back();
                     }
                 }

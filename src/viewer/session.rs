@@ -100,23 +100,33 @@ impl Session {
     }
 
     /// What was wanted cannot be: what is seen is wanted again, with the changes but those that `cannot_be`, or without any if none of them is
-    /// at fault. Whether there was something to take back.
-    pub fn failed(&mut self, cannot_be: impl Fn(&Edit) -> bool) -> bool {
-        let before = self.pending.len();
+    /// at fault. The numbers of those that were taken back.
+    pub fn failed(&mut self, cannot_be: impl Fn(&Edit) -> bool) -> Vec<u64> {
+        let before: Vec<_> = self.pending.iter().map(|(number, _)| *number).collect();
         self.pending.retain(|(_, edit)| !cannot_be(edit));
-        if self.pending.len() == before {
+        if self.pending.len() == before.len() {
             self.pending.clear();
         }
         self.wanted = self.shown.clone();
         let wanted = &mut self.wanted;
-        self.pending.retain(|(_, edit)| match edit {
-            Edit::Change(change) => change.apply(wanted).is_ok(),
-            Edit::Scene(scene) => {
-                wanted.clone_from(scene);
-                true
+        self.pending.retain(|(_, edit)| edit.apply(wanted).is_ok());
+        before.into_iter().filter(|number| self.pending.iter().all(|(left, _)| left != number)).collect()
+    }
+}
+
+impl Edit {
+    /// Makes it in `scene`.
+    ///
+    /// # Errors
+    /// Those of [`Change::apply`]; then `scene` is as it was.
+    pub fn apply(&self, scene: &mut Scene) -> Result<()> {
+        match self {
+            Self::Change(change) => change.apply(scene),
+            Self::Scene(other) => {
+                scene.clone_from(other);
+                Ok(())
             }
-        });
-        before > 0
+        }
     }
 }
 
@@ -164,13 +174,13 @@ mod tests {
         let mut session = Session::new(Scene::default());
         session.change(&Change::Mesh(Source::File("broken.obj".into())), 1).unwrap();
         session.change(&Change::Gamma(1.5), 2).unwrap();
-        assert!(session.failed(is_broken));
+        assert_eq!(session.failed(is_broken), [1]);
         let mut expected = Scene::default();
         expected.image.gamma = 1.5;
         assert_eq!((session.shown(), session.wanted()), (&expected, &expected));
         assert!(session.change(&Change::Exposure(f64::NAN), 3).is_err());
         assert_eq!((session.shown(), session.wanted()), (&expected, &expected));
-        assert!(!session.failed(is_broken), "there is nothing to take back");
+        assert!(session.failed(is_broken).is_empty(), "there is nothing to take back");
     }
 
     #[test]
@@ -182,16 +192,16 @@ mod tests {
         session.change(&Change::Mesh(Source::File("broken.obj".into())), 3).unwrap();
         session.change(&Change::Method("paper".into()), 4).unwrap();
         expected.shading.method = "paper".into();
-        assert!(session.failed(is_broken));
+        assert_eq!(session.failed(is_broken), [3]);
         assert_eq!(session.wanted(), &expected);
         // Nor those before another scene, which is broken.
         let mut broken = Scene::default();
         broken.objects[0].mesh = Source::File("broken.obj".into());
         session.replace(broken, 5);
-        assert!(session.failed(is_broken));
+        assert_eq!(session.failed(is_broken), [5]);
         assert_eq!(session.wanted(), &expected);
         // Where none of them is at fault, what is shown is wanted.
-        assert!(session.failed(|_| false));
+        assert_eq!(session.failed(|_| false), [1, 2, 4]);
         assert_eq!(session.wanted(), session.shown());
     }
 }
