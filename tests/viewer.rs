@@ -346,17 +346,17 @@ fn closing_takes_less_than_a_second_whatever_is_being_made() {
     }
 }
 
-#[test]
-fn a_still_window_costs_nothing() {
-    let Some(viewer) = Viewer::new() else { return };
-    let mut child = viewer.start(&SMALL);
+/// Fails the test if a viewer that nothing happens to draws frames or takes time.
+fn expect_rest(viewer: &Viewer, arguments: &[&str]) {
+    let mut child = viewer.start(&[&SMALL[..], arguments].concat());
     let (send, lines) = std::sync::mpsc::channel();
     let log = BufReader::new(child.stderr.take().expect("piped"));
     let reader = std::thread::spawn(move || log.lines().map_while(Result::ok).try_for_each(|line| send.send(line)));
     // Until the picture is there, and egui has settled.
     let wait = Duration::from_secs(120);
-    while !lines.recv_timeout(wait).expect("a picture").contains("shade") {}
-    while lines.recv_timeout(Duration::from_secs(3)).is_ok() {}
+    while !lines.recv_timeout(wait).expect("a picture").contains(" shade ") {}
+    let shown = Instant::now();
+    while lines.recv_timeout(Duration::from_secs(3)).is_ok() && shown.elapsed() < wait {}
     let ticks = || {
         let stat = std::fs::read_to_string(format!("/proc/{}/stat", child.id())).expect("a process");
         let fields: Vec<_> = stat.rsplit(')').next().expect("fields").split_whitespace().collect();
@@ -373,6 +373,19 @@ fn a_still_window_costs_nothing() {
     println!("in 3 s: {used} ticks of processor time, {drawn} frames");
     // A tick is a hundredth of a second.
     assert!(used <= 2 && drawn == 0, "{used} ticks, {drawn} frames");
+}
+
+#[test]
+fn a_still_window_costs_nothing() {
+    let Some(viewer) = Viewer::new() else { return };
+    expect_rest(&viewer, &[]);
+}
+
+#[test]
+fn nor_does_a_minimised_one_whose_turntable_turns() {
+    let Some(viewer) = Viewer::new() else { return };
+    viewer.write("replay.jsonl", "\"wait\"\n{\"minimise\": true}\n{\"key\": \"t\"}\n");
+    expect_rest(&viewer, &["--replay", "replay.jsonl"]);
 }
 
 #[test]

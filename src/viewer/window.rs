@@ -244,15 +244,14 @@ impl Open {
         {
             self.due_at(Instant::now() + output.repaint_delay);
         }
-        if let Some(next) = self.viewer.next_frame() {
-            self.due_at(next);
-        }
-        let Some(drawn) = drawn else {
-            if !self.is_minimised && !size.contains(&0) {
-                self.due_at(Instant::now() + RETRY);
+        // A window without area is drawn when it has one.
+        if !size.contains(&0) {
+            match &drawn {
+                Some(_) => self.viewer.next_frame().into_iter().for_each(|next| self.due_at(next)),
+                None => self.due_at(Instant::now() + RETRY),
             }
-            return Ok(false);
-        };
+        }
+        let Some(drawn) = drawn else { return Ok(false) };
         if let (Some((rgba, [width, height])), Some(path)) = (drawn.screenshot, &settings.screenshot) {
             output::write_png(path, width, height, &rgba, false)?;
         }

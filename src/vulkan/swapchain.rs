@@ -152,6 +152,10 @@ impl Swapchain {
         const ATTEMPTS: usize = 8;
         // Window systems that give no images back for hidden windows must not make the program hang.
         const PATIENCE_NS: u64 = 200_000_000;
+        // Not only where images are made: those of a minimised window may be there still.
+        if size.contains(&0) {
+            return Ok(None);
+        }
         for _ in 0..ATTEMPTS {
             if self.current.as_ref().is_none_or(|current| current.stale) && !self.renew(size)? {
                 return Ok(None);
@@ -234,7 +238,7 @@ impl Swapchain {
             },
             _ => current_extent,
         };
-        if extent.width == 0 || extent.height == 0 || size.contains(&0) {
+        if extent.width == 0 || extent.height == 0 {
             self.discard();
             return Ok(false);
         }
