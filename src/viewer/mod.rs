@@ -20,6 +20,7 @@
 //! | the frames that follow | `drawing` | |
 //! | what is shown and set beside the picture | `panel` | egui |
 //! | frames into the window | [`presenter`] | Vulkan, by the frame graph |
+//! | where the pointer is, and what it drags | `pointer` | pure |
 //! | the window | `window` | winit |
 
 pub mod change;
@@ -38,6 +39,7 @@ pub mod measured;
 pub mod orbit;
 mod panel;
 pub mod plots;
+mod pointer;
 pub mod presenter;
 pub mod session;
 #[cfg(feature = "hot-reload")]

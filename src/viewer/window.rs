@@ -1,9 +1,10 @@
 //! The window: what winit tells becomes inputs, and frames are drawn when there is something new.
 use super::change::Change;
-use super::input::{Button, Drag, Input, Scroll};
+use super::input::{Input, Scroll};
 use super::interaction::Viewer;
 use super::latency::Stats;
 use super::panel::{self, Panel};
+use super::pointer::{Pointer, button_of};
 use super::presenter::Presenter;
 use super::{ViewerSettings, failed};
 use crate::memo::Memo;
@@ -18,7 +19,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 use winit::application::ApplicationHandler;
 use winit::dpi::{LogicalSize, PhysicalSize};
-use winit::event::{ElementState, MouseButton, MouseScrollDelta, WindowEvent};
+use winit::event::{ElementState, MouseScrollDelta, WindowEvent};
 use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoopProxy};
 use winit::keyboard::{Key, ModifiersState, NamedKey};
 use winit::window::{Window, WindowId};
@@ -68,20 +69,9 @@ struct Open {
     due: Option<Instant>,
     last_drawn: Instant,
     is_minimised: bool,
-    cursor: [f64; 2],
+    pointer: Pointer,
     modifiers: ModifiersState,
-    /// What is held down, and from where.
-    held: Option<Held>,
     script: Script,
-}
-
-/// A button that is held down over the picture.
-struct Held {
-    button: Button,
-    /// Where it was pressed.
-    from: [f64; 2],
-    /// Whether the cursor has moved since.
-    has_moved: bool,
 }
 
 /// What a script asks for: inputs to play, frames to count, a picture to take.
@@ -171,9 +161,8 @@ impl App {
             due: Some(Instant::now()),
             last_drawn: Instant::now(),
             is_minimised: false,
-            cursor: [0.0; 2],
+            pointer: Pointer::default(),
             modifiers: ModifiersState::empty(),
-            held: None,
             script,
         };
         open.fit_picture();
@@ -229,7 +218,7 @@ impl Open {
         let PhysicalSize { width, height } = self.window.inner_size();
         let size = if self.is_minimised { [0, 0] } else { [width, height] };
         let drags_slider = self.context.is_using_pointer() && inputs.iter().any(Input::changes_picture);
-        let is_held = drags_slider || self.held.as_ref().is_some_and(|held| held.has_moved);
+        let is_held = drags_slider || self.pointer.is_dragging();
         let counts = self.viewer.loaded().is_some() && !self.viewer.is_busy() && self.script.replay.is_empty();
         let last = counts && self.script.frames_left.is_some_and(|left| left <= 1);
         let screenshot = last && settings.screenshot.is_some();
@@ -313,7 +302,7 @@ impl Open {
                 self.is_minimised = *minimise;
             }
             Input::Move(at) => {
-                self.cursor = *at;
+                self.pointer.at = *at;
                 self.viewer.handle(&input);
             }
             input => self.viewer.handle(input),
@@ -326,15 +315,10 @@ impl Open {
     }
 
     fn drag(&mut self, to: [f64; 2]) {
-        let from = std::mem::replace(&mut self.cursor, to);
         self.viewer.cursor = Some(to);
-        let by = [to[0] - from[0], to[1] - from[1]];
-        if let Some(held) = self.held.as_mut().filter(|_| by != [0.0; 2]) {
-            held.has_moved = true;
-            let Held { button, from, .. } = *held;
-            let (shift, control) =
-                (self.modifiers.shift_key(), self.modifiers.control_key() || self.modifiers.super_key());
-            self.viewer.handle(&Input::Drag(Drag { button, from, by, shift, control }));
+        let control = self.modifiers.control_key() || self.modifiers.super_key();
+        if let Some(drag) = self.pointer.move_to(to, self.modifiers.shift_key(), control) {
+            self.viewer.handle(&Input::Drag(drag));
             self.redraw();
         }
     }
@@ -343,7 +327,7 @@ impl Open {
     fn over_picture(&self) -> bool {
         let Area { left, top, width, height } = self.viewer.area;
         let within = |at: f64, low: u32, size: u32| at >= f64::from(low) && at < f64::from(low + size);
-        within(self.cursor[0], left, width) && within(self.cursor[1], top, height)
+        within(self.pointer.at[0], left, width) && within(self.pointer.at[1], top, height)
     }
 
     /// Takes an event of the window. Gives whether the program is to end.
@@ -366,20 +350,17 @@ impl Open {
             WindowEvent::ModifiersChanged(modifiers) => self.modifiers = modifiers.state(),
             WindowEvent::CursorLeft { .. } => self.viewer.cursor = None,
             WindowEvent::CursorMoved { position, .. } => self.drag([position.x, position.y]),
-            WindowEvent::MouseInput { state: ElementState::Released, .. } if self.held.take().is_some() => {
+            WindowEvent::Focused(false) if self.pointer.let_go() => self.redraw(),
+            WindowEvent::MouseInput { state: ElementState::Released, button, .. }
+                if button_of(*button).is_some_and(|button| self.pointer.release(button)) =>
+            {
                 // Sharp again.
                 self.redraw();
             }
-            WindowEvent::MouseInput { state: ElementState::Pressed, button, .. } if !response.consumed => {
-                let button = match button {
-                    MouseButton::Left => Button::Left,
-                    MouseButton::Middle => Button::Middle,
-                    MouseButton::Right => Button::Right,
-                    _ => return false,
-                };
-                if self.over_picture() {
-                    self.held = Some(Held { button, from: self.cursor, has_moved: false });
-                }
+            WindowEvent::MouseInput { state: ElementState::Pressed, button, .. }
+                if !response.consumed && self.over_picture() =>
+            {
+                button_of(*button).into_iter().for_each(|button| self.pointer.press(button));
             }
             WindowEvent::MouseWheel { delta, .. } if !response.consumed && self.over_picture() => {
                 let scroll = match delta {
