@@ -39,7 +39,7 @@ pub struct Bounds {
 pub enum Scroll {
     /// Notches of a wheel.
     Lines(f64),
-    /// Pixels of a touchpad.
+    /// Pixels of a touchpad, at a scale of the display of 1.
     Pixels(f64),
 }
 

@@ -1,6 +1,6 @@
-//! The pointer: where it is, and what is held down over the picture.
-use super::input::{Button, Drag};
-use winit::event::MouseButton;
+//! The pointer: where it is, what is held down over the picture, and how far wheels and touchpads scroll.
+use super::input::{Button, Drag, Scroll};
+use winit::event::{MouseButton, MouseScrollDelta};
 
 /// The pointer in the window.
 #[derive(Debug, Default)]
@@ -62,9 +62,18 @@ pub fn button_of(button: MouseButton) -> Option<Button> {
     }
 }
 
+/// How far was scrolled on a display of this scale: a touchpad says it in pixels, of which the same motion has more on a finer display.
+pub fn scroll_of(delta: MouseScrollDelta, scale: f64) -> Scroll {
+    match delta {
+        MouseScrollDelta::LineDelta(_, lines) => Scroll::Lines(f64::from(lines)),
+        MouseScrollDelta::PixelDelta(pixels) => Scroll::Pixels(pixels.to_logical::<f64>(scale).y),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use winit::dpi::PhysicalPosition;
 
     #[test]
     fn a_drag_is_of_the_button_that_was_pressed_first_and_ends_with_it() {
@@ -87,5 +96,13 @@ mod tests {
         pointer.press(Button::Middle);
         assert!(pointer.let_go() && !pointer.let_go());
         assert_eq!(pointer.move_to([5.0, 5.0], false, false), None);
+    }
+
+    #[test]
+    fn a_touchpad_scrolls_as_far_on_a_finer_display() {
+        let pixels = |y: f64| MouseScrollDelta::PixelDelta(PhysicalPosition::new(0.0, y));
+        assert_eq!(scroll_of(pixels(30.0), 1.0), Scroll::Pixels(30.0));
+        assert_eq!(scroll_of(pixels(60.0), 2.0), Scroll::Pixels(30.0));
+        assert_eq!(scroll_of(MouseScrollDelta::LineDelta(1.0, -2.0), 2.0), Scroll::Lines(-2.0));
     }
 }

@@ -4,7 +4,7 @@ use super::input::{Input, Scroll};
 use super::interaction::Viewer;
 use super::latency::Stats;
 use super::panel::{self, Panel};
-use super::pointer::{Pointer, button_of};
+use super::pointer::{Pointer, button_of, scroll_of};
 use super::presenter::Presenter;
 use super::{ViewerSettings, failed};
 use crate::memo::Memo;
@@ -19,7 +19,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 use winit::application::ApplicationHandler;
 use winit::dpi::{LogicalSize, PhysicalSize};
-use winit::event::{ElementState, MouseScrollDelta, WindowEvent};
+use winit::event::{ElementState, WindowEvent};
 use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoopProxy};
 use winit::keyboard::{Key, ModifiersState, NamedKey};
 use winit::window::{Window, WindowId};
@@ -363,14 +363,10 @@ impl Open {
                 button_of(*button).into_iter().for_each(|button| self.pointer.press(button));
             }
             WindowEvent::MouseWheel { delta, .. } if !response.consumed && self.over_picture() => {
-                let scroll = match delta {
-                    MouseScrollDelta::LineDelta(_, lines) => Scroll::Lines(f64::from(*lines)),
-                    MouseScrollDelta::PixelDelta(pixels) => Scroll::Pixels(pixels.y),
-                };
-                self.viewer.handle(&Input::Scroll(scroll));
+                self.viewer.handle(&Input::Scroll(scroll_of(*delta, self.window.scale_factor())));
                 self.redraw();
             }
-            WindowEvent::PinchGesture { delta, .. } => {
+            WindowEvent::PinchGesture { delta, .. } if !response.consumed && self.over_picture() => {
                 // A pinch to twice the size is as far as seven lines of the wheel.
                 self.viewer.handle(&Input::Scroll(Scroll::Lines(7.0 * delta)));
                 self.redraw();
