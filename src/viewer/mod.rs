@@ -21,6 +21,7 @@
 //! | what is shown and set beside the picture | `panel` | egui |
 //! | frames into the window | [`presenter`] | Vulkan, by the frame graph |
 //! | where the pointer is, and what it drags | `pointer` | pure |
+//! | what keys ask for | `keyboard` | pure |
 //! | the window | `window` | winit |
 
 pub mod change;
@@ -31,6 +32,7 @@ pub mod dynamic_resolution;
 pub mod history;
 pub mod input;
 pub mod interaction;
+mod keyboard;
 pub mod latency;
 pub mod latest_job;
 pub mod loaded;

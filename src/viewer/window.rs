@@ -2,6 +2,7 @@
 use super::change::Change;
 use super::input::{Input, Scroll};
 use super::interaction::Viewer;
+use super::keyboard::input_of;
 use super::latency::Stats;
 use super::panel::{self, Panel};
 use super::pointer::{Pointer, button_of, scroll_of};
@@ -21,7 +22,7 @@ use winit::application::ApplicationHandler;
 use winit::dpi::{LogicalSize, PhysicalSize};
 use winit::event::{ElementState, WindowEvent};
 use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoopProxy};
-use winit::keyboard::{Key, ModifiersState, NamedKey};
+use winit::keyboard::ModifiersState;
 use winit::window::{Window, WindowId};
 
 /// Something is new: a result of background work, or progress.
@@ -374,7 +375,7 @@ impl Open {
             WindowEvent::KeyboardInput { event, .. }
                 if event.state == ElementState::Pressed && !self.context.wants_keyboard_input() =>
             {
-                if let Some(input) = name_of(&event.logical_key).and_then(|key| input_of(key, self.modifiers)) {
+                if let Some(input) = input_of(&event.logical_key, event.physical_key, event.repeat, self.modifiers) {
                     self.viewer.handle(&input);
                     self.redraw();
                 }
@@ -386,30 +387,6 @@ impl Open {
             _ => {}
         }
         false
-    }
-}
-
-/// A key as inputs name it.
-fn name_of(key: &Key) -> Option<String> {
-    match key {
-        Key::Character(text) => Some(text.to_lowercase()),
-        Key::Named(NamedKey::Space) => Some("space".to_owned()),
-        Key::Named(NamedKey::Home) => Some("home".to_owned()),
-        Key::Named(NamedKey::Escape) => Some("escape".to_owned()),
-        _ => None,
-    }
-}
-
-/// What a key asks for, with what is held down beside it.
-fn input_of(key: String, held: ModifiersState) -> Option<Input> {
-    let shift = held.shift_key();
-    // Command on macOS.
-    let control = [ModifiersState::CONTROL, ModifiersState::SUPER].contains(&(held - ModifiersState::SHIFT));
-    match key.as_str() {
-        "z" if control && !shift => Some(Input::Undo),
-        "z" if control => Some(Input::Redo),
-        "y" if control && !shift => Some(Input::Redo),
-        _ => (held - ModifiersState::SHIFT).is_empty().then_some(Input::Key(key)),
     }
 }
 
