@@ -52,6 +52,11 @@ impl Comparer {
         self.jobs.progress()
     }
 
+    /// Makes nothing any more: [`LatestJob::close`].
+    pub fn close(&self) {
+        self.jobs.close();
+    }
+
     /// Takes what has been made meanwhile; gives whether there is anything new.
     ///
     /// # Errors

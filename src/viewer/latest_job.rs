@@ -28,7 +28,7 @@ pub struct Progress {
 
 /// Work of one kind whose newest request is the only one that counts. Results are of type `T`.
 ///
-/// Dropping it cancels the work and waits for it to end, 800 ms at most.
+/// Dropping it cancels the work and waits for it to end, until 800 ms after it was [closed](Self::close).
 pub struct LatestJob<T> {
     shared: Arc<Shared<T>>,
     thread: Option<JoinHandle<()>>,
@@ -55,7 +55,8 @@ struct State<T> {
     last_wake: Instant,
     /// When the work that is running was begun.
     begun: Instant,
-    closing: bool,
+    /// Since when no more requests are served.
+    closing: Option<Instant>,
 }
 
 /// A request as the work sees it: tells whether it still counts, and hears of progress.
@@ -77,7 +78,7 @@ impl<T: Send + 'static> LatestJob<T> {
             progress: None,
             last_wake: Instant::now(),
             begun: Instant::now(),
-            closing: false,
+            closing: None,
         };
         let shared = Arc::new(Shared {
             newest: AtomicU64::new(0),
@@ -103,6 +104,11 @@ impl<T: Send + 'static> LatestJob<T> {
         self.shared.called.notify_one();
     }
 
+    /// Cancels the work for good. Several that are closed before the first is dropped end within the time of one.
+    pub fn close(&self) {
+        self.closing_since();
+    }
+
     /// The oldest result of the newest request that was not taken yet: what it [published](Task::publish), then what it returned.
     pub fn take(&self) -> Option<Result<T>> {
         self.shared.lock().results.pop_front()
@@ -121,13 +127,20 @@ impl<T: Send + 'static> LatestJob<T> {
     }
 }
 
+impl<T> LatestJob<T> {
+    /// Closes it; gives when that was first done.
+    fn closing_since(&self) -> Instant {
+        let since = *self.shared.forget().closing.get_or_insert_with(Instant::now);
+        self.shared.called.notify_one();
+        since
+    }
+}
+
 impl<T> Drop for LatestJob<T> {
     fn drop(&mut self) {
-        let start = Instant::now();
-        self.shared.forget().closing = true;
-        self.shared.called.notify_one();
+        let since = self.closing_since();
         let Some(thread) = self.thread.take() else { return };
-        while !thread.is_finished() && start.elapsed() < CLOSING_TIME {
+        while !thread.is_finished() && since.elapsed() < CLOSING_TIME {
             std::thread::sleep(Duration::from_millis(1));
         }
         if thread.is_finished() {
@@ -169,7 +182,7 @@ fn serve<T>(shared: &Arc<Shared<T>>) {
     loop {
         let mut state = shared.lock();
         let (number, work) = loop {
-            if state.closing {
+            if state.closing.is_some() {
                 return;
             }
             match state.pending.take() {
@@ -374,16 +387,23 @@ mod tests {
         drop(jobs);
         assert!(start.elapsed() < Duration::from_millis(200));
 
-        let (end, ends) = mpsc::channel::<()>();
-        let jobs = LatestJob::<()>::new("test", || ());
-        jobs.request(move |_| {
-            let _ = ends.recv();
-            Ok(())
-        });
+        // Nor several of them, one after the other.
+        let (ends, stuck): (Vec<_>, Vec<_>) = (0..4)
+            .map(|_| {
+                let (end, ends) = mpsc::channel::<()>();
+                let jobs = LatestJob::<()>::new("test", || ());
+                jobs.request(move |_| {
+                    let _ = ends.recv();
+                    Ok(())
+                });
+                (end, jobs)
+            })
+            .unzip();
         std::thread::sleep(Duration::from_millis(20));
         let start = Instant::now();
-        drop(jobs);
+        stuck.iter().for_each(LatestJob::close);
+        drop(stuck);
         assert!(start.elapsed() < Duration::from_secs(1));
-        drop(end);
+        drop(ends);
     }
 }

@@ -212,6 +212,16 @@ impl Viewer {
     }
 }
 
+impl Drop for Viewer {
+    fn drop(&mut self) {
+        // All work is told to end before the first is waited for.
+        self.loading.close();
+        self.getting_ready.close();
+        self.comparer.close();
+        self.plotter.close();
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -53,6 +53,11 @@ impl Plotter {
         self.jobs.is_busy()
     }
 
+    /// Makes nothing any more: [`LatestJob::close`].
+    pub fn close(&self) {
+        self.jobs.close();
+    }
+
     /// The latest plots, which may be of the material before; begins those of `material` if they are not begun.
     pub fn of(&mut self, material: &Keyed<Brdf>) -> Option<&Arc<Plots>> {
         if self.begun != Some(material.key) {
