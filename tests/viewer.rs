@@ -178,6 +178,18 @@ fn the_screenshot_shows_picture_and_panel_and_only_what_has_changed_runs() {
 }
 
 #[test]
+fn a_window_that_is_closed_before_its_screenshot_is_an_error() {
+    let Some(viewer) = Viewer::new() else { return };
+    let ended = viewer.play(&[&SMALL[..], &["--screenshot", "window.png"]].concat(), "\"quit\"");
+    assert!(!ended.success && !viewer.path("window.png").exists());
+    assert!(
+        ended.log.last().is_some_and(|line| line.contains("window.png: the window was closed")),
+        "{:#?}",
+        ended.log
+    );
+}
+
+#[test]
 fn a_dragged_parameter_is_seen_by_drafts_and_ends_as_if_it_had_never_been_dragged() {
     let Some(viewer) = Viewer::new() else { return };
     let mut replay = "\"wait\"\n".to_owned();

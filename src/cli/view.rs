@@ -41,7 +41,7 @@ pub struct ViewArguments {
     /// End after this many frames of the loaded scene (and after the replay).
     #[arg(long, value_name = "N", value_parser = value_parser!(u64).range(1..))]
     frames: Option<u64>,
-    /// Write what the window shows in the last of these frames, as .png.
+    /// Write what the window shows in the last of these frames, as .png; an error if the window is closed before.
     #[arg(long, value_name = "FILE")]
     screenshot: Option<PathBuf>,
     /// Do what this file says as if the user did it: one event a line, in JSON.
@@ -77,7 +77,7 @@ impl ViewArguments {
             (Some(_), false) => Record::All,
             (Some(_), true) => Record::AllAndErrors,
         };
-        let Ended { messages, stats, failures } = viewer::run(ViewerSettings {
+        let Ended { messages, stats, failures, missing_screenshot } = viewer::run(ViewerSettings {
             scene,
             cache: self.machine.cache(),
             device: self.machine.device,
@@ -97,6 +97,10 @@ impl ViewArguments {
         if let Some((replay, first)) = self.replay.as_deref().zip(failures.first()) {
             let problem = format!("{} of what it asks for could not be done, the first: {first}", failures.len());
             return Err(Error::in_file(replay, problem, "the log has all of them").into());
+        }
+        if let Some(path) = missing_screenshot {
+            let problem = "the window was closed before this picture of it was taken";
+            anyhow::bail!("{}: {problem}; leave \"quit\" out of the replay, or ask for fewer --frames", path.display());
         }
         Ok(())
     }

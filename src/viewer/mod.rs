@@ -93,6 +93,8 @@ pub struct Ended {
     pub stats: Option<Stats>,
     /// What was asked for and could not be done, as the user was told.
     pub failures: Vec<String>,
+    /// Where the picture of the window was to be written, if the window was closed before it was taken.
+    pub missing_screenshot: Option<PathBuf>,
 }
 
 /// Opens a window and runs until it is closed.
@@ -109,12 +111,13 @@ pub fn run(settings: ViewerSettings) -> Result<Ended> {
     let event_loop = event_loop.build()?;
     let mut app = window::App::new(settings, event_loop.create_proxy());
     event_loop.run_app(&mut app)?;
-    let window::App { result, messages, stats, edited, failures, .. } = app;
+    let window::App { result, messages, stats, edited, failures, missing_screenshot, .. } = app;
     if let (Err(Error::Vulkan(_)), Some(scene)) = (&result, edited) {
         keep(&scene, &folder.join("edited.toml"));
     }
     result?;
-    Ok(Ended { messages: messages.map(|messages| messages.all()).unwrap_or_default(), stats, failures })
+    let messages = messages.map(|messages| messages.all()).unwrap_or_default();
+    Ok(Ended { messages, stats, failures, missing_screenshot })
 }
 
 /// Keeps a `scene` whose viewer fails.

@@ -16,6 +16,7 @@ use crate::vulkan::{Device, Instance, Messages, Surface, UiFrame};
 use crate::{Error, Result};
 use egui::{TexturesDelta, ViewportId};
 use std::collections::VecDeque;
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use winit::application::ApplicationHandler;
@@ -53,6 +54,8 @@ pub struct App {
     pub edited: Option<Scene>,
     /// What could not be done that was asked for, in order.
     pub failures: Vec<String>,
+    /// Where the picture of the window was to be written, if it ended before.
+    pub missing_screenshot: Option<PathBuf>,
 }
 
 /// An open window.
@@ -79,6 +82,8 @@ struct Open {
 struct Script {
     replay: VecDeque<Input>,
     frames_left: Option<u64>,
+    /// Where the picture goes, until it is taken.
+    screenshot: Option<PathBuf>,
     /// Until when the window may take to get this size.
     resizing: Option<([u32; 2], Instant)>,
     /// Whether the last input has not been drawn yet: each is before the next.
@@ -99,6 +104,7 @@ impl App {
             stats: None,
             edited: None,
             failures: Vec::new(),
+            missing_screenshot: None,
         }
     }
 
@@ -149,8 +155,14 @@ impl App {
         });
         viewer.record(self.settings.record);
         let frames_left = frames.or(screenshot.is_some().then_some(1));
-        let script =
-            Script { replay: replay.clone().into(), frames_left, resizing: None, is_undrawn: true, waiting: None };
+        let script = Script {
+            replay: replay.clone().into(),
+            frames_left,
+            screenshot: screenshot.clone(),
+            resizing: None,
+            is_undrawn: true,
+            waiting: None,
+        };
         let mut open = Open {
             viewer,
             stage,
@@ -201,7 +213,7 @@ impl Open {
     }
 
     /// Draws a frame; gives whether the program is to end.
-    fn draw(&mut self, settings: &ViewerSettings) -> Result<bool> {
+    fn draw(&mut self) -> Result<bool> {
         self.due = None;
         self.script.is_undrawn = false;
         self.last_drawn = Instant::now();
@@ -222,7 +234,7 @@ impl Open {
         let is_held = drags_slider || self.pointer.is_dragging();
         let counts = self.viewer.loaded().is_some() && !self.viewer.is_busy() && self.script.replay.is_empty();
         let last = counts && self.script.frames_left.is_some_and(|left| left <= 1);
-        let screenshot = last && settings.screenshot.is_some();
+        let screenshot = last && self.script.screenshot.is_some();
         let drawn = self.viewer.draw(&mut self.stage, size, &frame, &self.textures, is_held, screenshot)?;
         self.textures.clear();
         // What changed in the panel shows in the next frame.
@@ -242,8 +254,10 @@ impl Open {
             }
         }
         let Some(drawn) = drawn else { return Ok(false) };
-        if let (Some((rgba, [width, height])), Some(path)) = (drawn.screenshot, &settings.screenshot) {
-            output::write_png(path, width, height, &rgba, false)?;
+        if let Some((rgba, [width, height])) = drawn.screenshot
+            && let Some(path) = self.script.screenshot.take()
+        {
+            output::write_png(&path, width, height, &rgba, false)?;
         }
         if let Some(left) = self.script.frames_left.as_mut().filter(|_| counts) {
             *left = left.saturating_sub(1);
@@ -414,7 +428,7 @@ impl ApplicationHandler<Wake> for App {
     fn window_event(&mut self, event_loop: &ActiveEventLoop, _: WindowId, event: WindowEvent) {
         let Some(open) = &mut self.open else { return };
         if matches!(event, WindowEvent::RedrawRequested) {
-            match open.draw(&self.settings) {
+            match open.draw() {
                 Ok(false) => {}
                 Ok(true) => self.end(event_loop, Ok(())),
                 Err(error) => self.end(event_loop, Err(error)),
@@ -449,6 +463,7 @@ impl ApplicationHandler<Wake> for App {
         // All that Vulkan made goes while the window is still there.
         let Some(mut open) = self.open.take() else { return };
         self.failures = std::mem::take(&mut open.viewer.failures);
+        self.missing_screenshot = open.script.screenshot.take();
         let wanted = open.viewer.session.wanted();
         let mut opened = self.settings.scene.clone();
         // The window has its size of the window system.
