@@ -24,6 +24,8 @@ pub struct UiPainter {
     renderer: Mutex<Option<Renderer>>,
     /// The textures as they are: see [`UiPainter::update`].
     textures: HashMap<TextureId, ColorImage>,
+    /// Those that the frame after the last update is the last to draw.
+    unused: Vec<TextureId>,
     command_pool: vk::CommandPool,
     format: vk::Format,
     device: Arc<Device>,
@@ -57,17 +59,20 @@ impl UiPainter {
         let command_pool =
             unsafe { device.raw.create_command_pool(&info, None) }.during("vkCreateCommandPool", "panel")?;
         device.set_name(command_pool, "panel");
-        Ok(Self { renderer, textures: HashMap::new(), command_pool, format, device: device.clone() })
+        Ok(Self { renderer, textures: HashMap::new(), unused: Vec::new(), command_pool, format, device: device.clone() })
     }
 
-    /// Brings the textures (glyphs, above all) up to date, before the frame that needs them is recorded.
+    /// Brings the textures (glyphs, above all) up to date, before the frame that needs them is recorded. That may draw those that are to be
+    /// freed, which stay until the next update.
     ///
     /// # Errors
     /// No memory left.
     pub fn update(&mut self, changes: &TexturesDelta) -> Result<()> {
-        if changes.set.is_empty() && changes.free.is_empty() {
+        let unused = std::mem::replace(&mut self.unused, changes.free.clone());
+        if changes.set.is_empty() && unused.is_empty() {
             return Ok(());
         }
+        unused.iter().for_each(|id| drop(self.textures.remove(id)));
         let mut whole = Vec::new();
         for (id, change) in &changes.set {
             // The renderer would drop the rest of a texture that changes in part (it takes it from an undefined layout), so
@@ -90,13 +95,12 @@ impl UiPainter {
             whole.retain(|(other, _)| other != id);
             whole.push((*id, ImageDelta::full(texture, change.options)));
         }
-        changes.free.iter().for_each(|id| drop(self.textures.remove(id)));
         // Frames that are still drawn have the old ones.
         self.device.wait_idle()?;
         let (pool, renderer) = (self.command_pool, self.renderer.get_mut().unwrap_or_else(PoisonError::into_inner));
         let Some(renderer) = renderer else { return Ok(()) };
-        self.device.with_queue(|queue| renderer.set_textures(queue, pool, &whole)).map_err(refused)?;
-        renderer.free_textures(&changes.free).map_err(refused)
+        renderer.free_textures(&unused).map_err(refused)?;
+        self.device.with_queue(|queue| renderer.set_textures(queue, pool, &whole)).map_err(refused)
     }
 }
 
@@ -144,5 +148,52 @@ impl Drop for UiPainter {
         drop(self.renderer.get_mut().unwrap_or_else(PoisonError::into_inner).take());
         // SAFETY: the queue is idle, so none of its commands are in use.
         unsafe { self.device.raw.destroy_command_pool(self.command_pool, None) };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Frames, ImageShape, Instance, Memory};
+    use super::*;
+    use egui::epaint::{Mesh, Primitive};
+    use egui::{Color32, Rect, TextureOptions, pos2};
+
+    #[test]
+    fn the_frame_of_an_update_may_draw_what_that_frees_and_later_ones_may_not() {
+        let instance = Instance::new(true).expect("an instance");
+        let messages = instance.messages();
+        let asked = std::env::var("THREADLIGHT_TEST_DEVICE").ok();
+        let device = Device::new(&instance, asked.as_deref()).expect("a device");
+        let format = vk::Format::B8G8R8A8_UNORM;
+        let mut painter = UiPainter::new(&device, format, 1).expect("a painter");
+        let mut frames = Frames::new(&device, "frames", 1).expect("frames");
+        let usage = vk::ImageUsageFlags::COLOR_ATTACHMENT;
+        let mut target = Image::unbound(&device, "target", ImageShape::plane(format, 4, 4), usage).expect("an image");
+        let memory = Memory::new(&device, "target", target.requirements(), false).expect("memory");
+        target.bind(&memory, 0).expect("an image with memory");
+
+        let id = TextureId::Managed(1);
+        let square = Rect::from_min_max(pos2(0.0, 0.0), pos2(4.0, 4.0));
+        let mut mesh = Mesh::with_texture(id);
+        mesh.add_rect_with_uv(square, square, Color32::WHITE);
+        let primitives = vec![ClippedPrimitive { clip_rect: square, primitive: Primitive::Mesh(mesh) }];
+        let frame = UiFrame { primitives, pixels_per_point: 1.0 };
+        let mut draw = |changes: TexturesDelta| -> Result<()> {
+            painter.update(&changes)?;
+            frames.record(|commands| {
+                let to_target = Commands::image_barrier(&target)
+                    .dst_stage_mask(vk::PipelineStageFlags2::COLOR_ATTACHMENT_OUTPUT)
+                    .dst_access_mask(vk::AccessFlags2::COLOR_ATTACHMENT_WRITE | vk::AccessFlags2::COLOR_ATTACHMENT_READ)
+                    .new_layout(vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL);
+                commands.barriers(&[to_target], &[], &[]);
+                commands.draw_ui(&painter, &frame, &target)
+            })?;
+            frames.wait()
+        };
+        let white = ImageDelta::full(ColorImage::filled([1, 1], Color32::WHITE), TextureOptions::default());
+        draw(TexturesDelta { set: vec![(id, white)], free: vec![id] }).expect("a frame");
+        assert!(draw(TexturesDelta::default()).is_err(), "it is there no more");
+        drop((painter, frames, target, memory, device));
+        assert_eq!(messages.all(), Vec::<String>::new());
     }
 }
