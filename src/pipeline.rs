@@ -268,7 +268,7 @@ fn ask_geometry_cache(device: &Arc<Device>, prepared: &Prepared, round: &Round) 
 }
 
 /// An error for a view whose geometry cache is larger than images of `device` can be.
-fn check_size(device: &Device, view: &View) -> Result<()> {
+pub(crate) fn check_size(device: &Device, view: &View) -> Result<()> {
     let largest = device.limits().max_image_dimension2_d;
     let [width, height] = view.cache_size();
     if width.max(height) <= largest {

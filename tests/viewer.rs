@@ -416,6 +416,24 @@ fn a_window_goes_through_any_number_of_sizes() {
 }
 
 #[test]
+fn a_window_wider_than_images_of_its_sub_pixels_shows_a_coarser_picture() {
+    let Some(viewer) = Viewer::new() else { return };
+    // The widest image of lavapipe has 16384 columns.
+    let replay = r#""wait"
+        {"resize": [4200, 240]}
+        "wait"
+        {"set": {"exposure": 2}}
+        {"set": {"material": {"builtin": "silver"}}}
+        "wait"
+        {"save_scene": "wide.toml"}
+        "quit""#;
+    let arguments = ["--subpixels", "4", "--method", "cosine", "--environment", "white"];
+    viewer.play(&[&SMALL[..], &arguments].concat(), replay).expect_success();
+    let scene = std::fs::read_to_string(viewer.path("wide.toml")).expect("a scene");
+    assert!(scene.contains("width = 4200") && scene.contains("silver"), "{scene}");
+}
+
+#[test]
 fn bad_arguments_are_said_before_a_window_opens() {
     let Some(viewer) = Viewer::new() else { return };
     viewer.write("bad.jsonl", "{\"jump\": 3}\n");

@@ -83,8 +83,40 @@ impl View {
         [cos as f32, sin as f32]
     }
 
+    /// The same, with so few pixels that no side of the geometry cache is longer than `longest`. The shape of the image stays, as far as whole
+    /// pixels allow.
+    #[must_use]
+    pub fn fit(self, longest: u32) -> Self {
+        let (side, most) = (self.width.max(self.height), longest / self.subpixels);
+        if side <= most {
+            return self;
+        }
+        let scaled = |size: u32| ((u64::from(size) * u64::from(most) / u64::from(side)) as u32).max(1);
+        Self { width: scaled(self.width), height: scaled(self.height), ..self }
+    }
+
     /// Size of the geometry cache.
     pub fn cache_size(&self) -> [u32; 2] {
         [self.width * self.subpixels, self.height * self.subpixels]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::prepare::view_of;
+    use crate::scene::Scene;
+
+    #[test]
+    fn a_view_that_is_too_large_keeps_its_shape() {
+        let mut scene = Scene::default();
+        let mut fit = |width: u32, height: u32, subpixels: u32, longest: u32| {
+            (scene.image.width, scene.image.height, scene.image.subpixels) = (width, height, subpixels);
+            let view = view_of(&scene, (glam::DVec3::ZERO, 1.0)).unwrap().fit(longest);
+            [view.width, view.height]
+        };
+        assert_eq!(fit(4096, 240, 4, 16384), [4096, 240]);
+        assert_eq!(fit(4200, 240, 4, 16384), [4096, 234]);
+        assert_eq!(fit(300, 6000, 3, 9000), [150, 3000]);
+        assert_eq!(fit(10000, 2, 1, 1000), [1000, 1]);
     }
 }

@@ -8,7 +8,7 @@ use super::loaded::Loaded;
 use super::presenter::{Drawn, Extras, Presenter, ShownPicture};
 use crate::output::{self, Format};
 use crate::passes::{Area, View};
-use crate::pipeline::Wanted;
+use crate::pipeline::{Wanted, check_size};
 use crate::prepare::view_of;
 use crate::scene::Background;
 use crate::vulkan::UiFrame;
@@ -119,7 +119,8 @@ impl Viewer {
         let is_moving = (self.is_moving(is_held) || is_draft) && !screenshot;
         let view = match &loaded {
             Some(loaded) => {
-                let mut view = self.view(loaded)?;
+                // The window scales it.
+                let mut view = self.view(loaded)?.fit(self.device.limits().max_image_dimension2_d);
                 if is_moving {
                     [view.width, view.height] = self.dynamic_resolution.moving([view.width, view.height]);
                 }
@@ -186,6 +187,7 @@ impl Viewer {
         let loaded = if loaded.is_draft() { self.finished(&loaded)? } else { loaded };
         let mut renderer = (*loaded.renderer).clone();
         renderer.view = self.view(&loaded)?;
+        check_size(&self.device, &renderer.view)?;
         let wanted = Wanted { radiance: format == Format::Exr, display: format == Format::Png, geometry: false };
         let rendering = renderer.render(wanted, 1)?;
         let (width, height) = (renderer.view.width, renderer.view.height);

@@ -90,7 +90,9 @@ impl Viewer {
         self.getting_ready.cancel();
         let (device, memo, change) = (self.device.clone(), self.memo.clone(), self.changes);
         self.loading.request(move |task| {
-            let loaded = |prepared: Prepared, round: &Round| -> Result<Loaded> {
+            let loaded = |mut prepared: Prepared, round: &Round| -> Result<Loaded> {
+                // As frames have it.
+                prepared.view = prepared.view.fit(device.limits().max_image_dimension2_d);
                 let renderer = DeviceScene::new(&device, &prepared, round)?;
                 Ok(Loaded::new(prepared, renderer, key, change, &memo))
             };
