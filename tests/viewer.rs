@@ -6,7 +6,7 @@ mod display;
 use display::Display;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, Command, Output, Stdio};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
@@ -66,9 +66,7 @@ impl Viewer {
     fn play(&self, arguments: &[&str], replay: &str) -> Ended {
         self.write("replay.jsonl", replay);
         let viewer = self.start(&[arguments, &["--replay", "replay.jsonl"]].concat());
-        let output = viewer.wait_with_output().expect("an end");
-        let log: Vec<_> = String::from_utf8_lossy(&output.stderr).lines().map(str::to_owned).collect();
-        Ended { success: output.status.success(), log }
+        Ended::of(viewer.wait_with_output().expect("an end"))
     }
 
     /// `name`, rendered without a window out of the scene file `scene`.
@@ -84,6 +82,11 @@ impl Viewer {
 }
 
 impl Ended {
+    fn of(output: Output) -> Self {
+        let log: Vec<_> = String::from_utf8_lossy(&output.stderr).lines().map(str::to_owned).collect();
+        Self { success: output.status.success(), log }
+    }
+
     fn expect_success(&self) {
         let problems: Vec<_> =
             self.log.iter().filter(|line| line.contains("validation") || line.contains("ERROR")).collect();
@@ -431,6 +434,21 @@ fn a_window_wider_than_images_of_its_sub_pixels_shows_a_coarser_picture() {
     viewer.play(&[&SMALL[..], &arguments].concat(), replay).expect_success();
     let scene = std::fs::read_to_string(viewer.path("wide.toml")).expect("a scene");
     assert!(scene.contains("width = 4200") && scene.contains("silver"), "{scene}");
+}
+
+#[test]
+fn a_picture_that_there_is_no_memory_for_is_told_and_shown_with_fewer_pixels() {
+    let Some(viewer) = Viewer::new() else { return };
+    viewer.write("replay.jsonl", "\"wait\"\n{\"set\": {\"subpixels\": 4}}\n\"wait\"\n{\"key\": \"escape\"}\n");
+    let mut command = viewer.threadlight(&["view", "--validate", "-vv", "--replay", "replay.jsonl"]);
+    command.args(["--size", "1000x1000", "--method", "cosine", "--environment", "white", "--background", "none"]);
+    command.args(["--frames", "1", "--screenshot", "window.png"]).env("THREADLIGHT_DEVICE_MEMORY_MIB", "150");
+    let ended = Ended::of(command.output().expect("an end"));
+    let told = ended.log.iter().any(|line| line.contains("WARN") && line.contains("no memory for"));
+    assert!(told && ended.log.iter().all(|line| !line.contains("validation")), "{:#?}", ended.log);
+    let window = viewer.picture("window.png");
+    let at = |x: u32, y: u32| window.rgba[(y * window.width + x) as usize];
+    assert!(at(500, 500) != at(2, 2), "the object is not there");
 }
 
 #[test]

@@ -21,6 +21,9 @@ use std::time::{Duration, Instant};
 /// A picture is still moving for so long after the last motion: a scroll wheel has no release.
 const SETTLING: Duration = Duration::from_millis(150);
 
+/// Where there is no memory for a geometry cache of this size, there is none for pictures.
+const LEAST_SIDE: u32 = 64;
+
 impl Viewer {
     /// Records more, from now on, of how long inputs wait.
     pub fn record(&mut self, record: Record) {
@@ -120,7 +123,7 @@ impl Viewer {
         let view = match &loaded {
             Some(loaded) => {
                 // The window scales it.
-                let mut view = self.view(loaded)?.fit(self.device.limits().max_image_dimension2_d);
+                let mut view = self.view(loaded)?.fit(self.longest_side);
                 if is_moving {
                     [view.width, view.height] = self.dynamic_resolution.moving([view.width, view.height]);
                 }
@@ -139,8 +142,12 @@ impl Viewer {
         let change = loaded.as_ref().map_or(0, |loaded| loaded.change);
         let is_awaited = loaded.is_some() && self.latency.is_awaited(change, is_draft);
         let extras = Extras { counts: !is_moving, screenshot, completion: is_awaited };
-        let drawn = stage.draw(size, picture, panel, textures, extras)?;
+        let mut drawn = stage.draw(size, picture, panel, textures, extras)?;
         self.frame_was_drawn();
+        if let (Some(view), Some(error)) = (&view, drawn.as_mut().and_then(|drawn| drawn.lack.take())) {
+            self.shrink(view, error)?;
+            return Ok(None);
+        }
         if drawn.is_some() && is_awaited {
             self.latency.shown(change, is_draft, Instant::now());
             if let Some(draft) = loaded.as_ref().filter(|_| is_draft && self.record == Record::AllAndErrors) {
@@ -167,6 +174,17 @@ impl Viewer {
             self.measured.counted = drawn.counted.or(self.measured.counted);
         }
         Ok(drawn)
+    }
+
+    /// There is too little memory for a frame of `view`: later ones have a quarter of its pixels at most.
+    fn shrink(&mut self, view: &View, error: Error) -> Result<()> {
+        let [width, height] = view.cache_size();
+        self.longest_side = width.max(height) / 2;
+        if self.longest_side < LEAST_SIDE {
+            return Err(error);
+        }
+        self.tell_error(&error);
+        Ok(())
     }
 
     /// How the scene that is shown is looked at.

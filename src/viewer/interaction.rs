@@ -78,6 +78,8 @@ pub struct Viewer {
     /// The drafts that were shown, where they are to be measured: each with the number of the answer that it was.
     pub(super) drafts: Vec<(usize, Arc<Prepared>)>,
     pub(super) dynamic_resolution: DynamicResolution,
+    /// Geometry caches have no longer sides, since the device has no such images or had no memory for one.
+    pub(super) longest_side: u32,
     /// Whether a frame has run the shader that shades what is loaded.
     pub(super) is_compiled: bool,
     pub(super) last_motion: Option<Instant>,
@@ -120,6 +122,7 @@ impl Viewer {
             record: Record::default(),
             drafts: Vec::new(),
             dynamic_resolution: DynamicResolution::default(),
+            longest_side: device.limits().max_image_dimension2_d,
             is_compiled: false,
             last_motion: None,
             last_turn: None,

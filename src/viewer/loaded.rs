@@ -1,9 +1,10 @@
 //! What frames are made of.
 use crate::Result;
-use crate::memo::{Key, Memo};
+use crate::memo::{Key, Round};
 use crate::pipeline::DeviceScene;
 use crate::prepare::{Prepared, view_of};
 use crate::scene::Scene;
+use crate::vulkan::Device;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -23,11 +24,24 @@ pub struct Loaded {
 }
 
 impl Loaded {
-    /// What was `prepared` by means of `memo`, on the device.
-    pub fn new(prepared: Prepared, renderer: DeviceScene, key: Option<Key>, change: u64, memo: &Memo) -> Self {
+    /// What `round` has `prepared`, and all else that frames of it need on `device`, with geometry caches whose sides are no longer than
+    /// `longest_side`.
+    ///
+    /// # Errors
+    /// Those of [`DeviceScene::new`].
+    pub fn new(
+        device: &Arc<Device>,
+        mut prepared: Prepared,
+        longest_side: u32,
+        round: &Round,
+        key: Option<Key>,
+        change: u64,
+    ) -> Result<Self> {
+        prepared.view = prepared.view.fit(longest_side);
+        let renderer = Arc::new(DeviceScene::new(device, &prepared, round)?);
         let files = prepared.scene.files().into_iter();
-        let files = files.filter_map(|path| memo.file_key(&path).ok().map(|key| (path, key))).collect();
-        Self { prepared: Arc::new(prepared), renderer: Arc::new(renderer), key, change, files }
+        let files = files.filter_map(|path| round.memo().file_key(&path).ok().map(|key| (path, key))).collect();
+        Ok(Self { prepared: Arc::new(prepared), renderer, key, change, files })
     }
 
     /// Whether some of its threads only stand in for those that are being made.

@@ -88,14 +88,10 @@ impl Viewer {
         }
         (self.requested, self.drafting_since) = (key, before.is_some().then(Instant::now));
         self.getting_ready.cancel();
-        let (device, memo, change) = (self.device.clone(), self.memo.clone(), self.changes);
+        let (device, memo) = (self.device.clone(), self.memo.clone());
+        let (longest_side, change) = (self.longest_side, self.changes);
         self.loading.request(move |task| {
-            let loaded = |mut prepared: Prepared, round: &Round| -> Result<Loaded> {
-                // As frames have it.
-                prepared.view = prepared.view.fit(device.limits().max_image_dimension2_d);
-                let renderer = DeviceScene::new(&device, &prepared, round)?;
-                Ok(Loaded::new(prepared, renderer, key, change, &memo))
-            };
+            let loaded = |prepared, round: &Round| Loaded::new(&device, prepared, longest_side, round, key, change);
             if let Some(before) = before {
                 let round = memo.round(task);
                 if let Some(draft) = prepare_draft(&scene, &before, &round)? {
@@ -114,13 +110,12 @@ impl Viewer {
         let scene = self.session.wanted().clone();
         let (key, change) = (key_of(&scene, &self.memo).ok(), self.changes);
         (self.requested, self.drafting_since) = (key, None);
-        let (device, memo) = (self.device.clone(), self.memo.clone());
+        let (device, memo, longest_side) = (self.device.clone(), self.memo.clone(), self.longest_side);
         self.loading.request(move |task| {
             Observer::begin(task, "shaders");
             let round = memo.round(task);
             let prepared = prepare(&scene, &round)?;
-            let renderer = crate::vulkan::hot_reload::reload(|| DeviceScene::new(&device, &prepared, &round))?;
-            Ok(Loaded::new(prepared, renderer, key, change, &memo))
+            crate::vulkan::hot_reload::reload(|| Loaded::new(&device, prepared, longest_side, &round, key, change))
         });
     }
 
@@ -131,7 +126,8 @@ impl Viewer {
         if !may_be_drafted(&loaded.prepared) {
             return;
         }
-        let draft = Prepared { is_draft: true, ..(*loaded.prepared).clone() };
+        let view = loaded.prepared.view.clone().fit(self.longest_side);
+        let draft = Prepared { is_draft: true, view, ..(*loaded.prepared).clone() };
         let (device, memo) = (self.device.clone(), self.memo.clone());
         self.getting_ready.request(move |task| {
             let renderer = DeviceScene::new(&device, &draft, &memo.round(task))?;

@@ -1,9 +1,12 @@
 //! The stage: draws frames into the window.
-use crate::Result;
 use crate::graph::{Access, DeviceResource, Executable, FrameGraph, ImageDesc, ImageHandle, Store};
 use crate::passes::{Area, Counters, Readbacks, View, present, texels, ui};
 use crate::pipeline::{DeviceScene, Frame, declare};
-use crate::vulkan::{Device, Frames, PassTime, PresentMode, Presented, Surface, Swapchain, UiFrame, UiPainter};
+use crate::vulkan::{
+    Buffer, Device, Frames, Image, PassTime, PresentMode, Presented, Surface, Swapchain, UiFrame, UiPainter,
+    VulkanError,
+};
+use crate::{Error, Result};
 use egui::TexturesDelta;
 use std::sync::Arc;
 use std::time::Duration;
@@ -12,6 +15,7 @@ use std::time::Duration;
 const FRAMES: usize = 2;
 
 /// What a frame shows.
+#[derive(Clone, Copy)]
 pub struct ShownPicture<'a> {
     /// Of what.
     pub renderer: &'a DeviceScene,
@@ -31,6 +35,8 @@ pub struct Drawn {
     pub counted: Option<(Counters, u64)>,
     /// What the window shows, if that was asked for: RGBA, 8 bits each, and its size.
     pub screenshot: Option<(Vec<u8>, [u32; 2])>,
+    /// What there was too little memory for, if the picture is missing: it is to be drawn with fewer pixels.
+    pub lack: Option<Error>,
 }
 
 impl Drawn {
@@ -82,6 +88,52 @@ fn declare_window<'a>(
     let shown = ui(graph, painter, panel, shown);
     graph.output(shown);
     WindowFrame { window, shown, frame }
+}
+
+/// A frame with all that it needs.
+struct ReadyFrame<'a> {
+    executable: Executable<'a>,
+    /// Where counters and lookups are read back, if it counts.
+    counts: Option<[Arc<Buffer>; 2]>,
+    /// Where the window is read back, if that was asked for.
+    screenshot: Option<Arc<Buffer>>,
+}
+
+/// Makes what a frame of `picture` and `panel` in the image `target` of the window needs, besides what is in `store`.
+fn make_ready<'a>(
+    device: &Arc<Device>,
+    store: &mut Store,
+    painter: &'a UiPainter,
+    picture: Option<ShownPicture<'a>>,
+    panel: &'a UiFrame,
+    target: &Arc<Image>,
+    extras: Extras,
+) -> Result<ReadyFrame<'a>> {
+    let [width, height, _] = target.shape.extent;
+    let mut graph = FrameGraph::new();
+    let WindowFrame { window, shown, frame } =
+        declare_window(&mut graph, picture.as_ref(), painter, panel, [width, height]);
+    let mut readbacks = Readbacks::new(device, graph);
+    // Only frames that shade count: reading what was counted must not be what makes them do so.
+    let counting = frame.filter(|frame| extras.counts && !readbacks.graph.is_still_good(frame.radiance, store.kept()));
+    let counts = match &counting {
+        Some(frame) => Some([
+            readbacks.buffer("counters", frame.counters, size_of::<Counters>() as u64)?,
+            readbacks.buffer("lookups", frame.lookups, size_of::<u64>() as u64)?,
+        ]),
+        None => None,
+    };
+    let screenshot = readbacks.image("window", shown, [width, height], 4, extras.screenshot)?;
+    let Readbacks { graph, mut imports, .. } = readbacks;
+    imports.push((window.into(), DeviceResource::Image(target.clone())));
+    let executable = Executable::keeping(device, graph, &imports, store)?;
+    Ok(ReadyFrame { executable, counts, screenshot })
+}
+
+/// Whether there was too little memory for it.
+fn lacks_memory(ready: &Result<ReadyFrame>) -> bool {
+    let Err(Error::Vulkan(cause)) = ready else { return false };
+    cause.downcast_ref().is_some_and(VulkanError::is_lack_of_memory)
 }
 
 /// The window, as frames see it.
@@ -136,26 +188,23 @@ impl Presenter {
         // Also where nothing is drawn: egui tells of each change once.
         self.painter.update(textures)?;
         let Some(turn) = self.swapchain.turn(&self.frames, size)? else { return Ok(None) };
-        let [width, height, _] = turn.image.shape.extent;
-
-        let mut graph = FrameGraph::new();
-        let WindowFrame { window, shown, frame } =
-            declare_window(&mut graph, picture.as_ref(), &self.painter, panel, [width, height]);
-        let mut readbacks = Readbacks::new(&self.device, graph);
-        // Only frames that shade count: reading what was counted must not be what makes them do so.
-        let counting =
-            frame.filter(|frame| extras.counts && !readbacks.graph.is_still_good(frame.radiance, self.store.kept()));
-        let counts = match &counting {
-            Some(frame) => Some((
-                readbacks.buffer("counters", frame.counters, size_of::<Counters>() as u64)?,
-                readbacks.buffer("lookups", frame.lookups, size_of::<u64>() as u64)?,
-            )),
-            None => None,
+        let extent = turn.image.shape.extent;
+        let make_ready = |store: &mut Store, picture| {
+            make_ready(&self.device, store, &self.painter, picture, panel, &turn.image, extras)
         };
-        let screenshot = readbacks.image("window", shown, [width, height], 4, extras.screenshot)?;
-        let Readbacks { graph, mut imports, .. } = readbacks;
-        imports.push((window.into(), DeviceResource::Image(turn.image.clone())));
-        let executable = Executable::keeping(&self.device, graph, &imports, &mut self.store)?;
+        let mut ready = make_ready(&mut self.store, picture);
+        let mut lack = None;
+        // Once more with the room that was taken by what was kept, then without the picture: an image that was acquired has to be presented.
+        for picture in [picture, None] {
+            if !lacks_memory(&ready) {
+                break;
+            }
+            self.store = Store::default();
+            self.device.wait_idle()?;
+            lack = ready.err().filter(|_| picture.is_none());
+            ready = make_ready(&mut self.store, picture);
+        }
+        let ReadyFrame { executable, counts, screenshot } = ready?;
         let passes = match self.device.times_passes() {
             true => {
                 let passes = self.frames.oldest_pass_times()?;
@@ -172,15 +221,16 @@ impl Presenter {
             "frame: {}",
             executable.plan.passes.iter().map(|pass| pass.name.as_str()).collect::<Vec<_>>().join(" ")
         );
-        drop((executable, imports));
+        drop(executable);
         if self.swapchain.present(turn)? == Presented::Again && screenshot.is_none() {
             return Ok(None);
         }
-        let counted = counts.map(|(counters, lookups)| {
+        let counted = counts.map(|[counters, lookups]| {
             let counters: Vec<Counters> = texels(Some(&counters));
             let lookups: Vec<u64> = texels(Some(&lookups));
             (counters.first().copied().unwrap_or_default(), lookups.first().copied().unwrap_or_default())
         });
+        let [width, height, _] = extent;
         let screenshot = screenshot.map(|image| {
             let opaque = |texel| {
                 let [r, g, b] = self.swapchain.rgb8(texel);
@@ -188,7 +238,7 @@ impl Presenter {
             };
             (texels(Some(&image)).into_iter().flat_map(opaque).collect(), [width, height])
         });
-        Ok(Some(Drawn { passes, ran, counted, screenshot }))
+        Ok(Some(Drawn { passes, ran, counted, screenshot, lack }))
     }
 }
 

@@ -300,7 +300,7 @@ impl Device {
 
     /// Blocks until the queue has nothing left to do, also for presentation, then destroys what was waiting for it.
     #[cfg(feature = "viewer")]
-    pub(super) fn wait_idle(&self) -> Result<()> {
+    pub(crate) fn wait_idle(&self) -> Result<()> {
         let finished = self.with_queue(|queue| {
             // SAFETY: the queue is held exclusively.
             call("vkQueueWaitIdle", &self.description.name, || unsafe { self.raw.queue_wait_idle(queue) })?;

@@ -107,6 +107,16 @@ impl From<VulkanError> for crate::Error {
 }
 
 impl VulkanError {
+    /// Whether there was too little memory: what needs less may be had.
+    pub fn is_lack_of_memory(&self) -> bool {
+        let lacks = [vk::Result::ERROR_OUT_OF_DEVICE_MEMORY, vk::Result::ERROR_OUT_OF_HOST_MEMORY];
+        match self {
+            Self::Memory { .. } => true,
+            Self::Call { result, .. } => lacks.contains(result),
+            _ => false,
+        }
+    }
+
     /// A [`VulkanError::Unfit`] about the object of this name.
     pub(super) fn unfit(object: &str, problem: impl ToString) -> Self {
         Self::Unfit { object: object.to_owned(), problem: problem.to_string() }
