@@ -23,6 +23,9 @@ impl Primaries {
     pub const REC_709: Self =
         Self { red: [0.64, 0.33], green: [0.30, 0.60], blue: [0.15, 0.06], white: [0.3127, 0.3290] };
 
+    /// X, Y and Z of the CIE themselves. White is equal parts of them, as in Radiance's pictures.
+    pub const XYZ: Self = Self { red: [1.0, 0.0], green: [0.0, 1.0], blue: [0.0, 0.0], white: [1.0 / 3.0, 1.0 / 3.0] };
+
     /// Makes `pixels` of these primaries, from the file at `path`, ones of Rec. 709, with white as white (by Bradford's adaptation).
     /// Where a colour that is not negative leaves Rec. 709, it is cut off at 0. Primaries that make no colours are warned of.
     pub fn convert<'a>(self, path: &Path, pixels: impl IntoIterator<Item = &'a mut [f32; 3]>) {
@@ -104,7 +107,7 @@ mod tests {
     /// As IEC 61966-2-1 (sRGB) has it.
     #[test]
     fn x_y_and_z_themselves_are_primaries() {
-        let xyz = Primaries { red: [1.0, 0.0], green: [0.0, 1.0], blue: [0.0, 0.0], white: Primaries::REC_709.white };
+        let xyz = Primaries { white: Primaries::REC_709.white, ..Primaries::XYZ };
         let white = DVec3::new(0.3127, 0.3290, 0.3583) / 0.3290;
         let published = [[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]];
         let matrix = xyz.to_rec_709().unwrap();

@@ -199,6 +199,7 @@ pub fn hdr_environment() -> Reader {
     fn header(size: &str) -> Vec<u8> {
         format!("#?RADIANCE\nFORMAT=32-bit_rle_rgbe\nEXPOSURE=1\n\n{size}\n").into_bytes()
     }
+    const XYZ_BY_COLUMNS: &[u8] = b"#?RGBE\r\nFORMAT=32-bit_rle_xyze\r\nEXPOSURE=2\r\n\r\n-X 3 +Y 2\r\n";
     Reader {
         file_name: "x.hdr",
         seeds: || {
@@ -206,9 +207,10 @@ pub fn hdr_environment() -> Reader {
             // Four channels of a run of 8 and of 8 single values each.
             let channel = [&[136, 100][..], &[8, 1, 2, 3, 4, 5, 6, 7, 8]].concat();
             let line = [&[2, 2, 0, 16][..], &channel.repeat(4)].concat();
-            vec![flat, [header("-Y 2 +X 16"), line.repeat(2)].concat()]
+            let runs = [header("-Y 2 +X 16"), line.repeat(2)].concat();
+            vec![flat, runs, [XYZ_BY_COLUMNS, &[128, 64, 32, 129].repeat(6)].concat()]
         },
-        words: &["-Y ", "+X ", "\n\n", "FORMAT=", "\x02\x02", "\x01\x01\x01", "#?RADIANCE\n", "16 "],
+        words: &["-Y ", "+X ", "+Y ", "\n\n", "\r", "FORMAT=", "\x02\x02", "\x01\x01\x01", "#?RADIANCE\n", "16 "],
         seal: None,
         bytes_per_byte: 1000,
         read: read_environment,
