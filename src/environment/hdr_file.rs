@@ -41,6 +41,10 @@ fn parse(path: &Path, bytes: &[u8]) -> Result<Environment> {
         let exposure = header.exposure;
         tracing::warn!("{}: its EXPOSURE of {exposure} is not divided out; intensity can do that", path.display());
     }
+    if header.colour_correction != [1.0; 3] {
+        let [r, g, b] = header.colour_correction;
+        tracing::warn!("{}: its COLORCORR of {r} {g} {b} is not divided out", path.display());
+    }
     Environment::of_file(path, width, height, texels)
 }
 
@@ -58,13 +62,15 @@ struct Header {
     primaries: Option<Primaries>,
     /// Of all its lines, multiplied.
     exposure: f32,
+    /// The same.
+    colour_correction: [f32; 3],
 }
 
 impl Header {
     /// Takes the lines after the signature off `bytes`, up to the empty one. Indented lines are of the pictures that this one was made from.
     /// The error is what is wrong.
     fn take(bytes: &mut &[u8]) -> Result<Self, &'static str> {
-        let mut header = Self { primaries: None, exposure: 1.0 };
+        let mut header = Self { primaries: None, exposure: 1.0, colour_correction: [1.0; 3] };
         let mut is_xyz = false;
         loop {
             let line = take_line(bytes).ok_or("its header has no end")?;
@@ -82,6 +88,10 @@ impl Header {
                     }
                 }
                 "EXPOSURE" => header.exposure *= numbers().first().unwrap_or(&1.0),
+                "COLORCORR" => {
+                    let factors = header.colour_correction.iter_mut().zip(numbers());
+                    factors.for_each(|(product, factor)| *product *= factor);
+                }
                 "PRIMARIES" => header.primaries = primaries(&numbers()),
                 _ => {}
             }
@@ -285,13 +295,15 @@ mod tests {
     }
 
     #[test]
-    fn exposure_changes_nothing_and_what_a_picture_was_made_from_says_nothing() {
+    fn exposure_and_colour_correction_change_nothing_and_what_a_picture_was_made_from_says_nothing() {
         let plain = read("GAMMA=1");
-        for line in ["EXPOSURE=2", "EXPOSURE=x", "\tFORMAT=x", "\tPRIMARIES=1 0 0 1 0 0 .3 .3"] {
+        let of_another = ["\tFORMAT=x", "\tPRIMARIES=1 0 0 1 0 0 .3 .3"];
+        for line in ["EXPOSURE=2", "EXPOSURE=x", "COLORCORR=2 3 4", "COLORCORR=2"].into_iter().chain(of_another) {
             assert_eq!(read(line), plain, "{line}");
         }
         let said = |lines: &str| Header::take(&mut format!("{lines}\n\n").as_bytes()).unwrap();
-        assert_eq!(said("EXPOSURE= 2\n\tEXPOSURE=5\nEXPOSURE=3").exposure, 6.0);
+        let header = said("EXPOSURE= 2\nCOLORCORR=1 2 3\n\tEXPOSURE=5\nEXPOSURE=3\nCOLORCORR=2 1 1");
+        assert_eq!((header.exposure, header.colour_correction), (6.0, [2.0, 2.0, 3.0]));
     }
 
     #[test]

@@ -199,7 +199,7 @@ pub fn hdr_environment() -> Reader {
     fn header(size: &str) -> Vec<u8> {
         format!("#?RADIANCE\nFORMAT=32-bit_rle_rgbe\nEXPOSURE=1\n\n{size}\n").into_bytes()
     }
-    const XYZ_BY_COLUMNS: &[u8] = b"#?RGBE\r\nFORMAT=32-bit_rle_xyze\r\nEXPOSURE=2\r\n\r\n-X 3 +Y 2\r\n";
+    const XYZ_BY_COLUMNS: &[u8] = b"#?RGBE\r\nFORMAT=32-bit_rle_xyze\r\nCOLORCORR=1 2 3\r\n\r\n-X 3 +Y 2\r\n";
     Reader {
         file_name: "x.hdr",
         seeds: || {
