@@ -3,18 +3,32 @@ use std::collections::BTreeMap;
 use std::io::Cursor;
 use std::path::Path;
 
+use exr::block::chunk::{Chunk, CompressedBlock, CompressedScanLineBlock, CompressedTileBlock};
 use exr::meta::attribute::{AttributeValue, Chromaticities, Text};
 use exr::meta::{BlockDescription, MetaData};
 use exr::prelude::{
-    AnyChannel, AnyChannels, Encoding, FlatImage, FlatSamples, Image, IntegerBounds, Layer, LayerAttributes,
-    ReadChannels, ReadLayers, Vec2, WritableImage,
+    AnyChannel, AnyChannels, Compression, Encoding, FlatImage, FlatSamples, Image, IntegerBounds, Layer,
+    LayerAttributes, ReadChannels, ReadLayers, Vec2, WritableImage,
 };
 
 use super::{Format, PictureFile, Primaries, check_pixels, write_whole};
 use crate::error::{Error, Result};
 
-/// Pixels of all channels to each byte of a file, at most: deflate makes 1032 bytes of one, most of it for one channel of half floats.
-const MAX_SAMPLES_PER_BYTE: u64 = 1024;
+/// What deflate makes of a byte at most. It is used for samples, which take at least two, so that chroma of a quarter of the pixels may
+/// count as if it had them all.
+const DEFLATED: u64 = 1032;
+
+/// DWA deflates four bytes for each block of 8 x 8 samples.
+const MAX_SAMPLES_PER_BYTE: u64 = 16 * DEFLATED;
+
+/// Samples of all channels to each byte of a file of this compression, at most. Those that do not deflate make less of a byte.
+fn max_samples_per_byte(compression: Compression) -> u64 {
+    if is_dwa(compression) { MAX_SAMPLES_PER_BYTE } else { DEFLATED }
+}
+
+fn is_dwa(compression: Compression) -> bool {
+    matches!(compression, Compression::DWAA(_) | Compression::DWAB(_))
+}
 
 /// How a picture was made: written to the header of an EXR, each field under its own name.
 #[derive(Clone, Debug, PartialEq)]
@@ -147,9 +161,12 @@ pub fn parse_exr(path: &Path, bytes: &[u8]) -> Result<PictureFile> {
         };
         std::iter::repeat_n(area(header.layer_size).max(tile) as u64, header.channels.list.len().max(1))
     });
+    let most = meta.headers.iter().map(|header| max_samples_per_byte(header.compression)).max().unwrap_or_default();
+    check_pixels(path, samples, bytes.len(), most)?;
+    // However small the part is that has data.
     let shown = meta.headers.first().map_or(0, |header| area(header.shared_attributes.display_window.size));
-    let samples = samples.chain(std::iter::repeat_n(shown as u64, 4));
-    check_pixels(path, samples, bytes.len(), MAX_SAMPLES_PER_BYTE)?;
+    check_pixels(path, [shown as u64], bytes.len(), MAX_SAMPLES_PER_BYTE)?;
+    check_dwa_chunks(&meta, bytes).map_err(broken)?;
     let image: FlatImage = exr::prelude::read()
         .no_deep_data()
         .largest_resolution_level()
@@ -195,6 +212,35 @@ pub fn parse_exr(path: &Path, bytes: &[u8]) -> Result<PictureFile> {
         format: Format::Exr,
         attributes: attribute_texts(&image, layer),
     })
+}
+
+/// An error if a chunk that DWA has compressed claims more than can be deflated to its size: the crate allocates whatever such a chunk says.
+fn check_dwa_chunks(meta: &MetaData, bytes: &[u8]) -> exr::error::UnitResult {
+    if !meta.headers.iter().any(|header| is_dwa(header.compression)) {
+        return Ok(());
+    }
+    for chunk in exr::block::read(Cursor::new(bytes), false)?.filter_chunks(false, |_, _, _| true)? {
+        let Chunk { layer_index, compressed_block } = chunk?;
+        let Some(header) = meta.headers.get(layer_index).filter(|header| is_dwa(header.compression)) else { continue };
+        let place = header.get_block_data_indices(&compressed_block)?;
+        let pixels = header.get_absolute_block_pixel_coordinates(place)?.size.area();
+        let (CompressedBlock::ScanLine(CompressedScanLineBlock { compressed_pixels_le: data, .. })
+        | CompressedBlock::Tile(CompressedTileBlock { compressed_pixels_le: data, .. })) = compressed_block
+        else {
+            continue;
+        };
+        // What gets no smaller is stored as it is.
+        if data.len() == pixels * header.channels.bytes_per_pixel {
+            continue;
+        }
+        // It begins with a version and ten numbers, of which these are the lengths of what is inflated.
+        let mut numbers = data.as_chunks().0.iter().map(|&number| u64::from_le_bytes(number)).enumerate();
+        let most = DEFLATED * data.len() as u64;
+        if numbers.any(|(place, number)| [1, 6, 8, 9].contains(&place) && number > most) {
+            return Err(exr::error::Error::Invalid("size of a DWA chunk".into()));
+        }
+    }
+    Ok(())
 }
 
 /// `pixels` of `layer` where `window` shows them, `nothing` where it has none.
@@ -264,7 +310,7 @@ fn attribute_texts(image: &FlatImage, layer: &FlatLayer) -> BTreeMap<String, Str
 #[cfg(test)]
 mod tests {
     use super::*;
-    use exr::prelude::SpecificChannels;
+    use exr::prelude::{SpecificChannels, f16};
 
     /// The picture that an EXR of 2 x 1 pixels, the first at (3, -1), shows in a window of this place and size.
     fn shown(position: (i32, i32), size: (usize, usize), chromaticities: Option<Chromaticities>) -> PictureFile {
@@ -303,5 +349,56 @@ mod tests {
         // ACEScg's published matrix times (1, 0.5, 0.25).
         let expected = [1.37334, 0.43750, 0.19976, 0.75];
         assert!(picture.rgba[0].iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-3), "{:?}", picture.rgba);
+    }
+
+    /// An EXR of one colour, all half floats.
+    fn of_one_colour(size: (usize, usize), compression: Compression) -> Vec<u8> {
+        let colour = [1.0, 0.5, 0.25].map(f16::from_f32);
+        let channels = SpecificChannels::rgb(|_| (colour[0], colour[1], colour[2]));
+        let encoding = Encoding { compression, ..Encoding::UNCOMPRESSED };
+        let mut bytes = Cursor::new(Vec::new());
+        Image::from_encoded_channels(size, encoding, channels).write().to_buffered(&mut bytes).unwrap();
+        bytes.into_inner()
+    }
+
+    #[test]
+    fn a_picture_of_one_colour_is_read_however_small_compression_made_it() {
+        use Compression::{B44, B44A, DWAA, DWAB, PIZ, PXR24, RLE, Uncompressed, ZIP1, ZIP16};
+        // The small one gets no smaller, and is stored as it is.
+        for (width, height) in [(8192, 256), (4, 2)] {
+            for compression in [Uncompressed, RLE, ZIP1, ZIP16, PIZ, PXR24, B44, B44A, DWAA(None), DWAB(None)] {
+                let picture = parse_exr(Path::new("test.exr"), &of_one_colour((width, height), compression)).unwrap();
+                assert_eq!(picture.rgba.len(), width * height);
+                let near = |(found, expected): (&f32, f32)| (found - expected).abs() < 0.01;
+                let is_colour = |pixel: &[f32; 4]| pixel.iter().zip([1.0, 0.5, 0.25, 1.0]).all(near);
+                assert!(picture.rgba.iter().all(is_colour), "{compression}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_window_may_show_far_more_than_the_data_but_not_more_than_a_file_can_hold() {
+        assert_eq!(shown((0, -2), (1000, 1000), None).rgba[1000 + 3], [1.0, 0.5, 0.25, 0.75]);
+        let mut bytes = of_one_colour((2, 1), Compression::Uncompressed);
+        let name = b"displayWindow\0box2i\0";
+        let place = bytes.windows(name.len()).position(|bytes| bytes == name).unwrap();
+        // After the size of the value and the first pixel, the last one.
+        bytes[place + name.len() + 12..][..8].copy_from_slice(&[9999_i32; 2].map(i32::to_le_bytes).concat());
+        let error = parse_exr(Path::new("test.exr"), &bytes).unwrap_err().to_string();
+        assert!(error.contains("more than 16512 pixels for each"), "{error}");
+    }
+
+    #[test]
+    fn a_chunk_of_dwa_that_claims_more_than_memory_is_refused() {
+        let whole = of_one_colour((64, 64), Compression::DWAB(None));
+        let number = |place: usize| u64::from_le_bytes(*whole[place..].first_chunk().unwrap());
+        // The table of the only chunk is where the chunk begins, and stands before it; its own place and size do before its data.
+        let table = (0..whole.len() - 8).find(|&place| number(place) == place as u64 + 8).unwrap();
+        for counter in [1, 6, 8, 9] {
+            let mut bytes = whole.clone();
+            bytes[table + 16 + 8 * counter..][..8].copy_from_slice(&(1_u64 << 60).to_le_bytes());
+            let error = parse_exr(Path::new("test.exr"), &bytes).map(drop).unwrap_err().to_string();
+            assert!(error.contains("size of a DWA chunk"), "{error}");
+        }
     }
 }

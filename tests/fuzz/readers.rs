@@ -229,18 +229,21 @@ fn exr_files() -> Vec<Vec<u8>> {
         [Compression::Uncompressed, Compression::RLE, Compression::ZIP1, Compression::PIZ, Compression::PXR24];
     let encodings = encodings.map(|compression| Encoding { compression, ..Encoding::UNCOMPRESSED }).into_iter();
     let tiles = Encoding { blocks: Blocks::Tiles(Vec2(2, 2)), ..Encoding::SMALL_LOSSLESS };
-    let file = |encoding: Encoding| {
-        let channel = |name, samples| AnyChannel::new(name, samples);
-        let half = FlatSamples::F16(vec![f16::ONE; 8]);
-        let (single, whole) = (FlatSamples::F32(vec![0.5; 8]), FlatSamples::U32(vec![1; 8]));
-        let channels = [channel("B", half), channel("G", single), channel("R", whole)];
-        let channels = AnyChannels::sort(channels.into_iter().collect());
-        let layer = Layer::new((4, 2), LayerAttributes::default(), encoding, channels);
+    let file = |size: (usize, usize), encoding: Encoding, names: [&str; 3]| {
+        let count = size.0 * size.1;
+        let half = FlatSamples::F16(vec![f16::ONE; count]);
+        let (single, whole) = (FlatSamples::F32(vec![0.5; count]), FlatSamples::U32(vec![1; count]));
+        let channels = names.into_iter().zip([half, single, whole]);
+        let channels = AnyChannels::sort(channels.map(|(name, samples)| AnyChannel::new(name, samples)).collect());
+        let layer = Layer::new(size, LayerAttributes::default(), encoding, channels);
         let mut bytes = std::io::Cursor::new(Vec::new());
         Image::from_layer(layer).write().to_buffered(&mut bytes).expect("memory");
         bytes.into_inner()
     };
-    encodings.chain([tiles]).map(file).collect()
+    // Less is stored as it is, and DWA has no whole numbers for colours.
+    let dwa = [Compression::DWAA(None), Compression::DWAB(None)]
+        .map(|compression| file((16, 16), Encoding { compression, ..Encoding::UNCOMPRESSED }, ["A", "Y", "Z"]));
+    encodings.chain([tiles]).map(|encoding| file((4, 2), encoding, ["B", "G", "R"])).chain(dwa).collect()
 }
 
 const EXR_WORDS: &[&str] = &[
@@ -261,7 +264,7 @@ pub fn exr_environment() -> Reader {
         seeds: exr_files,
         words: EXR_WORDS,
         seal: None,
-        bytes_per_byte: 40_000,
+        bytes_per_byte: 700_000,
         read: read_environment,
     }
 }
@@ -279,7 +282,7 @@ pub fn kept_reference() -> Reader {
         },
         words: EXR_WORDS,
         seal: None,
-        bytes_per_byte: 40_000,
+        bytes_per_byte: 700_000,
         read: |path, bytes| reference::parse(path, bytes, [4, 2]).map(drop).map_err(text),
     }
 }
