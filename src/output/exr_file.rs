@@ -1,4 +1,5 @@
 //! Writes and reads OpenEXR pictures: 32-bit float, linear Rec. 709, the circumstances of the rendering in the header.
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::io::Cursor;
 use std::path::Path;
@@ -87,9 +88,9 @@ pub fn write_exr(
     let names: &[&str] = if alpha { &["R", "G", "B", "A"] } else { &["R", "G", "B"] };
     let channels = AnyChannels::sort(names.iter().copied().enumerate().map(channel).collect());
 
-    let text = |value: &str| AttributeValue::Text(Text::new_or_none(value).unwrap_or_else(|| Text::from("?")));
+    let text = |value: &str| AttributeValue::Text(utf8(value));
     let mut attributes = LayerAttributes {
-        software_name: Text::new_or_none(format!("Threadlight {}", header.version)),
+        software_name: Some(utf8(&format!("Threadlight {}", header.version))),
         ..LayerAttributes::default()
     };
     attributes.other.extend([
@@ -102,9 +103,7 @@ pub fn write_exr(
         // `version` alone is a name that the format keeps for deep data.
         (Text::from("threadlight_version"), text(&header.version)),
     ]);
-    attributes
-        .other
-        .extend(header.more.iter().filter_map(|(name, value)| Some((Text::new_or_none(name)?, text(value)))));
+    attributes.other.extend(header.more.iter().map(|(name, value)| (utf8(name), text(value))));
 
     let size = Vec2(width as usize, height as usize);
     let mut image = Image::from_layer(Layer::new(size, attributes, Encoding::SMALL_LOSSLESS, channels));
@@ -117,6 +116,16 @@ pub fn write_exr(
     let mut bytes = bytes.into_inner();
     sort_attributes(&mut bytes);
     write_whole(path, &bytes)
+}
+
+/// Strings of an EXR are UTF-8; by itself the crate takes their bytes for letters of Latin-1.
+fn utf8(text: &str) -> Text {
+    Text::from_slice_unchecked(text.as_bytes())
+}
+
+/// The same the other way round; what other programs wrote may be anything.
+fn string(text: &Text) -> Cow<'_, str> {
+    String::from_utf8_lossy(text.as_slice())
 }
 
 /// Puts the attributes in a single-part EXR's header into the order of their names. The crate keeps them in a hash map
@@ -177,10 +186,10 @@ pub fn parse_exr(path: &Path, bytes: &[u8]) -> Result<PictureFile> {
         .map_err(broken)?;
 
     let (layer, prefix, names) = image.layer_data.iter().find_map(find_colour).ok_or_else(|| {
-        let names: Vec<String> = image
+        let names: Vec<_> = image
             .layer_data
             .iter()
-            .flat_map(|layer| layer.channel_data.list.iter().map(|channel| channel.name.to_string()))
+            .flat_map(|layer| layer.channel_data.list.iter().map(|channel| string(&channel.name)))
             .collect();
         Error::in_file(
             path,
@@ -272,7 +281,7 @@ fn find_colour(layer: &FlatLayer) -> Option<(&FlatLayer, String, [&'static str; 
     for names in [["R", "G", "B"], ["Y", "Y", "Y"]] {
         // Channels are sorted, so names without a prefix come before others only by chance: look for them first.
         let prefixes = layer.channel_data.list.iter().filter_map(|channel| {
-            channel.name.to_string().strip_suffix(names[0]).filter(|prefix| prefix.ends_with('.')).map(str::to_owned)
+            string(&channel.name).strip_suffix(names[0]).filter(|prefix| prefix.ends_with('.')).map(str::to_owned)
         });
         for prefix in std::iter::once(String::new()).chain(prefixes) {
             if names.iter().all(|name| find_channel(layer, &prefix, name).is_some()) {
@@ -286,7 +295,7 @@ fn find_colour(layer: &FlatLayer) -> Option<(&FlatLayer, String, [&'static str; 
 /// The channel of that name with one sample for each pixel (chroma of a luminance-chroma image has fewer).
 fn find_channel<'a>(layer: &'a FlatLayer, prefix: &str, name: &str) -> Option<&'a AnyChannel<FlatSamples>> {
     layer.channel_data.list.iter().find(|channel| {
-        channel.name.to_string().strip_prefix(prefix) == Some(name)
+        string(&channel.name).strip_prefix(prefix) == Some(name)
             && channel.sample_data.len() == layer.size.0 * layer.size.1
     })
 }
@@ -296,13 +305,13 @@ fn attribute_texts(image: &FlatImage, layer: &FlatLayer) -> BTreeMap<String, Str
     let all = image.attributes.other.iter().chain(&layer.attributes.other);
     all.filter_map(|(name, value)| {
         let value = match value {
-            AttributeValue::Text(text) => text.to_string(),
+            AttributeValue::Text(text) => string(text).into_owned(),
             AttributeValue::I32(number) => number.to_string(),
             AttributeValue::F32(number) => number.to_string(),
             AttributeValue::F64(number) => number.to_string(),
             _ => return None,
         };
-        Some((name.to_string(), value))
+        Some((string(name).into_owned(), value))
     })
     .collect()
 }

@@ -124,23 +124,28 @@ mod tests {
         let header = ExrHeader {
             method: "paper".into(),
             threads: 100,
-            material: "gold".into(),
-            environment: "studio".into(),
+            material: "é.toml".into(),
+            environment: "日本.hdr".into(),
             device: "a device".into(),
             seconds: 0.25,
+            more: vec![("größe".into(), "½".into())],
             ..ExrHeader::default()
         };
         write_exr(&path, 3, 2, &GRADIENT, true, &header).unwrap();
+        // Other programs read UTF-8.
+        let has = |text: &str| std::fs::read(&path).unwrap().windows(text.len()).any(|bytes| bytes == text.as_bytes());
+        assert!(has("é.toml") && has("日本.hdr") && has("größe"));
         let picture = read_image(&path).unwrap();
         assert_eq!((picture.width, picture.height, picture.alpha), (3, 2, true));
         assert_eq!(picture.rgba, GRADIENT);
         for (name, value) in [
             ("method", "paper"),
             ("threads", "100"),
-            ("material", "gold"),
-            ("environment", "studio"),
+            ("material", "é.toml"),
+            ("environment", "日本.hdr"),
             ("device", "a device"),
             ("seconds", "0.25"),
+            ("größe", "½"),
             ("threadlight_version", env!("CARGO_PKG_VERSION")),
         ] {
             assert_eq!(picture.attributes[name], value, "{name}");
