@@ -148,10 +148,10 @@ fn sort_attributes(bytes: &mut [u8]) {
     bytes[MAGIC_AND_VERSION..start].copy_from_slice(&attributes.concat());
 }
 
-/// Reads an EXR: the first layer with channels R, G and B (perhaps with a common prefix, such as `beauty.R`), or with
-/// only Y, which then stands for all three. Half, float and integer samples, any compression that the crate knows. The picture is what
-/// the display window shows: black, and transparent if there is alpha, where the layer has no data. Colours of other primaries become those
-/// of Rec. 709.
+/// Reads an EXR: the channels R, G and B (perhaps with a common prefix, such as `beauty.R`), or else Y, which then stands for all three. Of
+/// several such layers it is the picture itself, if one is called so, and the first if not; a warning tells which. Half, float and integer samples,
+/// any compression that the crate knows. The picture is what the display window shows: black, and transparent if there is alpha, where the
+/// layer has no data. Colours of other primaries become those of Rec. 709.
 pub fn parse_exr(path: &Path, bytes: &[u8]) -> Result<PictureFile> {
     let broken = |cause: exr::error::Error| {
         Error::in_file(
@@ -185,39 +185,43 @@ pub fn parse_exr(path: &Path, bytes: &[u8]) -> Result<PictureFile> {
         .from_buffered(Cursor::new(bytes))
         .map_err(broken)?;
 
-    let (layer, prefix, names) = image.layer_data.iter().find_map(find_colour).ok_or_else(|| {
-        let names: Vec<_> = image
-            .layer_data
-            .iter()
-            .flat_map(|layer| layer.channel_data.list.iter().map(|channel| string(&channel.name)))
-            .collect();
+    let groups: Vec<Group> = image.layer_data.iter().flat_map(Group::all).collect();
+    let has_colour = groups.iter().any(|group| group.colour().is_some());
+    let colours_of = |group| if has_colour { Group::colour(group) } else { Group::grey(group) };
+    let shown: Vec<_> = groups.iter().filter_map(|group| Some((group, colours_of(group)?))).collect();
+    // The first of those that are equally good.
+    let (group, colours) = shown.iter().min_by_key(|(group, _)| group.rank()).ok_or_else(|| {
+        let channels = image.layer_data.iter().flat_map(|layer| &layer.channel_data.list);
+        let names: Vec<_> = channels.map(|channel| string(&channel.name)).collect();
         Error::in_file(
             path,
             format!("has no channels R, G, B, only {}", names.join(", ")),
             "give an EXR with colour in R, G, B",
         )
     })?;
-    let mut rgba = vec![[1.0; 4]; area(layer.size)];
-    for (index, name) in names.iter().enumerate().chain([(3, &"A")]) {
-        if let Some(channel) = find_channel(layer, &prefix, name) {
-            rgba.iter_mut().zip(channel.sample_data.values_as_f32()).for_each(|(pixel, value)| pixel[index] = value);
-        }
+    if shown.len() > 1 {
+        let taken = match &*group.name() {
+            "" => "the one without a name".to_owned(),
+            name => format!("{name:?}"),
+        };
+        tracing::warn!("{}: of its {} layers with colour {taken} is taken", path.display(), shown.len());
     }
-    // Y alone has no colour.
-    if let Some(Chromaticities { red, green, blue, white }) =
-        image.attributes.chromaticities.filter(|_| names[0] == "R")
-    {
+    let (layer, alpha) = (group.layer, group.channels[3]);
+    let mut rgba = vec![[1.0; 4]; area(layer.size)];
+    for (index, channel) in colours.iter().chain(&alpha).enumerate() {
+        rgba.iter_mut().zip(channel.sample_data.values_as_f32()).for_each(|(pixel, value)| pixel[index] = value);
+    }
+    if let Some(Chromaticities { red, green, blue, white }) = image.attributes.chromaticities.filter(|_| has_colour) {
         let at = |of: Vec2<f32>| [of.0, of.1];
         Primaries { red: at(red), green: at(green), blue: at(blue), white: at(white) }
             .convert(path, rgba.iter_mut().map(|[colour @ .., _]| colour));
     }
     let window = image.attributes.display_window;
-    let alpha = find_channel(layer, &prefix, "A").is_some();
     Ok(PictureFile {
         width: window.size.0 as u32,
         height: window.size.1 as u32,
-        rgba: within(window, layer, rgba, [0.0, 0.0, 0.0, if alpha { 0.0 } else { 1.0 }]),
-        alpha,
+        rgba: within(window, layer, rgba, [0.0, 0.0, 0.0, if alpha.is_some() { 0.0 } else { 1.0 }]),
+        alpha: alpha.is_some(),
         format: Format::Exr,
         attributes: attribute_texts(&image, layer),
     })
@@ -276,28 +280,64 @@ fn within(window: IntegerBounds, layer: &FlatLayer, pixels: Vec<[f32; 4]>, nothi
 
 type FlatLayer = Layer<AnyChannels<FlatSamples>>;
 
-/// The layer, the prefix before its channel names, and the names of its three colours; none where it has no colour.
-fn find_colour(layer: &FlatLayer) -> Option<(&FlatLayer, String, [&'static str; 3])> {
-    for names in [["R", "G", "B"], ["Y", "Y", "Y"]] {
-        // Channels are sorted, so names without a prefix come before others only by chance: look for them first.
-        let prefixes = layer.channel_data.list.iter().filter_map(|channel| {
-            string(&channel.name).strip_suffix(names[0]).filter(|prefix| prefix.ends_with('.')).map(str::to_owned)
-        });
-        for prefix in std::iter::once(String::new()).chain(prefixes) {
-            if names.iter().all(|name| find_channel(layer, &prefix, name).is_some()) {
-                return Some((layer, prefix, names));
-            }
-        }
-    }
-    None
+type FlatChannel = AnyChannel<FlatSamples>;
+
+/// What red, green, blue, alpha and luminance are called, in any case, after the last dot of a channel's name.
+const COMPONENTS: [&[&str]; 5] = [&["r", "red"], &["g", "green"], &["b", "blue"], &["a", "alpha"], &["y"]];
+
+/// What renderers call the picture itself, in any case, beside its passes.
+const PICTURES: [&str; 3] = ["combined", "rgba", "beauty"];
+
+/// The channels of a layer that begin with the same prefix.
+struct Group<'a> {
+    layer: &'a FlatLayer,
+    /// Without its last dot; may be empty.
+    prefix: String,
+    /// In the order of [`COMPONENTS`].
+    channels: [Option<&'a FlatChannel>; 5],
 }
 
-/// The channel of that name with one sample for each pixel (chroma of a luminance-chroma image has fewer).
-fn find_channel<'a>(layer: &'a FlatLayer, prefix: &str, name: &str) -> Option<&'a AnyChannel<FlatSamples>> {
-    layer.channel_data.list.iter().find(|channel| {
-        string(&channel.name).strip_prefix(prefix) == Some(name)
-            && channel.sample_data.len() == layer.size.0 * layer.size.1
-    })
+impl<'a> Group<'a> {
+    /// All of them, in the order of their prefixes.
+    fn all(layer: &'a FlatLayer) -> impl Iterator<Item = Self> {
+        let mut groups = BTreeMap::<String, [Option<&FlatChannel>; 5]>::new();
+        // Chroma of a luminance-chroma image has fewer samples.
+        let is_full = |channel: &&FlatChannel| channel.sample_data.len() == layer.size.0 * layer.size.1;
+        for channel in layer.channel_data.list.iter().filter(is_full) {
+            let name = string(&channel.name);
+            let (prefix, last) = name.rsplit_once('.').unwrap_or(("", &name));
+            let is_called = |names: &&[&str]| names.iter().any(|name| last.eq_ignore_ascii_case(name));
+            if let Some(component) = COMPONENTS.iter().position(is_called) {
+                groups.entry(prefix.to_owned()).or_default()[component].get_or_insert(channel);
+            }
+        }
+        groups.into_iter().map(move |(prefix, channels)| Group { layer, prefix, channels })
+    }
+
+    fn colour(&self) -> Option<[&'a FlatChannel; 3]> {
+        let [r, g, b, ..] = self.channels;
+        Some([r?, g?, b?])
+    }
+
+    /// The luminance, in the place of colour.
+    fn grey(&self) -> Option<[&'a FlatChannel; 3]> {
+        self.channels[4].map(|luminance| [luminance; 3])
+    }
+
+    /// That of the channels, or else of the part of the file.
+    fn name(&self) -> Cow<'_, str> {
+        match &self.layer.attributes.layer_name {
+            Some(name) if self.prefix.is_empty() => string(name),
+            _ => self.prefix.as_str().into(),
+        }
+    }
+
+    /// Least for the picture itself: no prefix, then a name that renderers give it.
+    fn rank(&self) -> (bool, bool) {
+        let name = self.name();
+        let last = name.rsplit('.').next().unwrap_or_default();
+        (!self.prefix.is_empty(), !PICTURES.iter().any(|picture| last.eq_ignore_ascii_case(picture)))
+    }
 }
 
 /// The texts and numbers among the attributes of image and layer that the format does not define.
@@ -319,7 +359,7 @@ fn attribute_texts(image: &FlatImage, layer: &FlatLayer) -> BTreeMap<String, Str
 #[cfg(test)]
 mod tests {
     use super::*;
-    use exr::prelude::{SpecificChannels, f16};
+    use exr::prelude::{ImageAttributes, Layers, SpecificChannels, f16};
 
     /// The picture that an EXR of 2 x 1 pixels, the first at (3, -1), shows in a window of this place and size.
     fn shown(position: (i32, i32), size: (usize, usize), chromaticities: Option<Chromaticities>) -> PictureFile {
@@ -358,6 +398,42 @@ mod tests {
         // ACEScg's published matrix times (1, 0.5, 0.25).
         let expected = [1.37334, 0.43750, 0.19976, 0.75];
         assert!(picture.rgba[0].iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-3), "{:?}", picture.rgba);
+    }
+
+    /// The red of a picture of one pixel, of channels of these names in parts of these names, whose values are 1, 2, 3 and so on.
+    fn red_of(parts: &[(Option<&str>, &[&str])]) -> f32 {
+        let mut value = 0.0;
+        let layer = |(name, channels): &(Option<&str>, &[&str])| {
+            let channel = |name: &&str| {
+                value += 1.0;
+                AnyChannel::new(utf8(name), FlatSamples::F32(vec![value]))
+            };
+            let channels = AnyChannels::sort(channels.iter().map(channel).collect());
+            let attributes = LayerAttributes { layer_name: name.map(utf8), ..LayerAttributes::default() };
+            Layer::new((1, 1), attributes, Encoding::UNCOMPRESSED, channels)
+        };
+        let layers: Layers<_> = parts.iter().map(layer).collect();
+        let image = Image::from_layers(ImageAttributes::with_size((1, 1)), layers);
+        let mut bytes = Cursor::new(Vec::new());
+        image.write().to_buffered(&mut bytes).unwrap();
+        parse_exr(Path::new("test.exr"), &bytes.into_inner()).unwrap().rgba[0][0]
+    }
+
+    #[test]
+    fn of_several_layers_the_picture_itself_is_taken_and_letters_may_be_of_any_case() {
+        let ao = ["ViewLayer.AO.R", "ViewLayer.AO.G", "ViewLayer.AO.B"];
+        let blender = [&ao[..], &["ViewLayer.Combined.R", "ViewLayer.Combined.G", "ViewLayer.Combined.B"]].concat();
+        let of_one_part = |channels: &[&str]| red_of(&[(Some("all"), channels)]);
+        assert_eq!(of_one_part(&blender), 4.0);
+        assert_eq!(of_one_part(&[&blender[..], &["red", "Green", "BLUE"]].concat()), 7.0);
+        assert_eq!(of_one_part(&["a.r", "a.g", "a.b", "x.Beauty.Red", "x.Beauty.Green", "x.Beauty.Blue"]), 4.0);
+        // Nothing says which, and then the first; depth and directions are no pictures.
+        assert_eq!(of_one_part(&["p.Y", "d.R", "d.G", "d.B", "c.R", "c.G", "c.B"]), 5.0);
+        assert_eq!(of_one_part(&["é.Y"]), 1.0);
+        // Parts are layers too.
+        let rgb = &["R", "G", "B"][..];
+        assert_eq!(red_of(&[(Some("Depth"), &["Z", "Y"]), (Some("AO"), rgb), (Some("RGBA"), rgb)]), 6.0);
+        assert_eq!(red_of(&[(Some("b"), rgb), (Some("a"), rgb)]), 1.0);
     }
 
     /// An EXR of one colour, all half floats.
