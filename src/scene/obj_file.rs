@@ -45,7 +45,7 @@ fn parse_parts(path: &Path, bytes: &[u8], is_textured: bool) -> Result<TexturedM
     // Names in old files are in any encoding; the numbers are ASCII in all of them.
     let text = String::from_utf8_lossy(bytes);
     // Some editors put a byte order mark first, which would be part of the first word.
-    let obj = read_obj(&joined_lines(text.trim_start_matches('\u{feff}')), is_textured)
+    let obj = read_obj(&whole_lines(text.trim_start_matches('\u{feff}')), is_textured)
         .map_err(|problem| Error::in_file(path, problem, "repair or export it again"))?;
     let (textured, dropped) = clean(&obj);
     let mesh = &textured.mesh;
@@ -60,14 +60,14 @@ fn parse_parts(path: &Path, bytes: &[u8], is_textured: bool) -> Result<TexturedM
     Ok(textured)
 }
 
-/// `text` with each line of the mesh that a backslash continues as one. Lines after it keep their numbers. Comments and names, such as that of a
-/// folder, may end in a backslash and go no further.
-fn joined_lines(text: &str) -> Cow<'_, str> {
-    if !text.contains('\\') {
+/// `text` without comments, with each line of the mesh that a backslash continues as one. Lines after it keep their numbers. Comments and
+/// names, such as that of a folder, may end in a backslash and go no further.
+fn whole_lines(text: &str) -> Cow<'_, str> {
+    if !text.contains(['#', '\\']) {
         return text.into();
     }
     let (mut joined, mut continued) = (String::with_capacity(text.len()), 0);
-    for line in text.lines() {
+    for line in text.lines().map(|line| line.split('#').next().unwrap_or_default()) {
         let is_of_mesh =
             continued > 0 || MESH_KEYWORDS.contains(&line.split_ascii_whitespace().next().unwrap_or_default());
         match line.trim_end().strip_suffix('\\').filter(|_| is_of_mesh) {
@@ -248,6 +248,13 @@ mod tests {
         let error = parse("v 0 \\\n0 0\nv 1 0 0\nv 0 1 0\nf 1//9 2 3\n").unwrap_err().to_string();
         assert!(error.contains("line 5"), "{error}");
         assert!(parse("v 0 0 0\nf 1 1 \\").is_err());
+    }
+
+    #[test]
+    fn a_comment_may_end_any_line() {
+        let corners = "v 0 0 0# x\nv 1 0 0 # v 2 2 2\nv 0 1 0\n";
+        let mesh = parse(Path::new("a.obj"), format!("{corners}f 1 2 3 # f 9 9 9 \\\nf 1 \\ # x\n 3 2\n").as_bytes());
+        assert_eq!(mesh.unwrap().indices, [0, 1, 2, 0, 2, 1]);
     }
 
     #[test]
