@@ -21,7 +21,7 @@ pub struct TexturedMesh {
 }
 
 /// What lines of the mesh begin with.
-const MESH_KEYWORDS: [&str; 4] = ["v", "vn", "vt", "f"];
+const MESH_KEYWORDS: [&str; 5] = ["v", "vn", "vt", "f", "s"];
 
 pub(super) const FORMAT: FileFormat<Mesh> =
     FileFormat { extension: "obj", name: "a Wavefront .obj", is_of_format: |_| true, parse };
@@ -39,8 +39,8 @@ fn parse_textured(path: &Path, bytes: &[u8]) -> Result<TexturedMesh> {
 }
 
 /// Reads all triangles and polygons as one mesh; objects, groups, materials and lines are ignored, and so are texture coordinates if they are
-/// not wanted. Polygons become triangles. Where a normal is missing, zero or not finite, the mean normal of the
-/// faces that share the position takes its place, weighted by their angles there. Degenerate triangles are dropped.
+/// not wanted. Polygons become triangles. Where a normal is missing, zero or not finite, the mean normal of the faces that share position and
+/// smoothing group takes its place, weighted by their angles there. Degenerate triangles are dropped.
 fn parse_parts(path: &Path, bytes: &[u8], is_textured: bool) -> Result<TexturedMesh> {
     // Names in old files are in any encoding; the numbers are ASCII in all of them.
     let text = String::from_utf8_lossy(bytes);
@@ -84,13 +84,32 @@ fn whole_lines(text: &str) -> Cow<'_, str> {
     joined.into()
 }
 
+/// Which faces a normal that is missing is the mean of.
+#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+enum SmoothingGroup {
+    /// Those before which nothing is said of it.
+    Unsaid,
+    /// Those of this number.
+    Numbered(u32),
+    /// The one of this index.
+    Flat(u32),
+}
+
+/// What an OBJ says of faces.
+struct Obj {
+    mesh: tobj::Mesh,
+    /// That of each face.
+    smoothing_groups: Vec<SmoothingGroup>,
+}
+
 /// The faces in the text of an OBJ, each corner with an index into the positions and one into the normals; a corner
 /// without a normal has one of length 0. If `is_textured` each has an index into the texture coordinates too, which are NaN where it has
 /// none. The error is what is wrong.
-fn read_obj(text: &str, is_textured: bool) -> Result<tobj::Mesh, String> {
+fn read_obj(text: &str, is_textured: bool) -> Result<Obj, String> {
+    let (lines, smoothing_groups) = geometry_lines(text, is_textured)?;
     let options = tobj::LoadOptions::default();
     let no_materials = |_: &Path| Ok(Default::default());
-    let (models, _) = tobj::load_obj_buf(&mut geometry_lines(text, is_textured)?.as_bytes(), &options, no_materials)
+    let (models, _) = tobj::load_obj_buf(&mut lines.as_bytes(), &options, no_materials)
         .map_err(|cause| format!("is not a sound OBJ: {cause}"))?;
     // Without o, g and usemtl there is one model.
     let mesh = models.into_iter().next().map(|model| model.mesh).unwrap_or_default();
@@ -99,34 +118,44 @@ fn read_obj(text: &str, is_textured: bool) -> Result<tobj::Mesh, String> {
     }
     match vectors(&mesh.positions).into_iter().find(|position| !position.is_finite()) {
         Some(position) => Err(format!("has a vertex that is not finite, {position}")),
-        None => Ok(mesh),
+        None => Ok(Obj { mesh, smoothing_groups }),
     }
 }
 
 /// The lines of an OBJ that are the mesh, such that tobj reads them right: of `v` the coordinates, `vn`, and `f` with its
 /// corners as `position//normal`; if `is_textured` also `vt` with two coordinates, and corners as `position/vt/normal`.
+/// What `s` says comes beside them, for each face.
 ///
 /// The rest goes since tobj takes polylines (`l`) for faces, wants colours for all vertices or none, and begins a new mesh at
 /// every group and material, whose vertices then are no longer shared. Corners without a normal get one of length 0,
 /// the last in the file, as from tobj they would get that of the corner before; those without texture coordinates get NaN in the same way.
 /// Indices of both are checked here: unlike those of positions, tobj takes 0 for none, and multiplies absurd ones until they overflow.
-fn geometry_lines(text: &str, is_textured: bool) -> Result<String, String> {
+fn geometry_lines(text: &str, is_textured: bool) -> Result<(String, Vec<SmoothingGroup>), String> {
     let count_of = |keyword: &str| {
         let is_one = |line: &&str| line.split_ascii_whitespace().next() == Some(keyword);
         text.lines().filter(is_one).count() as i64
     };
     let (normals, uvs) = (count_of("vn"), count_of("vt"));
     let (mut lines, mut normals_before, mut uvs_before) = (String::with_capacity(text.len()), 0, 0);
+    let (mut groups, mut group) = (Vec::new(), SmoothingGroup::Unsaid);
     for (index, line) in text.lines().enumerate() {
         let mut words = line.split_ascii_whitespace();
         let Some(keyword) = words.next().filter(|word| MESH_KEYWORDS.contains(word)) else { continue };
         if keyword == "vt" && !is_textured {
             continue;
         }
+        if keyword == "s" {
+            // Some programs write `on`.
+            let number = |word: &str| if word == "off" { 0 } else { word.parse().unwrap_or(1) };
+            group = SmoothingGroup::Numbered(words.next().map_or(1, number));
+            continue;
+        }
         lines += keyword;
         normals_before += i64::from(keyword == "vn");
         uvs_before += i64::from(keyword == "vt");
         if keyword == "f" {
+            let is_flat = group == SmoothingGroup::Numbered(0);
+            groups.push(if is_flat { SmoothingGroup::Flat(groups.len() as u32) } else { group });
             for word in words {
                 let mut numbers = word.split('/');
                 let position = numbers.next().unwrap_or_default();
@@ -152,7 +181,7 @@ fn geometry_lines(text: &str, is_textured: bool) -> Result<String, String> {
         }
         lines.push('\n');
     }
-    Ok(lines + if is_textured { "vn 0 0 0\nvt nan nan\n" } else { "vn 0 0 0\n" })
+    Ok((lines + if is_textured { "vn 0 0 0\nvt nan nan\n" } else { "vn 0 0 0\n" }, groups))
 }
 
 /// What `number`, the word of an index, stands for among `count` things of which so many are `before` it: the one after all if it is empty.
@@ -165,17 +194,17 @@ fn index_among(number: &str, count: i64, before: i64) -> Result<i64, &str> {
 }
 
 /// Joins corners with the same position, normal and texture coordinates into vertices; gives also the number of dropped triangles.
-fn clean(obj: &tobj::Mesh) -> (TexturedMesh, usize) {
+fn clean(Obj { mesh: obj, smoothing_groups }: &Obj) -> (TexturedMesh, usize) {
     let (positions, normals) = (vectors(&obj.positions), vectors(&obj.normals));
     // Normals that are none count as missing.
     let normal_at = |index: u32| {
         let normal = normals[index as usize].as_dvec3();
         (normal.is_finite() && normal.length_squared() > 0.0).then(|| normal.normalize())
     };
-    let mut mean_normals = vec![DVec3::ZERO; positions.len()];
+    let mut mean_normals = HashMap::<_, DVec3>::new();
     let mut vertices = HashMap::new();
     let (mut mesh, mut uvs, mut dropped, mut missing) = (Mesh::default(), Vec::new(), 0, Vec::new());
-    for corners in triangles(obj, &positions) {
+    for (face, corners) in triangles(obj, &positions) {
         let triangle = corners.map(|corner| obj.indices[corner]);
         let [a, b, c] = triangle.map(|position| positions[position as usize].as_dvec3());
         let area = (b - a).cross(c - a);
@@ -185,19 +214,17 @@ fn clean(obj: &tobj::Mesh) -> (TexturedMesh, usize) {
             dropped += 1;
             continue;
         }
-        let face_normal = area.normalize();
+        let (face_normal, group) = (area.normalize(), smoothing_groups[face]);
         for (&position, [at, next, before]) in triangle.iter().zip([[a, b, c], [b, c, a], [c, a, b]]) {
-            mean_normals[position as usize] += (next - at).angle_between(before - at) * face_normal;
+            *mean_normals.entry((position, group)).or_default() += (next - at).angle_between(before - at) * face_normal;
         }
         for (corner, position) in corners.into_iter().zip(triangle) {
             let normal = obj.normal_indices[corner];
-            let normal = normal_at(normal).map(|direction| (normal, direction));
+            let normal = normal_at(normal).map(|direction| (normal, direction)).ok_or((position, group));
             let uv = obj.texcoord_indices.get(corner).copied();
             let index = *vertices.entry((position, normal.map(|(index, _)| index), uv)).or_insert_with(|| {
                 uvs.extend(uv.map(|uv| Vec2::from_slice(&obj.texcoords[2 * uv as usize..])));
-                if normal.is_none() {
-                    missing.push((mesh.positions.len(), position));
-                }
+                missing.extend(normal.err().map(|mean| (mesh.positions.len(), mean)));
                 mesh.positions.push(positions[position as usize]);
                 mesh.normals.push(normal.map(|(_, direction)| direction).unwrap_or_default().as_vec3());
                 mesh.positions.len() as u32 - 1
@@ -205,27 +232,30 @@ fn clean(obj: &tobj::Mesh) -> (TexturedMesh, usize) {
             mesh.indices.push(index);
         }
     }
-    for (vertex, position) in missing {
+    for (vertex, mean) in missing {
         // Faces back to back cancel: any direction is as good, as long as it is one.
-        mesh.normals[vertex] = mean_normals[position as usize].try_normalize().unwrap_or(DVec3::Y).as_vec3();
+        mesh.normals[vertex] = mean_normals[&mean].try_normalize().unwrap_or(DVec3::Y).as_vec3();
     }
     (TexturedMesh { mesh, uvs }, dropped)
 }
 
-/// The triangles that the faces of `obj` consist of, as places of their corners in its indices. Faces of fewer than three corners have none.
-fn triangles(obj: &tobj::Mesh, positions: &[Vec3]) -> Vec<[usize; 3]> {
+/// The triangles that the faces of `obj` consist of: the index of the face, and the places of their corners in the indices of `obj`. Faces of
+/// fewer than three corners have none.
+fn triangles(obj: &tobj::Mesh, positions: &[Vec3]) -> Vec<(usize, [usize; 3])> {
     // No numbers of corners are given if all faces are triangles.
     if obj.face_arities.is_empty() {
-        return (0..obj.indices.len() / 3).map(|face| std::array::from_fn(|corner| 3 * face + corner)).collect();
+        let corners = |face| std::array::from_fn(|corner| 3 * face + corner);
+        return (0..obj.indices.len() / 3).map(|face| (face, corners(face))).collect();
     }
     let mut next = 0;
-    let triangles_of_face = |&arity: &u32| {
+    let triangles_of_face = |(face, &arity): (usize, &u32)| {
         let first = next;
         next += arity as usize;
         let polygon = obj.indices[first..next].iter().map(|&position| positions[position as usize].as_dvec3());
-        triangles_of(&polygon.collect::<Vec<_>>()).into_iter().map(move |corners| corners.map(|corner| first + corner))
+        let triangles = triangles_of(&polygon.collect::<Vec<_>>()).into_iter();
+        triangles.map(move |corners| (face, corners.map(|corner| first + corner)))
     };
-    obj.face_arities.iter().flat_map(triangles_of_face).collect()
+    obj.face_arities.iter().enumerate().flat_map(triangles_of_face).collect()
 }
 
 /// Every three numbers as a vector.
@@ -258,6 +288,35 @@ mod tests {
     }
 
     #[test]
+    fn missing_normals_are_smoothed_as_smoothing_groups_say() {
+        // Two faces of a cube, which meet in the edge from (1, 0, 0) to (1, 1, 0).
+        let corners = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 1 0 1\nv 1 1 1\nvn 0.6 0 0.8\n";
+        let normals = |faces: &str| {
+            let Mesh { positions, normals, indices, .. } =
+                parse(Path::new("a.obj"), format!("{corners}{faces}").as_bytes()).unwrap();
+            let at_edge = |&&index: &&u32| positions[index as usize].x == 1.0 && positions[index as usize].z == 0.0;
+            indices.iter().filter(at_edge).map(|&index| normals[index as usize]).collect::<Vec<_>>()
+        };
+        let (up, right, between) = (Vec3::Z, -Vec3::X, Vec3::new(-1.0, 0.0, 1.0).normalize());
+        let check = |faces: &str, expected: &[Vec3]| {
+            let found = normals(faces);
+            assert!(found.iter().all(|normal| expected.iter().any(|one| one.distance(*normal) < 1e-6)), "{faces} {found:?}");
+            assert!(expected.iter().all(|one| found.iter().any(|normal| one.distance(*normal) < 1e-6)), "{faces} {found:?}");
+        };
+        let (bottom, side) = ("f 1 2 3 4\n", "f 2 5 6 3\n");
+        check(&format!("{bottom}{side}"), &[between]);
+        check(&format!("s 1\n{bottom}{side}"), &[between]);
+        check(&format!("s on\n{bottom}s 1\n{side}"), &[between]);
+        check(&format!("s off\n{bottom}{side}"), &[up, right]);
+        check(&format!("s 0\n{bottom}{side}"), &[up, right]);
+        check(&format!("s 1\n{bottom}s 2\n{side}"), &[up, right]);
+        check(&format!("{bottom}s off\n{side}"), &[up, right]);
+        check(&format!("s off\n{bottom}s 3\n{side}s 4\n{bottom}s 3\n{bottom}"), &[up, between]);
+        // Normals of the file count whatever it says.
+        check(&format!("s off\nf 1//1 2//1 3//1 4//1\n{side}"), &[Vec3::new(0.6, 0.0, 0.8), right]);
+    }
+
+    #[test]
     fn no_mixture_of_hostile_words_panics_or_gives_a_mesh_that_cannot_be_drawn() {
         const WORDS: &[&str] = &[
             "\nv",
@@ -272,6 +331,8 @@ mod tests {
             "\ng a",
             "\nusemtl",
             "\nmtllib",
+            "\ns off",
+            "\ns 2",
             "#",
             "",
             "0",
