@@ -42,7 +42,10 @@ fn parse_textured(path: &Path, bytes: &[u8]) -> Result<TexturedMesh> {
 /// not wanted. Polygons become triangles. Where a normal is missing, zero or not finite, the mean normal of the faces that share position and
 /// smoothing group takes its place, weighted by their angles there. Degenerate triangles are dropped.
 fn parse_parts(path: &Path, bytes: &[u8], is_textured: bool) -> Result<TexturedMesh> {
-    // Names in old files are in any encoding; the numbers are ASCII in all of them.
+    if [[0xff, 0xfe], [0xfe, 0xff]].iter().any(|mark| bytes.starts_with(mark)) {
+        return Err(Error::in_file(path, "is text in UTF-16", "save it as UTF-8"));
+    }
+    // Names in old files are in any encoding; the numbers are ASCII in all of the others.
     let text = String::from_utf8_lossy(bytes);
     // Some editors put a byte order mark first, which would be part of the first word.
     let obj = read_obj(&whole_lines(text.trim_start_matches('\u{feff}')), is_textured)
@@ -60,14 +63,16 @@ fn parse_parts(path: &Path, bytes: &[u8], is_textured: bool) -> Result<TexturedM
     Ok(textured)
 }
 
-/// `text` without comments, with each line of the mesh that a backslash continues as one. Lines after it keep their numbers. Comments and
-/// names, such as that of a folder, may end in a backslash and go no further.
+/// `text` without comments, its lines ended by LF, and each line of the mesh that a backslash continues as one. Lines after it keep their
+/// numbers. Comments and names, such as that of a folder, may end in a backslash and go no further.
 fn whole_lines(text: &str) -> Cow<'_, str> {
-    if !text.contains(['#', '\\']) {
+    if !text.contains(['#', '\\', '\r']) {
         return text.into();
     }
     let (mut joined, mut continued) = (String::with_capacity(text.len()), 0);
-    for line in text.lines().map(|line| line.split('#').next().unwrap_or_default()) {
+    // What is left of CR are ends of lines of old Macs.
+    for line in text.lines().flat_map(|line| line.split('\r')) {
+        let line = line.split('#').next().unwrap_or_default();
         let is_of_mesh =
             continued > 0 || MESH_KEYWORDS.contains(&line.split_ascii_whitespace().next().unwrap_or_default());
         match line.trim_end().strip_suffix('\\').filter(|_| is_of_mesh) {
@@ -288,6 +293,17 @@ mod tests {
     }
 
     #[test]
+    fn lines_may_end_in_any_of_three_ways() {
+        let text = "# x\nv 0 0 0\nv 1 0 0\nv 0 1 \\\n0\nf 1 2 3\n";
+        for end in ["\n", "\r\n", "\r"] {
+            let parse = |text: &str| parse(Path::new("a.obj"), text.replace('\n', end).as_bytes());
+            assert_eq!(parse(text).unwrap().positions.len(), 3, "{end:?}");
+            let error = parse(&format!("{text}f 1//9 2 3\n")).unwrap_err().to_string();
+            assert!(error.contains("line 7"), "{end:?} {error}");
+        }
+    }
+
+    #[test]
     fn missing_normals_are_smoothed_as_smoothing_groups_say() {
         // Two faces of a cube, which meet in the edge from (1, 0, 0) to (1, 1, 0).
         let corners = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 1 0 1\nv 1 1 1\nvn 0.6 0 0.8\n";
@@ -297,23 +313,24 @@ mod tests {
             let at_edge = |&&index: &&u32| positions[index as usize].x == 1.0 && positions[index as usize].z == 0.0;
             indices.iter().filter(at_edge).map(|&index| normals[index as usize]).collect::<Vec<_>>()
         };
-        let (up, right, between) = (Vec3::Z, -Vec3::X, Vec3::new(-1.0, 0.0, 1.0).normalize());
+        let (up, left, between) = (Vec3::Z, -Vec3::X, Vec3::new(-1.0, 0.0, 1.0).normalize());
         let check = |faces: &str, expected: &[Vec3]| {
             let found = normals(faces);
-            assert!(found.iter().all(|normal| expected.iter().any(|one| one.distance(*normal) < 1e-6)), "{faces} {found:?}");
-            assert!(expected.iter().all(|one| found.iter().any(|normal| one.distance(*normal) < 1e-6)), "{faces} {found:?}");
+            let are_among =
+                |some: &[Vec3], all: &[Vec3]| some.iter().all(|one| all.iter().any(|other| one.distance(*other) < 1e-6));
+            assert!(are_among(&found, expected) && are_among(expected, &found), "{faces} {found:?}");
         };
         let (bottom, side) = ("f 1 2 3 4\n", "f 2 5 6 3\n");
         check(&format!("{bottom}{side}"), &[between]);
         check(&format!("s 1\n{bottom}{side}"), &[between]);
         check(&format!("s on\n{bottom}s 1\n{side}"), &[between]);
-        check(&format!("s off\n{bottom}{side}"), &[up, right]);
-        check(&format!("s 0\n{bottom}{side}"), &[up, right]);
-        check(&format!("s 1\n{bottom}s 2\n{side}"), &[up, right]);
-        check(&format!("{bottom}s off\n{side}"), &[up, right]);
+        check(&format!("s off\n{bottom}{side}"), &[up, left]);
+        check(&format!("s 0\n{bottom}{side}"), &[up, left]);
+        check(&format!("s 1\n{bottom}s 2\n{side}"), &[up, left]);
+        check(&format!("{bottom}s off\n{side}"), &[up, left]);
         check(&format!("s off\n{bottom}s 3\n{side}s 4\n{bottom}s 3\n{bottom}"), &[up, between]);
         // Normals of the file count whatever it says.
-        check(&format!("s off\nf 1//1 2//1 3//1 4//1\n{side}"), &[Vec3::new(0.6, 0.0, 0.8), right]);
+        check(&format!("s off\nf 1//1 2//1 3//1 4//1\n{side}"), &[Vec3::new(0.6, 0.0, 0.8), left]);
     }
 
     #[test]

@@ -28,6 +28,10 @@ fn hostile_meshes_are_refused() {
         fs::write(folder.path().join(name), text).unwrap();
         refuses(&folder, &render(&format!("--mesh {name}")), &[name]);
     }
+    for (name, mark) in [("little_endian.obj", [0xff, 0xfe]), ("big_endian.obj", [0xfe, 0xff])] {
+        fs::write(folder.path().join(name), [&mark[..], b"v\0"].concat()).unwrap();
+        refuses(&folder, &render(&format!("--mesh {name}")), &[name, "UTF-16"]);
+    }
     fs::create_dir(folder.path().join("folder.obj")).unwrap();
     fs::write(folder.path().join("noise.obj"), noise(4096)).unwrap();
     for name in ["folder.obj", "missing.obj", "noise.obj"] {

@@ -173,6 +173,7 @@ pub fn mesh() -> Reader {
             "/",
             " 0 0 0",
             "\r\n",
+            "\r",
             "\\\n",
             "#",
             "\ns off\n",
