@@ -59,7 +59,14 @@ impl UiPainter {
         let command_pool =
             unsafe { device.raw.create_command_pool(&info, None) }.during("vkCreateCommandPool", "panel")?;
         device.set_name(command_pool, "panel");
-        Ok(Self { renderer, textures: HashMap::new(), unused: Vec::new(), command_pool, format, device: device.clone() })
+        Ok(Self {
+            renderer,
+            textures: HashMap::new(),
+            unused: Vec::new(),
+            command_pool,
+            format,
+            device: device.clone(),
+        })
     }
 
     /// Brings the textures (glyphs, above all) up to date, before the frame that needs them is recorded. That may draw those that are to be
