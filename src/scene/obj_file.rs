@@ -40,7 +40,8 @@ fn parse_textured(path: &Path, bytes: &[u8]) -> Result<TexturedMesh> {
 
 /// Reads all triangles and polygons as one mesh; objects, groups, materials and lines are ignored, and so are texture coordinates if they are
 /// not wanted. Polygons become triangles. Where a normal is missing, zero or not finite, the mean normal of the faces that share position and
-/// smoothing group takes its place, weighted by their angles there. Degenerate triangles are dropped.
+/// smoothing group takes its place, weighted by their angles there; of a sheet that has every face twice, once
+/// reversed, those of one side. Degenerate triangles are dropped.
 fn parse_parts(path: &Path, bytes: &[u8], is_textured: bool) -> Result<TexturedMesh> {
     if [[0xff, 0xfe], [0xfe, 0xff]].iter().any(|mark| bytes.starts_with(mark)) {
         return Err(Error::in_file(path, "is text in UTF-16", "save it as UTF-8"));
@@ -198,6 +199,36 @@ fn index_among(number: &str, count: i64, before: i64) -> Result<i64, &str> {
     index.filter(|index| (1..=count).contains(index) || (-before..0).contains(index)).ok_or(number)
 }
 
+/// The sum of normals of faces, weighted.
+#[derive(Default)]
+struct MeanNormal {
+    sum: DVec3,
+    /// The same with each normal turned to the side of those before.
+    front: DVec3,
+    weight: f64,
+}
+
+impl MeanNormal {
+    /// Where the faces of two sides cancel, less than this part of their weight is left, and is rounding.
+    const CANCELLED: f64 = 1e-3;
+
+    fn add(&mut self, weight: f64, normal: DVec3) {
+        let normal = weight * normal;
+        self.sum += normal;
+        self.front += if normal.dot(self.front) < 0.0 { -normal } else { normal };
+        self.weight += weight;
+    }
+
+    /// What a face of this normal has there, and whether that is the normal of the sheet's back.
+    fn of_face(&self, normal: DVec3) -> (DVec3, bool) {
+        if self.sum.length() > Self::CANCELLED * self.weight {
+            return (self.sum.normalize(), false);
+        }
+        let (front, is_back) = (self.front.normalize(), normal.dot(self.front) < 0.0);
+        (if is_back { -front } else { front }, is_back)
+    }
+}
+
 /// Joins corners with the same position, normal and texture coordinates into vertices; gives also the number of dropped triangles.
 fn clean(Obj { mesh: obj, smoothing_groups }: &Obj) -> (TexturedMesh, usize) {
     let (positions, normals) = (vectors(&obj.positions), vectors(&obj.normals));
@@ -206,9 +237,8 @@ fn clean(Obj { mesh: obj, smoothing_groups }: &Obj) -> (TexturedMesh, usize) {
         let normal = normals[index as usize].as_dvec3();
         (normal.is_finite() && normal.length_squared() > 0.0).then(|| normal.normalize())
     };
-    let mut mean_normals = HashMap::<_, DVec3>::new();
-    let mut vertices = HashMap::new();
-    let (mut mesh, mut uvs, mut dropped, mut missing) = (Mesh::default(), Vec::new(), 0, Vec::new());
+    let mut mean_normals = HashMap::<_, MeanNormal>::new();
+    let (mut kept, mut dropped) = (Vec::new(), 0);
     for (face, corners) in triangles(obj, &positions) {
         let triangle = corners.map(|corner| obj.indices[corner]);
         let [a, b, c] = triangle.map(|position| positions[position as usize].as_dvec3());
@@ -221,25 +251,32 @@ fn clean(Obj { mesh: obj, smoothing_groups }: &Obj) -> (TexturedMesh, usize) {
         }
         let (face_normal, group) = (area.normalize(), smoothing_groups[face]);
         for (&position, [at, next, before]) in triangle.iter().zip([[a, b, c], [b, c, a], [c, a, b]]) {
-            *mean_normals.entry((position, group)).or_default() += (next - at).angle_between(before - at) * face_normal;
+            let angle = (next - at).angle_between(before - at);
+            mean_normals.entry((position, group)).or_default().add(angle, face_normal);
         }
+        kept.push((corners, triangle, face_normal, group));
+    }
+    let mut vertices = HashMap::new();
+    let (mut mesh, mut uvs) = (Mesh::default(), Vec::new());
+    for (corners, triangle, face_normal, group) in kept {
         for (corner, position) in corners.into_iter().zip(triangle) {
-            let normal = obj.normal_indices[corner];
-            let normal = normal_at(normal).map(|direction| (normal, direction)).ok_or((position, group));
+            let index = obj.normal_indices[corner];
+            let (normal, direction) = match normal_at(index) {
+                Some(direction) => (Ok(index), direction),
+                None => {
+                    let (direction, is_back) = mean_normals[&(position, group)].of_face(face_normal);
+                    (Err((group, is_back)), direction)
+                }
+            };
             let uv = obj.texcoord_indices.get(corner).copied();
-            let index = *vertices.entry((position, normal.map(|(index, _)| index), uv)).or_insert_with(|| {
+            let index = *vertices.entry((position, normal, uv)).or_insert_with(|| {
                 uvs.extend(uv.map(|uv| Vec2::from_slice(&obj.texcoords[2 * uv as usize..])));
-                missing.extend(normal.err().map(|mean| (mesh.positions.len(), mean)));
                 mesh.positions.push(positions[position as usize]);
-                mesh.normals.push(normal.map(|(_, direction)| direction).unwrap_or_default().as_vec3());
+                mesh.normals.push(direction.as_vec3());
                 mesh.positions.len() as u32 - 1
             });
             mesh.indices.push(index);
         }
-    }
-    for (vertex, mean) in missing {
-        // Faces back to back cancel: any direction is as good, as long as it is one.
-        mesh.normals[vertex] = mean_normals[&mean].try_normalize().unwrap_or(DVec3::Y).as_vec3();
     }
     (TexturedMesh { mesh, uvs }, dropped)
 }
@@ -288,8 +325,8 @@ mod tests {
     #[test]
     fn a_comment_may_end_any_line() {
         let corners = "v 0 0 0# x\nv 1 0 0 # v 2 2 2\nv 0 1 0\n";
-        let mesh = parse(Path::new("a.obj"), format!("{corners}f 1 2 3 # f 9 9 9 \\\nf 1 \\ # x\n 3 2\n").as_bytes());
-        assert_eq!(mesh.unwrap().indices, [0, 1, 2, 0, 2, 1]);
+        let mesh = parse(Path::new("a.obj"), format!("{corners}f 1 2 3 # f 9 9 9 \\\nf 1 \\ # x\n 2 3\n").as_bytes());
+        assert_eq!(mesh.unwrap().indices, [0, 1, 2, 0, 1, 2]);
     }
 
     #[test]
@@ -331,6 +368,39 @@ mod tests {
         check(&format!("s off\n{bottom}s 3\n{side}s 4\n{bottom}s 3\n{bottom}"), &[up, between]);
         // Normals of the file count whatever it says.
         check(&format!("s off\nf 1//1 2//1 3//1 4//1\n{side}"), &[Vec3::new(0.6, 0.0, 0.8), left]);
+    }
+
+    #[test]
+    fn a_sheet_with_both_sides_is_as_smooth_as_one_with_its_front_alone() {
+        let at = |x: u32, y: u32| x + 9 * y + 1;
+        let mut corners = String::new();
+        for (y, x) in (0..9).flat_map(|y| (0..9).map(move |x| (y, x))) {
+            corners += &format!("v {x} {y} {}\n", (f64::from(x) * 0.7 + f64::from(y) * 0.2).sin());
+        }
+        let quads = (0..8).flat_map(|y| (0..8).map(move |x| [at(x, y), at(x + 1, y), at(x + 1, y + 1), at(x, y + 1)]));
+        let quads: Vec<_> = quads.collect();
+        let face = |[a, b, c, d]: [u32; 4]| format!("f {a} {b} {c}\nf {a} {c} {d}\n");
+        let back = |[a, b, c, d]: [u32; 4]| format!("f {c} {b} {a}\nf {d} {c} {a}\n");
+        // Either side may come first anywhere.
+        let both = |(index, &quad): (usize, &[u32; 4])| match index % 2 {
+            0 => face(quad) + &back(quad),
+            _ => back(quad) + &face(quad),
+        };
+        let parse = |faces: String| parse(Path::new("a.obj"), (corners.clone() + &faces).as_bytes()).unwrap();
+        let single = parse(quads.iter().map(|&quad| face(quad)).collect());
+        for smoothing in ["", "s 1\n"] {
+            let double = parse(smoothing.to_owned() + &quads.iter().enumerate().map(both).collect::<String>());
+            assert_eq!((double.positions.len(), double.indices.len()), (2 * 81, 2 * single.indices.len()));
+            for triangle in double.indices.as_chunks().0 {
+                let [a, b, c] = triangle.map(|index| double.positions[index as usize]);
+                let side = (b - a).cross(c - a).z.signum();
+                for index in triangle.map(|index| index as usize) {
+                    let alone = single.positions.iter().position(|position| *position == double.positions[index]);
+                    let expected = side * single.normals[alone.unwrap()];
+                    assert!(double.normals[index].distance(expected) < 1e-6, "{} {expected}", double.normals[index]);
+                }
+            }
+        }
     }
 
     #[test]
