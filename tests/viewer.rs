@@ -419,6 +419,47 @@ fn a_window_goes_through_any_number_of_sizes() {
 }
 
 #[test]
+fn sizes_that_no_picture_has_are_told_and_the_window_stays_as_it_is() {
+    let Some(viewer) = Viewer::new() else { return };
+    let replay = r#""wait"
+        {"set": {"size": [20000, 20000]}}
+        {"resize": [100000, 100000]}
+        {"set": {"size": [0, 0]}}
+        "wait"
+        {"save_scene": "scene.toml"}
+        "quit""#;
+    let ended = viewer.play(&["--size", "200x250", "--method", "cosine", "--environment", "white"], replay);
+    assert!(
+        !ended.success && ended.log.last().is_some_and(|line| line.contains("3 of what it asks for")),
+        "{:#?}",
+        ended.log
+    );
+    for side in ["20000", "100000", "0"] {
+        let problem = format!("size: {side} is out of range");
+        assert!(ended.log.iter().any(|line| line.contains(&problem)), "{problem}: {:#?}", ended.log);
+    }
+    let scene = std::fs::read_to_string(viewer.path("scene.toml")).expect("a scene");
+    assert!(scene.contains("width = 200") && scene.contains("height = 250"), "{scene}");
+}
+
+#[test]
+fn a_window_is_no_larger_than_images_can_be() {
+    let Some(viewer) = Viewer::new() else { return };
+    // With the panel both have more columns than the widest image of lavapipe, which has 16384.
+    let replay = r#""wait"
+        {"resize": [16384, 250]}
+        "wait"
+        {"save_scene": "wide.toml"}
+        "quit""#;
+    let ended = viewer.play(&["--size", "16384x240", "--method", "cosine", "--environment", "white"], replay);
+    assert!(ended.log.iter().all(|line| !line.contains("validation")), "{:#?}", ended.log);
+    let last = ended.log.last().expect("a log");
+    assert!(last.contains("1 of what it asks for") && last.contains("16684 x 250 is out of range"), "{:#?}", ended.log);
+    let scene = std::fs::read_to_string(viewer.path("wide.toml")).expect("a scene");
+    assert!(scene.contains("width = 16084") && scene.contains("height = 240"), "{scene}");
+}
+
+#[test]
 fn a_window_wider_than_images_of_its_sub_pixels_shows_a_coarser_picture() {
     let Some(viewer) = Viewer::new() else { return };
     // The widest image of lavapipe has 16384 columns.

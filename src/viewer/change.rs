@@ -137,8 +137,8 @@ impl Change {
             Self::Pattern(pattern) => shading.pattern = *pattern,
             Self::Seed(seed) => shading.seed = *seed,
             Self::Size(width, height) => {
-                let side = |side| within("size", side, &(1..=MAX_SIZE_PX));
-                (image.width, image.height) = (side(*width)?, side(*height)?);
+                check_size([*width, *height])?;
+                (image.width, image.height) = (*width, *height);
             }
             Self::Subpixels(side) => image.subpixels = within("subpixels", *side, &(1..=MAX_SUBPIXELS))?,
             Self::Exposure(factor) => image.exposure = within("exposure", *factor, &EXPOSURE)?,
@@ -163,6 +163,11 @@ impl Change {
 /// The largest number of threads or samples that `method` can have in `scene`.
 pub fn most_count(method: Method, scene: &Scene) -> u32 {
     method.max_count(scene.image.subpixels).min(MAX_SAMPLES)
+}
+
+/// An error for columns and rows that no picture has.
+pub(super) fn check_size(size: [u32; 2]) -> Result<()> {
+    size.into_iter().try_for_each(|side| within("size", side, &(1..=MAX_SIZE_PX)).map(drop))
 }
 
 /// `value` if it is in `range`: no range holds NaN.

@@ -1,5 +1,5 @@
 //! The window: what winit tells becomes inputs, and frames are drawn when there is something new.
-use super::change::Change;
+use super::change::{Change, check_size};
 use super::input::{Input, Scroll};
 use super::interaction::Viewer;
 use super::keyboard::input_of;
@@ -11,7 +11,7 @@ use super::{ViewerSettings, failed};
 use crate::memo::Memo;
 use crate::output;
 use crate::passes::Area;
-use crate::scene::Scene;
+use crate::scene::{MAX_SIZE_PX, Scene};
 use crate::vulkan::{Device, Instance, Messages, Surface, UiFrame};
 use crate::{Error, Result};
 use egui::{TexturesDelta, ViewportId};
@@ -202,10 +202,49 @@ impl Open {
     fn fit_picture(&mut self) {
         let PhysicalSize { width, height } = self.window.inner_size();
         let panel = (f64::from(panel::WIDTH) * self.window.scale_factor()).ceil() as u32;
+        let longest = self.longest_side();
+        if width.max(height) > longest {
+            tracing::warn!(
+                "a window of {width} x {height} is larger than {longest} x {longest}, which the device can draw"
+            );
+            let _ = self.window.request_inner_size(PhysicalSize::new(width.min(longest), height.min(longest)));
+        }
         // A minimised window has no area; the picture keeps its.
         if width > panel && height > 0 {
-            self.viewer.resize(Area { left: 0, top: 0, width: width - panel, height });
+            // What is past the largest picture stays empty.
+            let [width, height] = [width - panel, height].map(|side| side.min(MAX_SIZE_PX));
+            self.viewer.resize(Area { left: 0, top: 0, width, height });
         }
+    }
+
+    /// Columns or rows that a window can have: it is drawn as one image.
+    fn longest_side(&self) -> u32 {
+        self.viewer.device().limits().max_image_dimension2_d
+    }
+
+    /// Asks the window system for a window whose picture has this size.
+    ///
+    /// # Errors
+    /// A size that no picture has, or that is too large beside the panel.
+    fn request_size(&mut self, size: [u32; 2]) -> Result<()> {
+        check_size(size)?;
+        let window = window_size(size, self.window.scale_factor());
+        let longest = self.longest_side();
+        if window.width.max(window.height) > longest {
+            let problem = format!("with the panel, {} x {} is out of range", window.width, window.height);
+            return Err(Error::input(
+                "size",
+                problem,
+                format!("the device draws windows of up to {longest} x {longest}"),
+            ));
+        }
+        if let Some(size) = self.window.request_inner_size(window) {
+            tracing::debug!("the window is {} x {} at once", size.width, size.height);
+            self.stage.window_changed();
+            self.fit_picture();
+        }
+        self.script.resizing = Some((size, Instant::now() + RESIZE_PATIENCE));
+        Ok(())
     }
 
     fn redraw(&mut self) {
@@ -303,13 +342,9 @@ impl Open {
             }
             Input::Quit => return Ok(true),
             Input::Resize(width, height) | Input::Set(Change::Size(width, height)) => {
-                let size = window_size([*width, *height], self.window.scale_factor());
-                if let Some(size) = self.window.request_inner_size(size) {
-                    tracing::debug!("the window is {} x {} at once", size.width, size.height);
-                    self.stage.window_changed();
-                    self.fit_picture();
+                if let Err(error) = self.request_size([*width, *height]) {
+                    self.viewer.tell_error(&error);
                 }
-                self.script.resizing = Some(([*width, *height], Instant::now() + RESIZE_PATIENCE));
             }
             Input::Minimise(minimise) => {
                 self.window.set_minimized(*minimise);

@@ -142,7 +142,7 @@ impl Swapchain {
     }
 
     /// The next image to draw, of about `size` in pixels (the window's; where the window system knows better, it decides).
-    /// None while the window has no area or the window system has no image to give: then it is worth asking again in a while.
+    /// None while the window has no area, or more than an image can have, or the window system has no image to give: then it is worth asking again in a while.
     /// `frames` is waited for until it has a place for the frame.
     ///
     /// # Errors
@@ -220,7 +220,7 @@ impl Swapchain {
         self.surface.renew()
     }
 
-    /// Makes the images anew for the window as it is now. False if it has no area.
+    /// Makes the images anew for the window as it is now. False if it has no area, or more than an image can have.
     fn renew(&mut self, size: [u32; 2]) -> Result<bool> {
         let capabilities = match self.capabilities() {
             Err(VulkanError::Call { result: vk::Result::ERROR_SURFACE_LOST_KHR, .. }) => {
@@ -230,15 +230,16 @@ impl Swapchain {
             other => other?,
         };
         let vk::SurfaceCapabilitiesKHR { current_extent, min_image_extent, max_image_extent, .. } = capabilities;
+        let longest = self.device.limits().max_image_dimension2_d;
         // Where the images decide the size of the window (Wayland), the extent is said to be undefined.
         let extent = match current_extent.width {
             u32::MAX => vk::Extent2D {
-                width: size[0].clamp(min_image_extent.width, max_image_extent.width),
-                height: size[1].clamp(min_image_extent.height, max_image_extent.height),
+                width: size[0].clamp(min_image_extent.width, max_image_extent.width.min(longest)),
+                height: size[1].clamp(min_image_extent.height, max_image_extent.height.min(longest)),
             },
             _ => current_extent,
         };
-        if extent.width == 0 || extent.height == 0 {
+        if extent.width == 0 || extent.height == 0 || extent.width.max(extent.height) > longest {
             self.discard();
             return Ok(false);
         }
