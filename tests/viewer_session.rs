@@ -7,9 +7,10 @@ use glam::DVec3;
 use std::time::{Duration, Instant};
 use threadlight::low_level::memo::Memo;
 use threadlight::low_level::prepare::{Prepared, PreparedMaterial};
-use threadlight::low_level::scene::{MaterialSettings, MaterialSource, ObjectSettings, Scene, Source};
+use threadlight::low_level::scene::{MaterialSettings, MaterialSource, ObjectSettings, Scene, ShadingSettings, Source};
 use threadlight::low_level::threads::Threads;
 use threadlight::low_level::viewer::change::Change;
+use threadlight::low_level::viewer::comparison::Other;
 use threadlight::low_level::viewer::input::{Input, Scroll};
 use threadlight::low_level::viewer::interaction::Viewer;
 
@@ -193,6 +194,19 @@ fn a_draft_is_finished_though_something_else_cannot_be_loaded_meanwhile() {
     wait(&mut viewer);
     assert!(viewer.notice.as_ref().is_some_and(|notice| notice.is_error));
     assert!(!viewer.loaded().unwrap().is_draft() && (red(&viewer) - 0.75).abs() < 1e-9);
+    drop(viewer);
+    gpu.finish();
+}
+
+#[test]
+fn a_comparison_that_cannot_be_is_told_and_leaves_the_one_before() {
+    let gpu = Validated::new();
+    let mut viewer = Viewer::new(quick(), &gpu.device, Memo::default(), || ());
+    viewer.handle(&Input::Compare(Some(Other::Reference)));
+    let shading = ShadingSettings { threads: Some(500), ..ShadingSettings::default() };
+    viewer.handle(&Input::Compare(Some(Other::Shading(shading))));
+    assert!(viewer.failures.len() == 1 && viewer.failures[0].contains("500"), "{:?}", viewer.failures);
+    assert_eq!(viewer.comparer.other, Some(Other::Reference));
     drop(viewer);
     gpu.finish();
 }

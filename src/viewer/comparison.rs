@@ -13,7 +13,7 @@ use crate::evaluate::{Comparable, Display, Metrics, compare};
 use crate::memo::{Memo, Round};
 use crate::method::Method;
 use crate::pipeline::{DeviceScene, Wanted, render_geometry};
-use crate::prepare::{Prepared, prepare};
+use crate::prepare::{Prepared, check_count, prepare};
 use crate::progress::Observer;
 use crate::scene::{Scene, ShadingSettings};
 use crate::vulkan::Device;
@@ -49,6 +49,18 @@ pub enum Other {
     Shading(ShadingSettings),
     /// The reference, computed for as long as the view stands still.
     Reference,
+}
+
+impl Other {
+    /// Whether a picture of `scene` can be compared with it.
+    ///
+    /// # Errors
+    /// A method that there is not, or more threads or samples than it can have.
+    pub fn check(&self, scene: &Scene) -> Result<()> {
+        let Self::Shading(ShadingSettings { method, threads, .. }) = self else { return Ok(()) };
+        let method = Method::from_name(method)?;
+        check_count(method, threads.unwrap_or(method.default_count()), scene.image.subpixels)
+    }
 }
 
 /// Two pictures of one view, and how they differ.
@@ -155,6 +167,22 @@ fn compared(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_no_picture_can_be_compared_with_is_an_error() {
+        let shading = |method: &str, threads| {
+            Other::Shading(ShadingSettings { method: method.into(), threads, ..ShadingSettings::default() })
+        };
+        let check = |other: Other| other.check(&Scene::default());
+        for (method, threads) in [("fitted", 500), ("paper", 5000)] {
+            let error = check(shading(method, Some(threads))).unwrap_err().to_string();
+            assert!(error.contains("threads") && error.contains(&threads.to_string()), "{error}");
+            check(shading(method, Some(64))).unwrap();
+            check(shading(method, None)).unwrap();
+        }
+        assert!(check(shading("magic", None)).unwrap_err().to_string().contains("magic"));
+        check(Other::Reference).unwrap();
+    }
 
     #[test]
     fn the_line_stays_in_the_picture() {

@@ -200,6 +200,7 @@ impl Viewer {
                 Ok(())
             }
             Input::Compare(other) => {
+                other.iter().try_for_each(|other| other.check(self.session.wanted()))?;
                 self.comparer.other.clone_from(other);
                 Ok(())
             }
