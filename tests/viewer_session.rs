@@ -211,6 +211,30 @@ fn a_comparison_that_cannot_be_is_told_and_leaves_the_one_before() {
     gpu.finish();
 }
 
+#[test]
+fn lines_and_keys_that_there_are_not_are_told_and_change_nothing() {
+    let gpu = Validated::new();
+    let mut viewer = Viewer::new(quick(), &gpu.device, Memo::default(), || ());
+    viewer.handle(&Input::Wipe(0.25));
+    for (count, (input, what)) in [
+        (Input::Wipe(5.0), "wipe"),
+        (Input::Wipe(-1.0), "wipe"),
+        (Input::Key("nope".into()), "nope"),
+        (Input::Key(String::new()), "key"),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        viewer.handle(&input);
+        assert!(viewer.failures.len() == count + 1 && viewer.failures[count].contains(what), "{:?}", viewer.failures);
+    }
+    // A key that does nothing is pressed in vain, as it is in a window.
+    viewer.handle(&Input::Key("q".into()));
+    assert_eq!((viewer.failures.len(), viewer.comparer.wipe.part()), (4, 0.25));
+    drop(viewer);
+    gpu.finish();
+}
+
 /// A scene of which no drafts are made.
 fn quick() -> Scene {
     let mut scene = sphere(MaterialSource::Builtin("clay".into()), "white", 2, (32, 24));

@@ -171,7 +171,7 @@ pub(super) fn check_size(size: [u32; 2]) -> Result<()> {
 }
 
 /// `value` if it is in `range`: no range holds NaN.
-fn within<T: PartialOrd + Debug + Copy>(name: &str, value: T, range: &RangeInclusive<T>) -> Result<T> {
+pub(super) fn within<T: PartialOrd + Debug + Copy>(name: &str, value: T, range: &RangeInclusive<T>) -> Result<T> {
     if range.contains(&value) {
         return Ok(value);
     }

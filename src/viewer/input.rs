@@ -10,7 +10,7 @@
 //! | `{"drag": {"button": "left", "from": [320, 240], "by": [40, -10]}}` | drags the mouse; `"button"` is `left` (orbit), `middle` or `right` (pan); with `"shift": true` a left drag pans, with `"control": true` it turns the environment |
 //! | `{"move": [320, 240]}` | moves the cursor there |
 //! | `{"scroll": {"lines": 3}}`, `{"scroll": {"pixels": -40}}` | scrolls a wheel or a touchpad, forwards if positive |
-//! | `{"key": "f"}` | presses and releases a key: a letter, a digit, or a name such as `"space"` |
+//! | `{"key": "f"}` | presses and releases a key: what it writes, in lower case, or `"space"`, `"home"` or `"escape"` |
 //! | `{"drop": "material.binary"}` | drops a file on the window |
 //! | `{"resize": [800, 600]}` | gives the window's picture this size |
 //! | `{"minimise": true}`, `{"minimise": false}` | minimises and restores the window |

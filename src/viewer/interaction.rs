@@ -1,10 +1,11 @@
 //! The viewer: what inputs do to the session. What follows is in `making.rs` and `drawing.rs`. Knows nothing of the window system.
-use super::change::{Change, most_count};
+use super::change::{Change, most_count, within};
 use super::comparer::Comparer;
 use super::comparison::Wipe;
 use super::dynamic_resolution::DynamicResolution;
 use super::history::History;
 use super::input::{DragAction, Dropped, Input, change_of_dropped};
+use super::keyboard;
 use super::latency::{Latency, Record};
 use super::latest_job::LatestJob;
 use super::loaded::Loaded;
@@ -205,7 +206,7 @@ impl Viewer {
                 Ok(())
             }
             Input::Wipe(part) => {
-                self.comparer.wipe = Wipe::at(*part);
+                self.comparer.wipe = Wipe::at(within("wipe", *part, &(0.0..=1.0))?);
                 Ok(())
             }
             Input::HeatMap(shows) => {
@@ -256,7 +257,13 @@ impl Viewer {
                 self.notice = None;
                 Ok(())
             }
-            _ => Ok(()),
+            // Others do nothing.
+            _ if keyboard::is_key(key) => Ok(()),
+            _ => {
+                let remedy =
+                    "use a letter in lower case, a digit or another character, \"space\", \"home\" or \"escape\"";
+                Err(Error::input(format!("key \"{key}\""), "is not known", remedy))
+            }
         }
     }
 

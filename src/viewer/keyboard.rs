@@ -2,6 +2,16 @@
 use super::input::Input;
 use winit::keyboard::{Key, KeyCode, ModifiersState, NamedKey, PhysicalKey};
 
+/// Names of the keys that write no character.
+const NAMED: [(NamedKey, &str); 3] =
+    [(NamedKey::Space, "space"), (NamedKey::Home, "home"), (NamedKey::Escape, "escape")];
+
+/// Whether inputs call a key so, whatever it does.
+pub fn is_key(name: &str) -> bool {
+    let is_typed = |typed: u8| typed.is_ascii_graphic() && !typed.is_ascii_uppercase();
+    matches!(name.as_bytes(), [typed] if is_typed(*typed)) || NAMED.iter().any(|(_, named)| *named == name)
+}
+
 /// What a pressed key asks for, which means `logical` and is at `physical`, with what is `held` down beside it. One that is held down itself
 /// `repeats`.
 pub fn input_of(logical: &Key, physical: PhysicalKey, repeats: bool, held: ModifiersState) -> Option<Input> {
@@ -28,7 +38,7 @@ pub fn input_of(logical: &Key, physical: PhysicalKey, repeats: bool, held: Modif
 /// A key as inputs name it.
 fn name_of(logical: &Key, physical: PhysicalKey) -> Option<String> {
     let name = match logical {
-        Key::Character(text) if text.is_ascii() => return Some(text.to_lowercase()),
+        Key::Character(text) if text.is_ascii() => return Some(text.to_lowercase()).filter(|name| is_key(name)),
         // Keyboards of other scripts have Latin letters printed beside theirs.
         Key::Character(_) => match physical {
             PhysicalKey::Code(KeyCode::KeyB) => "b",
@@ -38,9 +48,7 @@ fn name_of(logical: &Key, physical: PhysicalKey) -> Option<String> {
             PhysicalKey::Code(KeyCode::KeyZ) => "z",
             _ => return None,
         },
-        Key::Named(NamedKey::Space) => "space",
-        Key::Named(NamedKey::Home) => "home",
-        Key::Named(NamedKey::Escape) => "escape",
+        Key::Named(named) => NAMED.iter().find(|(key, _)| key == named)?.1,
         _ => return None,
     };
     Some(name.to_owned())
@@ -90,6 +98,18 @@ mod tests {
         assert_eq!(typed("]", KeyCode::Digit6, false, alt | ModifiersState::SHIFT), key("]"));
         assert_eq!(typed("t", KeyCode::KeyT, false, alt), None);
         assert_eq!(typed("[", KeyCode::BracketLeft, false, ModifiersState::CONTROL), None);
+    }
+
+    #[test]
+    fn keys_that_do_nothing_are_keys_and_other_words_are_none() {
+        for name in ["f", "q", "0", "[", "space", "home", "escape"] {
+            assert!(is_key(name), "{name}");
+        }
+        for name in ["", "nope", "F", "ö", " ", "\n"] {
+            assert!(!is_key(name), "{name:?}");
+        }
+        assert_eq!(typed("q", KeyCode::KeyQ, false, NONE), key("q"));
+        assert_eq!(typed("^q", KeyCode::KeyQ, false, NONE), None);
     }
 
     #[test]
