@@ -353,8 +353,9 @@ mod tests {
         let (up, left, between) = (Vec3::Z, -Vec3::X, Vec3::new(-1.0, 0.0, 1.0).normalize());
         let check = |faces: &str, expected: &[Vec3]| {
             let found = normals(faces);
-            let are_among =
-                |some: &[Vec3], all: &[Vec3]| some.iter().all(|one| all.iter().any(|other| one.distance(*other) < 1e-6));
+            let are_among = |some: &[Vec3], all: &[Vec3]| {
+                some.iter().all(|one| all.iter().any(|other| one.distance(*other) < 1e-6))
+            };
             assert!(are_among(&found, expected) && are_among(expected, &found), "{faces} {found:?}");
         };
         let (bottom, side) = ("f 1 2 3 4\n", "f 2 5 6 3\n");
