@@ -100,10 +100,10 @@ pub(super) fn candidates(instance: &Instance) -> Result<Vec<Candidate>> {
     if physical_devices.is_empty() {
         return Err(VulkanError::NoDriver);
     }
-    Ok(physical_devices.into_iter().enumerate().map(|(index, physical)| candidate(instance, index, physical)).collect())
+    physical_devices.into_iter().enumerate().map(|(index, physical)| candidate(instance, index, physical)).collect()
 }
 
-fn candidate(instance: &Instance, index: usize, physical: vk::PhysicalDevice) -> Candidate {
+fn candidate(instance: &Instance, index: usize, physical: vk::PhysicalDevice) -> Result<Candidate> {
     let mut driver = vk::PhysicalDeviceDriverProperties::default();
     let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut driver);
     // SAFETY: `physical` comes from this instance.
@@ -114,7 +114,7 @@ fn candidate(instance: &Instance, index: usize, physical: vk::PhysicalDevice) ->
     if properties.api_version < vk::API_VERSION_1_2 {
         lacks.push("Vulkan 1.2");
     }
-    let extensions = extensions(instance, physical, &name, &mut lacks);
+    let extensions = extensions(instance, physical, &name, &mut lacks)?;
     let (queue_family, timestamp_valid_bits) = queue_family(instance, physical, &mut lacks);
     let description = DeviceDescription {
         index,
@@ -124,7 +124,7 @@ fn candidate(instance: &Instance, index: usize, physical: vk::PhysicalDevice) ->
         api_version: version_text(properties.api_version),
         lacks,
     };
-    Candidate {
+    Ok(Candidate {
         description,
         physical,
         properties,
@@ -132,7 +132,7 @@ fn candidate(instance: &Instance, index: usize, physical: vk::PhysicalDevice) ->
         timestamp_valid_bits,
         driver: driver.driver_id,
         extensions,
-    }
+    })
 }
 
 /// The extensions to enable: of those that are wanted, the ones that there are. Needed ones that there are not go to `lacks`.
@@ -141,13 +141,8 @@ fn extensions(
     physical: vk::PhysicalDevice,
     name: &str,
     lacks: &mut Vec<&'static str>,
-) -> Vec<&'static CStr> {
-    // A driver that fails here does not keep others from being used.
-    let available = available_extensions(instance, physical, name).unwrap_or_else(|error| {
-        tracing::warn!("{error}");
-        lacks.push("a driver that tells its extensions");
-        Vec::new()
-    });
+) -> Result<Vec<&'static CStr>> {
+    let available = available_extensions(instance, physical, name)?;
     let has = |wanted: &CStr| contains(&available, wanted);
     // These are asked for even where Vulkan 1.3 has them in its core: their entry points are the same ones.
     let needed = [
@@ -163,7 +158,7 @@ fn extensions(
         wanted.push(khr::swapchain::NAME);
     }
     wanted.retain(|extension| has(extension));
-    wanted
+    Ok(wanted)
 }
 
 fn available_extensions(
