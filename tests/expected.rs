@@ -72,6 +72,6 @@ fn an_error_that_no_number_of_threads_reaches_is_refused_with_the_one_that_is() 
     let mut scene = glossy(&folder);
     scene.shading.method = "cosine".to_owned();
     let error = prepare_within(&scene, 1e-6, &gpu.device, &gpu.round()).err().unwrap().to_string();
-    assert!(error.contains("--error") && error.contains("1024") && error.contains("cosine"), "{error}");
+    assert!(error.contains("--error") && error.contains("8192") && error.contains("cosine"), "{error}");
     gpu.finish();
 }
