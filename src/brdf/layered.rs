@@ -17,8 +17,8 @@
 //!   rest. Its energy from each angle is that of all orders for isotropic bases, less 0.5 %: `interreflection.rs` sums them in the mean over
 //!   azimuth. For a diffuse base that is Saunderson's correction (1942), f = T_i T_o reflectance / (n^2 pi (1 - reflectance r)), r the coat's reflectance
 //!   for diffuse light from within. What is lost is the direction. In the mirror direction the sum says by which factor later light raises the
-//!   lobe: that is k k. What then lacks leaves evenly: h h, of which the integral is what lacks, in the manner of Kulla and Conty (2017). Both are exact for a diffuse base and for a mirror; between them a lobe of later light is taken for the base's
-//!   own lobe and a haze.
+//!   lobe: that is k k. What then lacks leaves evenly: h h, of which the integral is what lacks, in the manner of Kulla and Conty (2017). Both are
+//!   exact for a diffuse base and for a mirror; between them a lobe of later light is taken for the base's own lobe and a haze.
 //!
 //! Reciprocal as the base is. Energy is at most 1.002, or at most that of the base where the base reflects more than it receives.
 //! ior = 1 without absorption is the base itself.

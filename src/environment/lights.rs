@@ -19,16 +19,27 @@ pub(super) struct Light {
 pub(super) enum Shape {
     /// All within this angle, in radians, of the centre.
     Disc(f64),
-    /// An upright rectangle that faces the origin: half its width and height on the plane at distance 1.
-    Window([f64; 2]),
+    /// An upright rectangle that faces the origin: [`upright_axes`] of its centre, and half its width and height on the plane at distance 1.
+    Window { axes: [DVec3; 2], half_sides: [f64; 2] },
+}
+
+/// The unit vectors to the right and up on the plane that faces the origin from `centre`; towards the poles any.
+pub(super) fn upright_axes(centre: DVec3) -> [DVec3; 2] {
+    let right = centre.cross(DVec3::Y).normalize_or(DVec3::X);
+    [right, right.cross(centre)]
 }
 
 impl Light {
+    /// A window around `centre`, with these halves of its width and height.
+    fn window(centre: DVec3, half_sides: [f64; 2], radiance: DVec3) -> Self {
+        Self { centre, shape: Shape::Window { axes: upright_axes(centre), half_sides }, radiance }
+    }
+
     /// Cosine of the angle from the centre within which all of it is.
     fn cos_reach(&self) -> f64 {
         match self.shape {
             Shape::Disc(radius) => radius.cos(),
-            Shape::Window([x, y]) => 1.0 / (1.0 + x * x + y * y).sqrt(),
+            Shape::Window { half_sides: [x, y], .. } => 1.0 / (1.0 + x * x + y * y).sqrt(),
         }
     }
 
@@ -36,12 +47,9 @@ impl Light {
         let along = direction.dot(self.centre);
         match self.shape {
             Shape::Disc(radius) => along > radius.cos(),
-            Shape::Window([half_width, half_height]) => {
-                let right = self.centre.cross(DVec3::Y).normalize_or(DVec3::X);
-                let up = right.cross(self.centre);
-                along > 0.0
-                    && direction.dot(right).abs() < half_width * along
-                    && direction.dot(up).abs() < half_height * along
+            Shape::Window { axes, half_sides } => {
+                let is_within = |(axis, half): (DVec3, f64)| direction.dot(axis).abs() < half * along;
+                along > 0.0 && axes.into_iter().zip(half_sides).all(is_within)
             }
         }
     }
@@ -50,27 +58,28 @@ impl Light {
 /// Adds lights to an environment.
 pub(super) fn with_lights(mut environment: Environment, lights: &[Light]) -> Environment {
     const SUBPIXELS: usize = 16;
-    // Pixels whose centre is farther than this from what a light covers hold nothing of it.
-    let half_pixel = TAU / environment.height as f64;
+    // Pixels whose centre is farther than that from what a light covers hold nothing of it.
+    let two_rows = TAU / environment.height as f64;
     let cos_reaches: Vec<f64> =
-        lights.iter().map(|light| (light.cos_reach().acos() + half_pixel).min(PI).cos()).collect();
+        lights.iter().map(|light| (light.cos_reach().acos() + two_rows).min(PI).cos()).collect();
     let added = (0..environment.texels.len()).into_par_iter().map(|i| {
         let (column, row) = ((i % environment.width) as f64, (i / environment.width) as f64);
         let centre = environment.direction(column, row);
         let near = lights.iter().zip(&cos_reaches).filter(|(light, reach)| centre.dot(light.centre) > **reach);
+        let mut covered: Vec<_> = near.map(|(light, _)| (light, 0.0)).collect();
+        if covered.is_empty() {
+            return DVec3::ZERO;
+        }
         let offset = |index: usize| (index as f64 + 0.5) / SUBPIXELS as f64 - 0.5;
-        near.map(|(light, _)| {
-            let (mut covered, mut all) = (0.0, 0.0);
-            for sample in 0..SUBPIXELS * SUBPIXELS {
-                let direction =
-                    environment.direction(column + offset(sample % SUBPIXELS), row + offset(sample / SUBPIXELS));
-                let sin_theta = direction.x.hypot(direction.z);
-                all += sin_theta;
-                covered += if light.covers(direction) { sin_theta } else { 0.0 };
-            }
-            light.radiance * (covered / all)
-        })
-        .sum::<DVec3>()
+        let mut all = 0.0;
+        for sample in 0..SUBPIXELS * SUBPIXELS {
+            let direction =
+                environment.direction(column + offset(sample % SUBPIXELS), row + offset(sample / SUBPIXELS));
+            let sin_theta = direction.x.hypot(direction.z);
+            all += sin_theta;
+            covered.iter_mut().for_each(|(light, sum)| *sum += if light.covers(direction) { sin_theta } else { 0.0 });
+        }
+        covered.into_iter().map(|(light, sum)| light.radiance * (sum / all)).sum()
     });
     let added: Vec<DVec3> = added.collect();
     for (texel, light) in environment.texels.iter_mut().zip(added) {
@@ -93,17 +102,17 @@ pub(super) fn windows_and_bulbs(count: usize) -> Vec<Light> {
         let y = 1.0 - 2.0 * height;
         let (sin, cos) = (TAU * turn).sin_cos();
         let across = (1.0 - y * y).sqrt();
+        let centre = dvec3(across * cos, y, across * sin);
         let warm_to_cool = dvec3(1.0, 0.72, 0.42).lerp(dvec3(0.72, 0.88, 1.1), colour);
+        let radiance = |radiance: f64| warm_to_cool * radiance * from_to(0.25, 4.0, brightness);
         // Every third is a bulb.
-        let (shape, radiance) = if index % 3 == 2 {
-            (Shape::Disc(smaller * from_to(0.2, 3.0, size).to_radians()), from_to(2000.0, 100.0, size))
-        } else {
-            let side = smaller * from_to(0.03, 0.4, size);
-            let stretch = from_to(0.4, 2.5, aspect).sqrt();
-            (Shape::Window([side * stretch, side / stretch]), from_to(40.0, 8.0, size))
-        };
-        let radiance = warm_to_cool * radiance * from_to(0.25, 4.0, brightness);
-        Light { centre: dvec3(across * cos, y, across * sin), shape, radiance }
+        if index % 3 == 2 {
+            let shape = Shape::Disc(smaller * from_to(0.2, 3.0, size).to_radians());
+            return Light { centre, shape, radiance: radiance(from_to(2000.0, 100.0, size)) };
+        }
+        let side = smaller * from_to(0.03, 0.4, size);
+        let stretch = from_to(0.4, 2.5, aspect).sqrt();
+        Light::window(centre, [side * stretch, side / stretch], radiance(from_to(40.0, 8.0, size)))
     };
     (0..count).map(light).collect()
 }
@@ -119,7 +128,7 @@ mod tests {
         let solid_angle_sr = 4.0 * (x * y / ((1.0 + x * x) * (1.0 + y * y)).sqrt()).asin();
         for centre in [DVec3::X, DVec3::Y, DVec3::new(0.3, -0.8, 0.5).normalize()] {
             let black = Environment::new("black".into(), 256, 128, vec![[0.0; 3]; 256 * 128], RepairCounts::default());
-            let light = Light { centre, shape: Shape::Window([x, y]), radiance: dvec3(1.0, 2.0, 3.0) };
+            let light = Light::window(centre, [x, y], dvec3(1.0, 2.0, 3.0));
             let shed = with_lights(black, &[light]).mean_radiance() * 4.0 * PI / solid_angle_sr;
             // 16 x 16 samples a pixel of an edge.
             assert!((shed / dvec3(1.0, 2.0, 3.0) - 1.0).abs().max_element() < 4e-3, "{centre}: {shed}");

@@ -1,8 +1,9 @@
-//! The built-in environments: a soft sky, the same with a small sun, a studio with area lights, and the white furnace.
+//! The built-in environments: a soft sky, the same with a small sun, a studio with area lights, halls of many lamps, and the white
+//! furnace.
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::lights::{Light, Shape, windows_and_bulbs, with_lights};
+use super::lights::{Light, Shape, upright_axes, windows_and_bulbs, with_lights};
 use super::{Environment, RepairCounts};
 use crate::error::{Error, Result};
 
@@ -23,15 +24,17 @@ pub fn builtin_names() -> &'static [&'static str] {
 
 impl Environment {
     /// A built-in environment: `sky` (soft gradient over ground), `sun` (the same with a small sun), `studio` (area lights in
-    /// a dark room) or `white` (radiance 1 everywhere: the furnace).
+    /// a dark room), `lamps-10`, `lamps-70` and `lamps-500` (so many windows and bulbs around a dark hall) or `white` (radiance 1
+    /// everywhere: the furnace).
     pub fn builtin(name: &str) -> Result<Self> {
+        let lamps = |count| with_lights(procedural(name, SIZE, hall), &windows_and_bulbs(count));
         match name {
             "sky" => Ok(procedural(name, SIZE, sky)),
             "sun" => Ok(with_lights(procedural(name, SIZE, sky), &[sun()])),
             "studio" => Ok(procedural(name, SIZE, studio)),
-            "lamps-10" => Ok(with_lights(procedural(name, SIZE, hall), &windows_and_bulbs(10))),
-            "lamps-70" => Ok(with_lights(procedural(name, SIZE, hall), &windows_and_bulbs(70))),
-            "lamps-500" => Ok(with_lights(procedural(name, SIZE, hall), &windows_and_bulbs(500))),
+            "lamps-10" => Ok(lamps(10)),
+            "lamps-70" => Ok(lamps(70)),
+            "lamps-500" => Ok(lamps(500)),
             "white" => Ok(procedural(name, (4, 2), |_| DVec3::ONE)),
             _ => Err(Error::input(
                 format!("environment `{name}`"),
@@ -104,8 +107,7 @@ fn area_light(direction: DVec3, centre: DVec3, half_width: f64, half_height: f64
     if distance <= 0.0 {
         return 0.0;
     }
-    let right = centre.cross(DVec3::Y).normalize();
-    let up = right.cross(centre);
+    let [right, up] = upright_axes(centre);
     let x = direction.dot(right).abs() / distance - half_width;
     let y = direction.dot(up).abs() / distance - half_height;
     // Distance to the rectangle's edge, negative inside; corners outside are round.

@@ -73,7 +73,7 @@ impl TryFrom<RawEnvironmentKeys> for EnvironmentKeys {
     fn try_from(keys: RawEnvironmentKeys) -> Result<Self, String> {
         let source = match (keys.file, keys.builtin) {
             (Some(file), None) => Source::File(file),
-            (None, Some(name)) => builtin("environment", name, environment::builtin_names())?,
+            (None, Some(name)) => Source::Builtin(builtin("environment", name, environment::builtin_names())?),
             (None, None) => EnvironmentSettings::default().source,
             (Some(_), Some(_)) => return Err("[environment] takes `file` or `builtin`, not both".into()),
         };
@@ -222,17 +222,13 @@ fn material(mut table: toml::Table) -> Result<MaterialSettings, String> {
         Some(toml::Value::String(text)) => Ok(Some(text)),
         Some(other) => Err(format!("`{key}` must be a string, not {}", other.type_str())),
     };
-    let (name, file, builtin, model) = (take("name")?, take("file")?, take("builtin")?, take("model")?);
+    let (name, file, named, model) = (take("name")?, take("file")?, take("builtin")?, take("model")?);
     let name = name.ok_or("a [[material]] needs a `name`")?;
-    let source = match (file, builtin, model) {
+    let source = match (file, named, model) {
         (Some(file), None, None) => MaterialSource::File(file.into()),
-        (None, Some(builtin), None) => match Brdf::builtin_names().any(|known| known == builtin) {
-            true => MaterialSource::Builtin(builtin),
-            false => {
-                let known = Brdf::builtin_names().collect::<Vec<_>>().join(", ");
-                return Err(format!("no material `{builtin}` is built in; these are: {known}"));
-            }
-        },
+        (None, Some(name), None) => {
+            MaterialSource::Builtin(builtin("material", name, &Brdf::builtin_names().collect::<Vec<_>>())?)
+        }
         (None, None, Some(model)) => MaterialSource::Model { model, parameters: std::mem::take(&mut table) },
         (None, None, None) if Brdf::builtin_names().any(|known| known == name) => MaterialSource::Builtin(name.clone()),
         (None, None, None) => {
@@ -253,7 +249,7 @@ fn material(mut table: toml::Table) -> Result<MaterialSettings, String> {
 fn object(keys: ObjectKeys, first_material: &str) -> Result<ObjectSettings, String> {
     let mesh = match (keys.mesh, keys.builtin) {
         (Some(file), None) => Source::File(file),
-        (None, Some(name)) => builtin("mesh", name, mesh::builtin_names())?,
+        (None, Some(name)) => Source::Builtin(builtin("mesh", name, mesh::builtin_names())?),
         _ => return Err("an [[object]] needs exactly one of `mesh` and `builtin`".into()),
     };
     Ok(ObjectSettings {
@@ -266,10 +262,10 @@ fn object(keys: ObjectKeys, first_material: &str) -> Result<ObjectSettings, Stri
     })
 }
 
-/// The built-in `what` of this name.
-fn builtin(what: &str, name: String, known: &[&str]) -> Result<Source, String> {
+/// `name`, if a `what` of that name is built in: one of the `known`.
+fn builtin(what: &str, name: String, known: &[&str]) -> Result<String, String> {
     match known.contains(&name.as_str()) {
-        true => Ok(Source::Builtin(name)),
+        true => Ok(name),
         false => Err(format!("no {what} `{name}` is built in; these are: {}", known.join(", "))),
     }
 }

@@ -142,7 +142,8 @@ impl Swapchain {
     }
 
     /// The next image to draw, of about `size` in pixels (the window's; where the window system knows better, it decides).
-    /// None while the window has no area, or more than an image can have, or the window system has no image to give: then it is worth asking again in a while.
+    /// None while the window has no area, or more than an image can have, or the window system has no image to give: then it is worth asking
+    /// again in a while.
     /// `frames` is waited for until it has a place for the frame.
     ///
     /// # Errors
