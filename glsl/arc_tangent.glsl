@@ -1,5 +1,6 @@
 // Angles in triangles. GLSL's arc tangent may err by 4096 units in the last place (Vulkan 1.3, "Precision and Operation of SPIR-V
-// Instructions"), and handles cases that do not occur.
+// Instructions"), and handles cases that do not occur. `mix` and not `?:`, of which glslc makes branches: SwiftShader compiles those for
+// minutes, where many are in line.
 #ifndef ARC_TANGENT_GLSL
 #define ARC_TANGENT_GLSL
 
@@ -18,19 +19,19 @@ float acute_angle(float y, float x, float hypotenuse) {
     series = series * square - 0.33332808;
     series = series * square + 0.99999998;
     float angle = 2.0 * tangent * series;
-    return y > x ? HALF_PI - angle : angle;
+    return mix(angle, HALF_PI - angle, y > x);
 }
 
 // The same in [0, 180 degrees], of x of either sign: atan2 in Rust, which errs by a unit in the last place.
 float angle_of(float y, float x, float hypotenuse) {
     float angle = acute_angle(y, abs(x), hypotenuse);
-    return x < 0.0 ? 2.0 * HALF_PI - angle : angle;
+    return mix(angle, 2.0 * HALF_PI - angle, x < 0.0);
 }
 
 // The same in [-180, 180 degrees], of y of either sign, too; 0 if all are 0.
 float azimuth_of(float y, float x, float hypotenuse) {
     float angle = angle_of(abs(y), x, hypotenuse);
-    return y < 0.0 ? -angle : angle;
+    return mix(angle, -angle, y < 0.0);
 }
 
 #endif

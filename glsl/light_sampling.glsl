@@ -17,7 +17,7 @@ layout(set = 0, binding = 11, std430) readonly buffer LightAliases {
 
 // A number in (-1, 1) with density 1 - |x|, from one in [0, 1).
 float tent(float u) {
-    return u < 0.5 ? sqrt(2.0 * u) - 1.0 : 1.0 - sqrt(2.0 - 2.0 * u);
+    return mix(1.0 - sqrt(2.0 - 2.0 * u), sqrt(2.0 * u) - 1.0, u < 0.5);
 }
 
 // A direction; its density is light_pdf of what the map holds there.
