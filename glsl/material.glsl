@@ -5,7 +5,7 @@ struct ThreadTable {
     uint first;       // where its threads start in the thread buffer
     uint count;
     uint row_count;
-    uint sharp_count;   // how many of its threads, up to the last one that is, are sharper than the environment's pyramid in some row
+    uint sharp_count;   // only threads before this one are sharper than the environment's pyramid in some row
     uint set_count;     // sets of its threads, each of which does alone: thread k is of set k % set_count
     uint azimuth_count; // of the view, that there are rows or CDFs for; 1 of an isotropic BRDF
 };

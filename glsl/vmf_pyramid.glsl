@@ -56,8 +56,8 @@ vec3 sharp_radiance(vec3 d, float sources) {
     return sum;
 }
 
-// From this part of the variance of the finest level on, a kernel is taken for that level. It is one to two pixels of the environment wide, so
-// little is lost; and nearly all lobes but mirrors have no use then for the environment as it is, which costs several lookups.
+// Kernels of at least this part of the variance of the finest level are looked up in that level alone. They are one to two pixels of the
+// environment wide, so little is lost; and nearly all lobes but mirrors then need no lookup of the environment as it is, which costs several.
 const float AS_SHARP = 0.625;
 
 // How much of a kernel of `level` is the environment as it is, the rest being the finest level (F16).

@@ -145,8 +145,8 @@ struct AtSources {
     float least_clearance;
 };
 
-// Of a square of light around a direction of this z, whose standard deviation along z is this: what part of it has risen above the
-// horizon, times z in the middle of that part; and that z (F31).
+// For a square of light whose middle has this z, and whose standard deviation along z is this. x: the part of it that has risen above the
+// horizon, times z in the middle of that part; y: that z (F31).
 vec2 risen(float z, float deviation) {
     // Light straight above has none.
     float half_side = max(sqrt(3.0) * deviation, 1e-6);

@@ -3,8 +3,8 @@
 #include "packing.glsl"
 
 // Azimuth by azimuth of the view: the albedo of each row of theta_o as three floats, then thread by thread its rows, each three words: direction
-// (its place on the stereographic map, 2 x 16 bits), level and red weight, green and blue weight (half floats). Pixels that look the same thread up
-// together, each between two rows, so find it in few lines of a cache. A fourth word is 0: GPUs load what is aligned to 16 bytes at once.
+// (its place on the stereographic map, 2 x 16 bits), level and red weight, green and blue weight (half floats). Neighbouring pixels look one thread up
+// at the same time, each between two rows, and so find it in few cache lines. A fourth word is 0: GPUs load what is aligned to 16 bytes at once.
 layout(set = 0, binding = 7, std430) readonly buffer Threads {
     uvec4 threads[];
 };

@@ -12,9 +12,9 @@ const NARROWEST_RAD: f64 = 1e-4;
 /// this: beyond 87 degrees is a rim of 0.1 % of a sphere.
 pub const MIN_COS_THETA_D: f64 = 0.05;
 
-/// The angle of the half vector to the normal within which f stays within a quarter of what it is in the mirror direction;
-/// a right angle if it does so everywhere. In radians. Seen along the normal, where lobes are widest; of an anisotropic BRDF the least
-/// over azimuths of the half vector.
+/// The angle of the half vector to the normal from which f, summed over channels, differs by more than a quarter from what it is in the mirror
+/// direction: the first of 1e-4, 1.25e-4, 1.25^2 1e-4 and so on to 45 degrees, or a right angle if it is none of these. In radians. Seen along
+/// the normal, where lobes are widest; of an anisotropic BRDF the least over azimuths of the half vector.
 pub fn half_vector_width(brdf: &Brdf) -> f64 {
     LobeShape::of(brdf).width_rad
 }

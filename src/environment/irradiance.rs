@@ -26,7 +26,7 @@ const FEWEST_COLUMNS: usize = 1024;
 struct Cell {
     solid_angle: f32,
     power: Vec3,
-    /// Sum of directions, weighted by solid angle, then by power.
+    /// Mean directions, weighted by solid angle, and by the sum of the channels of power.
     middle: Vec3,
     centroid: Vec3,
 }

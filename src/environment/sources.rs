@@ -13,7 +13,7 @@ use crate::brdf::luminance;
 pub const MAX_SOURCES: usize = 48;
 const MAX_REGIONS: usize = 12;
 
-/// Pixels so many times brighter than the mean of all that are not are of a source.
+/// Pixels so many times brighter than the mean over the sphere of all that are not are of a source.
 const BRIGHTNESS: f64 = 30.0;
 
 /// What a region must have of all the light to be worth its cost.
@@ -145,7 +145,8 @@ fn add_tree(index: usize, found: &[Part], halves: &[Range<usize>], nodes: &mut V
     nodes[place].size = nodes.len() - place;
 }
 
-/// [`BRIGHTNESS`] times the mean radiance of what is below it: one lamp that outshines all others does not hide them.
+/// [`BRIGHTNESS`] times the mean luminance over the sphere, to which what is brighter adds nothing: one lamp that outshines all others does
+/// not hide them.
 fn threshold(environment: &Environment) -> f64 {
     let mean_below = |threshold: f64| {
         let pixel = |(i, texel): (usize, &[f32; 3])| {
@@ -159,7 +160,7 @@ fn threshold(environment: &Environment) -> f64 {
     (0..ROUNDS).fold(f64::INFINITY, |threshold, _| BRIGHTNESS * mean_below(threshold))
 }
 
-/// Connected pixels above `threshold`, with the first column next to the last.
+/// Pixels above `threshold` that touch, at corners too; the first column is next to the last.
 fn bright_regions(environment: &Environment, threshold: f64) -> Vec<Vec<usize>> {
     let (width, height) = (environment.width, environment.height);
     let is_bright = |pixel: usize| luminance(super::to_dvec3(&environment.texels[pixel])) > threshold;

@@ -61,8 +61,8 @@ impl VmfPyramid {
     /// How its maps are made for faces of `finest` texels: levels (kernel [`BlurKernel::Vmf`]) from fine to coarse, and means of 2 x 2
     /// texels of them.
     ///
-    /// Level 0 is made from the box-filtered one, and each other from means of a finer level of its own: that is so smooth that nothing is
-    /// lost by sampling it there, while box-filtered texels as large would no longer tell where in them a light was.
+    /// Level 0 is made from the box-filtered one, and each other from means of a finer level of its own, one to three levels finer: that is so
+    /// smooth that nothing is lost by sampling it there, while box-filtered texels as large would no longer tell where in them a light was.
     pub fn steps(finest: usize) -> Vec<BlurStep> {
         let vmf = |from, from_kernel, from_size, size| BlurStep {
             from,
@@ -319,7 +319,7 @@ impl pulp::NullaryFnOnce for BlurRow<'_> {
         for (column, texels) in texels.iter_mut().enumerate() {
             let centre: [DVec3; 6] =
                 std::array::from_fn(|face| texel_direction(size, (face * size + self.row) * size + column));
-            // All faces are alike.
+            // All faces are alike. (F14)
             let from = texel_deficit(from_kernel, from_size, centre[0]);
             let kappa = kappa_of_deficit((texel_deficit(kernel, size, centre[0]) - from) / (1.0 - from));
             let cone = Cone::new(centre[0], kappa);
@@ -340,7 +340,7 @@ impl pulp::NullaryFnOnce for BlurRow<'_> {
     }
 }
 
-/// The map of these blocks, weighed by the kernel of this cone, wherever that is. `weights` is room to work in.
+/// The map of these blocks, weighed by the kernel of this cone, wherever that is (F15). `weights` is room to work in.
 #[inline(always)]
 fn convolved(blocks: &Blocks, cone: &Cone, weights: &mut Vec<[f32; LANES]>) -> [f32; 3] {
     let windows: [Window; 6] = std::array::from_fn(|face| Window::of(cone, face, blocks.size));

@@ -14,14 +14,15 @@
 //! Row r is for the view angle theta_o = r 90 deg / rows, in the frame whose z is the normal and in which w_o = (sin theta_o, 0,
 //! cos theta_o). Colours are linear Rec. 709. Thread k of row r is the (r count + k)-th. Of an anisotropic BRDF there are as many rows for
 //! each of 19, 37 or 73 azimuths of w_o from the tangent, every 5 degrees; then those of the second azimuth follow those of the first.
-//! Of fitted threads and Gaussians in several sets thread k is of set k % sets: each set does alone, with as many times the weights as there are sets.
-//! Twice as much content are two such tables: the second is of threads in sets, for sub-pixels, and the first of as many threads that are not, for
-//! pixels whose sub-pixels share one sum.
+//!
+//! Fitted threads and Gaussians may be in several sets, of which thread k is of set k % sets. A sub-pixel with a sum of its own takes one set,
+//! with `sets` times the weights; a pixel whose sub-pixels share one sum takes all threads. If there are two tables, one after the other, the
+//! first is for such pixels and its threads are in no sets; the second is for such sub-pixels. Then there are twice as many bytes.
 //!
 //! | method | a row | a thread |
 //! |---|---|---|
 //! | `paper` | albedo, 3 f32 | theta, phi (radians), p (1/sr), 3 f32 |
-//! | `fitted`, `gaussian` | albedo, 3 f32; expected relative error, f32 | 3 words, below |
+//! | `fitted`, `gaussian` | albedo, 3 f32; expected relative error, f32 | 3 words of 4 bytes, below |
 //!
 //! The words of a fitted thread: its direction's place on the stereographic map, (x, y) / (1.25 (1 + z)), as 16-bit signed normalised
 //! numbers, x in the low half; level and red weight as half floats, level in the low half; green and blue weight as half floats, green
