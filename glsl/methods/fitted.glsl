@@ -128,13 +128,13 @@ Lobe lobe_of(Surface surface, Material material) {
 // Up to this deviation of their normals, in radians, sub-pixels are one surface to any lobe that is not narrower: src/threads/fitted/sets.rs.
 const float NEARLY_FLAT_RAD = 0.01;
 
-// A sum at one normal does not do where normals vary more than half vectors within a narrow lobe, or by a good part of a wide one: what
-// sub-pixels mirror there is not one blur. Nor where a sun is mirrored within the pixel, or so near that its highlight bends within it.
+// A sum at one normal does not do where normals vary more than half vectors within a narrow lobe, as thin as that is across the plane of
+// incidence, or by a good part of a wide one: what sub-pixels mirror there is not one blur. Nor where a sun is mirrored within the pixel, or so near that its highlight bends within it.
 bool needs_subpixels(Surface surface, Material material) {
     float deviation = sqrt(surface.normal_variance);
     Lobe lobe = lobe_of(surface, material);
     // Normals mirrored turn twice as far; three standard deviations of that.
-    return deviation > max(min(material.lobe_width, NEARLY_FLAT_RAD), material.shared_deviation * lobe.w_o.z)
+    return deviation > max(min(lobe.width, NEARLY_FLAT_RAD), material.shared_deviation * lobe.w_o.z)
         || HAS_SOURCES != 0 && share_of_brdf(least_clearance(lobe, surface, material, 3.0 * 2.0 * deviation), material) < 1.0;
 }
 

@@ -156,7 +156,7 @@ pub(super) fn needs_subpixels(point: &Point) -> bool {
     }
     let (sources, record, lobe) = (&point.twin.sources, point.record(), Lobe::of(point));
     let deviation = point.surface.normal_variance.sqrt();
-    deviation > record.lobe_width.min(NEARLY_FLAT_RAD as f32).max(record.shared_deviation * lobe.w_o.z)
+    deviation > lobe.width.min(NEARLY_FLAT_RAD as f32).max(record.shared_deviation * lobe.w_o.z)
         || share_of_brdf(lobe.least_clearance(sources, 3.0 * 2.0 * deviation), &lobe) < 1.0
 }
 

@@ -5,12 +5,12 @@ use glam::{DVec2, DVec3, dvec3};
 use rayon::prelude::*;
 
 use super::cells::in_sets;
-use super::kernel::{Kernel, all_between, scale_rad};
+use super::kernel::{FINEST_WIDTH_RAD, Kernel, SHARPEST_LEVEL, all_between, scale_rad};
 use super::lights::{Quadrature, TestLights};
 use super::sets::{pixels_have_own, share_of_sets};
 use super::solve::{Effort, Fit};
 use super::table::FittedTable;
-use crate::brdf::{Brdf, SeenBrdf, luminance};
+use crate::brdf::{Brdf, MIN_COS_THETA_D, SeenBrdf, half_vector_width, luminance};
 use crate::error::Result;
 use crate::progress::Observer;
 use crate::threads::azimuths::{View, azimuth_count};
@@ -54,6 +54,12 @@ const LEAST_ERROR: f64 = 3e-3;
 /// Kernels narrower than this, in radians, stay where a facet mirrors the view to; wider ones stay where they are.
 const FOLLOWS_BELOW_RAD: f64 = 0.15;
 
+/// No kernel is narrower than this part of the lobe's width in half vectors: a Gaussian as wide as the lobe has 2.6 times that. Narrower
+/// ones would answer the lights of the fit, not those between them: a comb, if there are many. Lights tell kernels that are wider than
+/// [`TOLD_RAD`], so these have no such bound. Chrome beside 300 small lamps, close to the limb, errs by 0.0032 with 128 threads, not by 0.0074.
+const NARROWEST_IN_LOBE: f64 = 1.25;
+const TOLD_RAD: f64 = 0.02;
+
 /// A row: its kernels, the albedo and the relative error.
 pub(super) type Row = (Vec<Kernel>, DVec3, f64);
 
@@ -71,6 +77,12 @@ struct Targets {
 /// How many lights there are in a row for so many threads.
 fn light_count(threads: usize) -> usize {
     FEWEST_LIGHTS + LIGHTS_A_THREAD * threads.max(FEWEST_THREADS)
+}
+
+/// The level that kernels of a row are no sharper than, for a lobe of this width in half vectors, in radians.
+fn sharpest_level(lobe_width_rad: f64, theta_o: f64) -> f64 {
+    let narrowest = (NARROWEST_IN_LOBE * lobe_width_rad).min(TOLD_RAD) * theta_o.cos().max(MIN_COS_THETA_D);
+    (narrowest / FINEST_WIDTH_RAD).log2().max(SHARPEST_LEVEL)
 }
 
 impl Targets {
@@ -134,6 +146,7 @@ fn fit_all(
     row_is_done: &(impl Fn() + Sync),
 ) -> Result<FittedTable> {
     let rows = settings.rows;
+    let lobe_width_rad = half_vector_width(brdf);
     // Row `index` of all azimuths, from what its neighbours' kernels are there: those of the view angle before and of the azimuth before.
     let fit = |index: usize, neighbours: &[(usize, &Row)]| -> Result<Row> {
         observer.check()?;
@@ -147,14 +160,16 @@ fn fit_all(
             (before, here)
         });
         let (before, neighbours): (Vec<_>, Vec<_>) = neighbours.unzip();
-        let fit = Fit::new(lights, *albedo / lights.unit).in_sets(settings.sets, share);
+        let fit = Fit::new(lights, *albedo / lights.unit)
+            .in_sets(settings.sets, share)
+            .no_sharper_than(sharpest_level(lobe_width_rad, to.theta_o));
         let start = match &neighbours[..] {
             [] => {
                 let View { theta_o, phi_o } = View::of_row(index, rows);
                 let [_, lobes] = Slice::with_lobes(&SeenBrdf::from_azimuth(brdf, phi_o), theta_o, Resolution::FULL);
                 let solved = |cells: Vec<Kernel>| {
                     let mut kernels = in_units(&cells);
-                    kernels.iter_mut().for_each(|kernel| kernel.level = kernel.level.max(lights.sharpest_level()));
+                    kernels.iter_mut().for_each(|kernel| kernel.level = kernel.level.max(fit.sharpest_level()));
                     fit.solve(&mut kernels, FIRST, observer)?;
                     Ok((fit.cost(&kernels), kernels))
                 };

@@ -53,12 +53,14 @@ pub struct Fit<'a> {
     share_of_sets: f32,
     /// Tied to these, with this strength: the row before.
     prior: Option<(&'a [Kernel], f64)>,
+    /// No step leaves a kernel sharper than this level.
+    sharpest_level: f64,
 }
 
 impl<'a> Fit<'a> {
     /// Of the slice with this albedo, which answers `lights` as they say; the albedo and all weights in units of `lights`.
     pub fn new(lights: &'a TestLights, albedo: DVec3) -> Self {
-        Self { lights, albedo, sets: 1, share_of_sets: 0.0, prior: None }
+        Self { lights, albedo, sets: 1, share_of_sets: 0.0, prior: None, sharpest_level: lights.sharpest_level() }
     }
 
     /// The same in so many sets of kernels, each of which answers the lights by itself too, with as many times the weights: kernel k is of
@@ -71,6 +73,16 @@ impl<'a> Fit<'a> {
     /// squared responses.
     pub fn tied(self, before: &'a [Kernel], strength: f64) -> Self {
         Self { prior: Some((before, strength * self.squared_responses())), ..self }
+    }
+
+    /// The same, in which no step leaves a kernel sharper than this level.
+    pub fn no_sharper_than(self, level: f64) -> Self {
+        Self { sharpest_level: self.sharpest_level.max(level), ..self }
+    }
+
+    /// The level that no step leaves a kernel sharper than.
+    pub fn sharpest_level(&self) -> f64 {
+        self.sharpest_level
     }
 
     /// How many sets of kernels there are.
@@ -160,13 +172,13 @@ impl<'a> Fit<'a> {
             let whole = kernels[k].level.floor();
             if whole < kernels[k].level || whole < WIDEST_LEVEL && slope(k, 1) < 0.0 {
                 [whole, whole + 1.0]
-            } else if whole > self.lights.sharpest_level() && slope(k, 0) > 0.0 {
+            } else if whole > self.sharpest_level && slope(k, 0) > 0.0 {
                 [whole - 1.0, whole]
             } else {
                 [whole, whole]
             }
         };
-        (0..kernels.len()).map(bounds).collect()
+        (0..kernels.len()).map(|k| bounds(k).map(|level| level.max(self.sharpest_level))).collect()
     }
 
     /// What the answers of each kernel differ by from those of the cosine kernel, whose weight is what kernels leave of the albedo.
