@@ -150,18 +150,10 @@ fn fit_all(
         let fit = Fit::new(lights, *albedo / lights.unit).in_sets(settings.sets, share);
         let start = match &neighbours[..] {
             [] => {
-                let View { theta_o, phi_o } = View::of_row(index, rows);
-                let [_, lobes] = Slice::with_lobes(&SeenBrdf::from_azimuth(brdf, phi_o), theta_o, Resolution::FULL);
-                let solved = |cells: Vec<Kernel>| {
-                    let mut kernels = in_units(&cells);
-                    kernels.iter_mut().for_each(|kernel| kernel.level = kernel.level.max(lights.sharpest_level()));
-                    fit.solve(&mut kernels, FIRST, observer)?;
-                    Ok((fit.cost(&kernels), kernels))
-                };
+                let seen = SeenBrdf::from_azimuth(brdf, to.phi_o);
+                let [_, lobes] = Slice::with_lobes(&seen, to.theta_o, Resolution::FULL);
                 let starts = in_sets(&lobes, settings.count, settings.sets);
-                let all = starts.into_par_iter().map(solved).collect::<Result<Vec<_>>>()?;
-                let best = all.into_iter().min_by(|(a, _), (b, _)| a.total_cmp(b));
-                best.map(|(_, kernels)| kernels).unwrap_or_default()
+                best_of(&fit, lights, starts.into_iter().map(|cells| in_units(&cells)).collect(), observer)?
             }
             [one] => one.clone(),
             [a, b, ..] => all_between(a, b, 0.5),
@@ -198,6 +190,18 @@ fn fit_all(
         fitted.iter_mut().for_each(|(kernels, ..)| *kernels = scaled(kernels, 0.0));
     }
     Ok(FittedTable::pack(&fitted, targets.azimuths, settings.sets))
+}
+
+/// The solution of the least cost from any of these `starts`, whose weights are in units of `lights`.
+fn best_of(fit: &Fit, lights: &TestLights, starts: Vec<Vec<Kernel>>, observer: &dyn Observer) -> Result<Vec<Kernel>> {
+    let solved = |mut kernels: Vec<Kernel>| {
+        kernels.iter_mut().for_each(|kernel| kernel.level = kernel.level.max(lights.sharpest_level()));
+        fit.solve(&mut kernels, FIRST, observer)?;
+        Ok((fit.cost(&kernels), kernels))
+    };
+    let all = starts.into_par_iter().map(solved).collect::<Result<Vec<_>>>()?;
+    let best = all.into_iter().min_by(|(a, _), (b, _)| a.total_cmp(b));
+    Ok(best.map(|(_, kernels)| kernels).unwrap_or_default())
 }
 
 /// How far kernels have moved, at most, from where they were `before` or where they are carried to, whichever is nearer: in widths and in
