@@ -4,10 +4,9 @@ use crate::memo::Memo;
 use crate::method::Method;
 use crate::output::{self, ExrHeader, Format};
 use crate::pipeline::{DeviceScene, Rendering, Wanted};
-use crate::prepare::{in_own_axes, prepare};
+use crate::prepare::{prepare, threads_of};
 use crate::progress::Observer;
-use crate::scene::{Background, ImageSettings, MaterialSource, Scene, Source, mesh};
-use crate::steps::{FindLobe, FitThreads, LoadMaterial};
+use crate::scene::{Background, MaterialSource, Scene, Source, mesh};
 use crate::threads::{ThreadSettings, Threads};
 use crate::vulkan::{Device, Instance};
 use crate::{Result, environment};
@@ -121,11 +120,8 @@ impl Renderer {
     pub fn threads(&self, material: impl Into<MaterialSource>, count: usize) -> Result<Threads> {
         let material = material.into();
         material.files().iter().for_each(|path| self.memo.look_again(path));
-        let round = self.memo.round(&());
-        let (brdf, _) = in_own_axes(&round.ask(&LoadMaterial(&material))?);
         let settings = ThreadSettings { count, ..Default::default() };
-        let settings = settings.for_picture(&*round.ask(&FindLobe(&brdf))?, ImageSettings::default().subpixels);
-        Ok((*round.ask(&FitThreads { brdf: &brdf, settings })?).clone())
+        Ok((*threads_of(&material, settings, &self.memo.round(&()))?).clone())
     }
 }
 

@@ -26,7 +26,6 @@ struct Properties {
     shares_surface: bool,
     /// Whether its shader includes pattern.glsl.
     has_pattern: bool,
-    is_unbiased: bool,
 }
 
 /// What a method's shader looks up besides BRDFs and threads.
@@ -47,20 +46,8 @@ pub struct Lookups {
 }
 
 impl Properties {
-    const fn unbiased(summary: &'static str, lookups: Lookups) -> Self {
-        Self {
-            summary,
-            older_name: None,
-            threads: None,
-            lookups,
-            shares_surface: false,
-            has_pattern: false,
-            is_unbiased: true,
-        }
-    }
-
-    const fn biased(summary: &'static str, lookups: Lookups) -> Self {
-        Self { is_unbiased: false, ..Self::unbiased(summary, lookups) }
+    const fn new(summary: &'static str, lookups: Lookups) -> Self {
+        Self { summary, older_name: None, threads: None, lookups, shares_surface: false, has_pattern: false }
     }
 }
 
@@ -105,7 +92,7 @@ macro_rules! methods {
             fn properties(self) -> Properties {
                 match self {
                     $(Self::$Method => $properties,)+
-                    Self::Reference => Properties::biased("The integral itself, by quadrature on the CPU.", NOTHING),
+                    Self::Reference => Properties::new("The integral itself, by quadrature on the CPU.", NOTHING),
                 }
             }
         }
@@ -200,11 +187,6 @@ impl Method {
     /// Whether a shader runs it: all but the reference.
     pub fn runs_on_gpu(self) -> bool {
         self != Self::Reference
-    }
-
-    /// Whether the mean over seeds is equation (1), whatever the number of samples.
-    pub fn is_unbiased(self) -> bool {
-        self.properties().is_unbiased
     }
 }
 

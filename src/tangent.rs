@@ -1,5 +1,5 @@
 //! Directions in the tangent plane. Twin of glsl/tangent.glsl.
-use glam::{Vec2, Vec3};
+use glam::Vec3;
 
 /// An axis orthogonal to unit `n`, for where nothing gives one. Twin of `any_tangent` (Duff et al. 2017).
 pub fn any_tangent(n: Vec3) -> Vec3 {
@@ -15,12 +15,6 @@ pub fn tangent_along(direction: Vec3, n: Vec3) -> Vec3 {
     let unit = if largest > 0.0 { (direction / largest).normalize() } else { n };
     let along = unit - unit.dot(n) * n;
     if along.length_squared() > 1e-6 { along.normalize() } else { any_tangent(n) }
-}
-
-/// Unit `tangent`, orthogonal to unit `n`, turned about `n` by an angle of this cosine and sine: counter-clockwise seen from where `n`
-/// points. Twin of `turned_tangent`.
-pub fn turned_tangent(tangent: Vec3, n: Vec3, turn: Vec2) -> Vec3 {
-    turn.x * tangent + turn.y * n.cross(tangent)
 }
 
 #[cfg(test)]

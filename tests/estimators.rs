@@ -12,7 +12,7 @@ use threadlight::low_level::geometry_texel::GeometryTexel;
 use threadlight::low_level::memo::Memo;
 use threadlight::low_level::method::{Method, Variant};
 use threadlight::low_level::output::write_exr;
-use threadlight::low_level::pipeline::{DeviceScene, Rendering, Wanted};
+use threadlight::low_level::pipeline::{Rendering, Wanted};
 use threadlight::low_level::prepare::Prepared;
 use threadlight::low_level::scene::{
     Background, MAX_SAMPLES, MAX_SUBPIXELS, MaterialSettings, MaterialSource, ObjectSettings, Pattern, Scene, Source,
@@ -25,19 +25,15 @@ fn estimators() -> Vec<Variant> {
     names.split(' ').map(|name| Variant::from_name(name).unwrap()).collect()
 }
 
-/// Those among them that are right on average, and whose pixels have nothing to do with each other.
+/// Those among them whose mean over seeds is equation (1), whatever the number of samples, and whose pixels have nothing to do with each
+/// other.
 fn unbiased() -> impl Iterator<Item = Method> {
     let independent = estimators().into_iter().filter(|variant| variant.pattern == Pattern::PerPixel);
-    independent.map(|variant| variant.method).filter(|method| method.is_unbiased())
-}
-
-/// A renderer whose compiled shaders are kept between tests and runs.
-fn renderer(gpu: &Validated, prepared: &Prepared) -> DeviceScene {
-    gpu.renderer(prepared)
+    independent.map(|variant| variant.method).filter(|method| *method != Method::Filtered)
 }
 
 fn render(gpu: &Validated, prepared: &Prepared) -> Rendering {
-    renderer(gpu, prepared).render(EVERYTHING, 1).unwrap()
+    gpu.render(prepared, EVERYTHING)
 }
 
 /// A sphere without background, shaded by `variant`.
@@ -248,7 +244,7 @@ fn surfaces(prepared: &Prepared, geometry: &[[u32; 2]]) -> Vec<(usize, Surface)>
 
 /// Pictures of `seeds` seeds, with other noise each.
 fn pictures(gpu: &Validated, prepared: &Prepared, seeds: u64) -> Vec<Vec<[f32; 4]>> {
-    let mut renderer = renderer(gpu, prepared);
+    let mut renderer = gpu.renderer(prepared);
     let picture = |seed| {
         renderer.reseed(seed);
         renderer.render(Wanted { radiance: true, ..Wanted::default() }, 1).unwrap().radiance

@@ -19,9 +19,9 @@ fn error_of(declare: impl FnOnce(&mut Graph<()>)) -> String {
 /// A pass that does `uses` to one image and one buffer with contents, and writes something else.
 fn error_of_uses(uses: impl FnOnce(&mut PassBuilder<()>, ImageHandle, BufferHandle, ImageHandle)) -> String {
     error_of(|graph| {
-        let image = graph.import_image("image", COLOR, Some(Access::SampledFragment), None);
-        let depth = graph.import_image("depth", DEPTH, Some(Access::SampledFragment), None);
-        let buffer = graph.import_buffer("buffer", SMALL, Some(Access::HostWrite), None);
+        let image = graph.import_image("image", COLOR, Some(Access::SampledCompute), None);
+        let depth = graph.import_image("depth", DEPTH, Some(Access::SampledCompute), None);
+        let buffer = graph.import_buffer("buffer", SMALL, Some(Access::TransferWrite), None);
         let other = graph.buffer("other", SMALL);
         let mut pass = graph.pass("wrong");
         uses(&mut pass, image, buffer, depth);
@@ -187,7 +187,7 @@ fn empty_sizes_double_names_and_idle_passes_are_errors() {
     });
     assert_eq!(text, "two passes are named `same`; names must differ");
     let text = error_of(|graph| {
-        let buffer = graph.import_buffer("buffer", SMALL, Some(Access::HostWrite), None);
+        let buffer = graph.import_buffer("buffer", SMALL, Some(Access::TransferWrite), None);
         let mut pass = graph.pass("look");
         pass.read(buffer, Access::UniformCompute);
         pass.record(());

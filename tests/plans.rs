@@ -72,12 +72,12 @@ fn one_barrier_serves_all_reads_in_one_layout_and_a_later_write_waits_for_all_of
     read(&mut graph, "compute", &[(old.into(), Access::StorageReadCompute)]);
     read(&mut graph, "again", &[(old.into(), Access::StorageReadCompute)]);
     let new = write(&mut graph, "refill", old, Access::TransferWrite);
-    read(&mut graph, "draw", &[(new.into(), Access::VertexInput)]);
+    read(&mut graph, "draw", &[(new.into(), Access::UniformCompute)]);
     let plan = plan(graph);
     assert_eq!(waits(&plan, "dispatch", "buffer"), ["transfer(write) -> indirect|compute(read arguments, read)"]);
     assert!(waits(&plan, "compute", "buffer").is_empty() && waits(&plan, "again", "buffer").is_empty());
     assert_eq!(waits(&plan, "refill", "buffer"), ["indirect|compute -> transfer(write)"]);
-    assert_eq!(waits(&plan, "draw", "buffer"), ["transfer(write) -> vertex input(read vertices)"]);
+    assert_eq!(waits(&plan, "draw", "buffer"), ["transfer(write) -> compute(read uniform)"]);
 }
 
 #[test]
@@ -107,11 +107,11 @@ fn a_reader_of_an_older_version_runs_before_the_write_though_declared_after_it()
     let old = write(&mut graph, "first", buffer, Access::TransferWrite);
     let new = write(&mut graph, "second", old, Access::StorageWriteCompute);
     read(&mut graph, "of_new", &[(new.into(), Access::Indirect)]);
-    read(&mut graph, "of_old", &[(old.into(), Access::UniformGraphics)]);
+    read(&mut graph, "of_old", &[(old.into(), Access::UniformCompute)]);
     let plan = plan(graph);
     let order: Vec<_> = plan.passes.iter().map(|pass| pass.name.as_str()).collect();
     assert_eq!(order, ["first", "of_old", "second", "of_new"]);
-    assert_eq!(waits(&plan, "second", "buffer"), ["vertex|fragment -> compute(write)"]);
+    assert_eq!(waits(&plan, "second", "buffer"), ["compute -> compute(write)"]);
 }
 
 #[test]
@@ -119,16 +119,16 @@ fn memory_is_shared_and_its_next_user_waits_for_the_last_also_across_frames() {
     let mut graph = Graph::new();
     let (early, late) = (graph.image("early", COLOR), graph.image("late", COLOR));
     let early = write(&mut graph, "draw_early", early, Access::ColorAttachment);
-    read(&mut graph, "use_early", &[(early.into(), Access::SampledFragment)]);
+    read(&mut graph, "use_early", &[(early.into(), Access::SampledCompute)]);
     let late = write(&mut graph, "draw_late", late, Access::StorageWriteCompute);
     read(&mut graph, "use_late", &[(late.into(), Access::TransferRead)]);
     let plan = plan(graph);
     assert_eq!((plan.aliased_bytes(), plan.unaliased_bytes()), (65536, 2 * 65536));
     let text = waits(&plan, "draw_late", "late");
-    let expected = "fragment|transfer -> compute(write), undefined => general  (memory of early, the frame before)";
+    let expected = "compute|transfer -> compute(write), undefined => general  (memory of early, the frame before)";
     assert_eq!(text, [expected]);
     let text = waits(&plan, "draw_early", "early");
-    let expected = "fragment|transfer -> color output(write), undefined => color  (memory of late, the frame before)";
+    let expected = "compute|transfer -> color output(write), undefined => color  (memory of late, the frame before)";
     assert_eq!(text, [expected]);
     assert!(plan.passes[0].barriers[0].is_aliasing());
 }
@@ -182,13 +182,13 @@ fn a_cache_kept_from_the_frame_before_needs_no_barrier() {
 
 #[test]
 fn an_owner_gets_its_resource_back_behind_readers_in_other_stages() {
-    let kept = Some(Access::SampledCompute);
+    let kept = Some(Access::StorageReadCompute);
     let mut graph = Graph::new();
-    let geometry = graph.import_image("geometry", COLOR, kept, kept);
-    read(&mut graph, "draw", &[(geometry.into(), Access::SampledFragment)]);
+    let counters = graph.import_buffer("counters", SMALL, kept, kept);
+    read(&mut graph, "dispatch", &[(counters.into(), Access::Indirect)]);
     let plan = plan(graph);
-    assert_eq!(waits(&plan, "draw", "geometry"), ["compute -> fragment(sample)"]);
-    assert_eq!(waits(&plan, "left", "geometry"), ["fragment -> compute(sample)"]);
+    assert_eq!(waits(&plan, "dispatch", "counters"), ["compute -> indirect(read arguments)"]);
+    assert_eq!(waits(&plan, "left", "counters"), ["indirect -> compute(read)"]);
 }
 
 #[test]

@@ -100,11 +100,6 @@ impl Roughness {
         self.alpha.x == self.alpha.y
     }
 
-    /// roughness_alpha along both axes.
-    pub fn alpha(self) -> DVec2 {
-        self.alpha
-    }
-
     /// roughness_alpha of the isotropic surface whose shadows along `w` are the same: alpha^2 sin^2 = alpha_x^2 x^2 + alpha_y^2 y^2. Heitz eq 80.
     #[inline]
     pub fn seen_along(self, w: DVec3) -> f64 {

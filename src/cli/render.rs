@@ -19,7 +19,7 @@ use threadlight::low_level::prepare::prepare;
 use threadlight::low_level::progress::Observer;
 use threadlight::low_level::scene::Scene;
 use threadlight::low_level::steps::FitThreads;
-use threadlight::low_level::vulkan::{Device, Instance};
+use threadlight::low_level::vulkan::Device;
 
 use threadlight::{Error, Result};
 
@@ -72,10 +72,7 @@ impl Render {
         // Whatever is wrong with the command is said before the work begins.
         let format = self.output.as_deref().map(Format::of).transpose()?;
         let scene = self.checked_scene()?;
-        let instance = Instance::new(self.machine.validate).map_err(Error::from)?;
-        let messages = instance.messages();
-        let device = Device::new(&instance, self.machine.device.as_deref()).map_err(Error::from)?;
-        drop(instance);
+        let (device, messages) = self.machine.open()?;
         let memo = Memo::new(self.machine.cache().as_deref());
         // Closing what was made and the device is part of what validation checks.
         let rendered = self.render(&scene, format, &device, &memo)?;

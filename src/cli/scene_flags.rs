@@ -3,11 +3,13 @@ use super::{cache_folder, nameable, number};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::value_parser;
 use std::path::PathBuf;
+use std::sync::Arc;
 use threadlight::low_level::environment;
 use threadlight::low_level::method::Method;
 use threadlight::low_level::scene::{
     Background, EXPOSURE, GAMMA, MAX_SAMPLES, MAX_SIZE_PX, MAX_SUBPIXELS, MaterialSource, Pattern, Scene, Source, mesh,
 };
+use threadlight::low_level::vulkan::{Device, Instance, Messages};
 
 /// What is rendered.
 #[derive(clap::Args)]
@@ -69,6 +71,12 @@ impl MachineFlags {
     /// The folder for what takes long to make, if there is to be one.
     pub fn cache(&self) -> Option<PathBuf> {
         cache_folder(self.no_cache)
+    }
+
+    /// The device, and what the validation layer says.
+    pub fn open(&self) -> threadlight::Result<(Arc<Device>, Messages)> {
+        let instance = Instance::new(self.validate)?;
+        Ok((Device::new(&instance, self.device.as_deref())?, instance.messages()))
     }
 }
 

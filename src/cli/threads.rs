@@ -6,9 +6,9 @@ use threadlight::Error;
 use threadlight::low_level::memo::{Asked, Memo, Origin, Step};
 use threadlight::low_level::method::Method;
 use threadlight::low_level::output;
-use threadlight::low_level::prepare::in_own_axes;
-use threadlight::low_level::scene::{ImageSettings, MaterialSource};
-use threadlight::low_level::steps::{FindLobe, FitThreads, LoadMaterial};
+use threadlight::low_level::prepare::threads_of;
+use threadlight::low_level::scene::MaterialSource;
+use threadlight::low_level::steps::FitThreads;
 use threadlight::low_level::threads::{self, ThreadKind, ThreadSettings};
 
 const EXAMPLES: &str = "\
@@ -73,10 +73,8 @@ impl Threads {
         let progress = TerminalProgress::new("threads")?;
         let memo = Memo::new(cache_folder(self.no_cache).as_deref());
         let round = memo.round(&progress);
-        let (brdf, _) = in_own_axes(&round.ask(&LoadMaterial(&source))?);
         let settings = ThreadSettings { kind, count, seed: self.seed, ..Default::default() };
-        let settings = settings.for_picture(&*round.ask(&FindLobe(&brdf))?, ImageSettings::default().subpixels);
-        let threads = round.ask(&FitThreads { brdf: &brdf, settings })?;
+        let threads = threads_of(&source, settings, &round)?;
         progress.finish();
         let Asked { origin, time, .. } = round.asked(FitThreads::NAME)[0];
         let threads = (*threads).clone().of_material(&name);

@@ -3,10 +3,7 @@ use std::f64::consts::PI;
 
 use glam::DVec3;
 
-/// The faces in their order in memory.
-pub const FACE_NAMES: [&str; 6] = ["+X", "-X", "+Y", "-Y", "+Z", "-Z"];
-
-/// The face that `direction` falls on, and s and t in [0, 1] there (Vulkan 1.3, "Cube Map Face Selection").
+/// The face that `direction` falls on, of +X -X +Y -Y +Z -Z, and s and t in [0, 1] there (Vulkan 1.3, "Cube Map Face Selection").
 pub fn face_of(direction: DVec3) -> (usize, f64, f64) {
     let DVec3 { x, y, z } = direction;
     let size = direction.abs();
@@ -99,9 +96,9 @@ mod tests {
             (1.0, 1.0, -1.0),
         ];
         for face in 0..6 {
-            assert!((direction_of(face, 0.5, 0.5) - axes[face]).length() < 1e-15, "{}", FACE_NAMES[face]);
+            assert!((direction_of(face, 0.5, 0.5) - axes[face]).length() < 1e-15, "face {face}");
             let corner = DVec3::from(corners[face]).normalize();
-            assert!((direction_of(face, 0.0, 0.0) - corner).length() < 1e-15, "{}", FACE_NAMES[face]);
+            assert!((direction_of(face, 0.0, 0.0) - corner).length() < 1e-15, "face {face}");
         }
     }
 

@@ -460,7 +460,7 @@ mod tests {
         for (face, axis) in axes.into_iter().enumerate() {
             let pyramid = lit(axis);
             let coarsest = &pyramid.levels[pyramid.levels.len() - 1];
-            assert!((0..6).all(|other| (coarsest[other][0] > 0.1) == (other == face)), "{}", cube::FACE_NAMES[face]);
+            assert!((0..6).all(|other| (coarsest[other][0] > 0.1) == (other == face)), "face {face}");
             assert_eq!(pyramid.lookup(axis.as_vec3(), 0.0), Vec3::ONE);
         }
     }

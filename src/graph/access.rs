@@ -8,18 +8,10 @@ pub enum Access {
     ColorAttachment,
     /// Depth attachment of a raster pass, tested and written.
     DepthAttachment,
-    /// Vertex attributes and indices.
-    VertexInput,
-    /// Uniform buffer in vertex or fragment shaders.
-    UniformGraphics,
     /// Uniform buffer in compute shaders.
     UniformCompute,
-    /// Sampled image in fragment shaders.
-    SampledFragment,
     /// Sampled image in compute shaders.
     SampledCompute,
-    /// Storage buffer or image, read in vertex or fragment shaders.
-    StorageReadGraphics,
     /// Storage buffer or image, read in compute shaders.
     StorageReadCompute,
     /// Storage buffer or image in compute shaders; `modify` where the shader also reads it (atomics too) or writes a part.
@@ -32,8 +24,6 @@ pub enum Access {
     TransferWrite,
     /// Read by the CPU after the frame's fence. Only the owner of an imported buffer does this, never a pass.
     HostRead,
-    /// Written by the CPU before the frame is submitted. Only the owner of an imported buffer does this, never a pass.
-    HostWrite,
     /// Presented. Only the owner of an imported image does this, never a pass. Its stage is `ALL_COMMANDS`, so that
     /// barriers form a chain with the swapchain's semaphores, which must wait and signal at `ALL_COMMANDS` too.
     Present,
@@ -62,26 +52,20 @@ impl Access {
     pub fn info(self) -> AccessInfo {
         use ash::vk::{AccessFlags2 as A, BufferUsageFlags as B, ImageLayout as L, ImageUsageFlags as I, PipelineStageFlags2 as S};
         let tests = S::EARLY_FRAGMENT_TESTS | S::LATE_FRAGMENT_TESTS;
-        let graphics = S::VERTEX_SHADER | S::FRAGMENT_SHADER;
         // The depth test reads what the clear wrote, so a depth write is never without reads.
         let (depth_read, depth_write) = (A::DEPTH_STENCIL_ATTACHMENT_READ, A::DEPTH_STENCIL_ATTACHMENT_READ | A::DEPTH_STENCIL_ATTACHMENT_WRITE);
         let (no, read_only) = (A::NONE, L::SHADER_READ_ONLY_OPTIMAL);
         let (stages, reads, writes, layout, image_usage, buffer_usage) = match self {
             Self::ColorAttachment     => (S::COLOR_ATTACHMENT_OUTPUT, A::COLOR_ATTACHMENT_READ, A::COLOR_ATTACHMENT_WRITE, L::COLOR_ATTACHMENT_OPTIMAL, Some(I::COLOR_ATTACHMENT), None),
             Self::DepthAttachment     => (tests, depth_read, depth_write, L::DEPTH_STENCIL_ATTACHMENT_OPTIMAL, Some(I::DEPTH_STENCIL_ATTACHMENT), None),
-            Self::VertexInput         => (S::VERTEX_INPUT, A::VERTEX_ATTRIBUTE_READ | A::INDEX_READ, no, L::UNDEFINED, None, Some(B::from_raw(B::VERTEX_BUFFER.as_raw() | B::INDEX_BUFFER.as_raw()))),
-            Self::UniformGraphics     => (graphics, A::UNIFORM_READ, no, L::UNDEFINED, None, Some(B::UNIFORM_BUFFER)),
             Self::UniformCompute      => (S::COMPUTE_SHADER, A::UNIFORM_READ, no, L::UNDEFINED, None, Some(B::UNIFORM_BUFFER)),
-            Self::SampledFragment     => (S::FRAGMENT_SHADER, A::SHADER_SAMPLED_READ, no, read_only, Some(I::SAMPLED), None),
             Self::SampledCompute      => (S::COMPUTE_SHADER, A::SHADER_SAMPLED_READ, no, read_only, Some(I::SAMPLED), None),
-            Self::StorageReadGraphics => (graphics, A::SHADER_STORAGE_READ, no, L::GENERAL, Some(I::STORAGE), Some(B::STORAGE_BUFFER)),
             Self::StorageReadCompute  => (S::COMPUTE_SHADER, A::SHADER_STORAGE_READ, no, L::GENERAL, Some(I::STORAGE), Some(B::STORAGE_BUFFER)),
             Self::StorageWriteCompute => (S::COMPUTE_SHADER, A::SHADER_STORAGE_READ, A::SHADER_STORAGE_WRITE, L::GENERAL, Some(I::STORAGE), Some(B::STORAGE_BUFFER)),
             Self::Indirect            => (S::DRAW_INDIRECT, A::INDIRECT_COMMAND_READ, no, L::UNDEFINED, None, Some(B::INDIRECT_BUFFER)),
             Self::TransferRead        => (S::ALL_TRANSFER, A::TRANSFER_READ, no, L::TRANSFER_SRC_OPTIMAL, Some(I::TRANSFER_SRC), Some(B::TRANSFER_SRC)),
             Self::TransferWrite       => (S::ALL_TRANSFER, no, A::TRANSFER_WRITE, L::TRANSFER_DST_OPTIMAL, Some(I::TRANSFER_DST), Some(B::TRANSFER_DST)),
             Self::HostRead            => (S::HOST, A::HOST_READ, no, L::UNDEFINED, None, Some(B::empty())),
-            Self::HostWrite           => (S::HOST, no, A::HOST_WRITE, L::UNDEFINED, None, Some(B::empty())),
             Self::Present             => (S::ALL_COMMANDS, no, no, L::PRESENT_SRC_KHR, Some(I::empty()), None),
         };
         AccessInfo { stages, reads, writes, layout, image_usage, buffer_usage }
@@ -89,7 +73,7 @@ impl Access {
 
     /// Whether only the owner of an imported resource can make this access, before or after the frame.
     pub fn is_outside_frame(self) -> bool {
-        matches!(self, Self::HostRead | Self::HostWrite | Self::Present)
+        matches!(self, Self::HostRead | Self::Present)
     }
 }
 

@@ -42,8 +42,7 @@ const WRITES: AccessFlags2 = AccessFlags2::from_raw(
         | AccessFlags2::COLOR_ATTACHMENT_WRITE.as_raw()
         | AccessFlags2::DEPTH_STENCIL_ATTACHMENT_WRITE.as_raw()
         | AccessFlags2::SHADER_STORAGE_WRITE.as_raw()
-        | AccessFlags2::TRANSFER_WRITE.as_raw()
-        | AccessFlags2::HOST_WRITE.as_raw(),
+        | AccessFlags2::TRANSFER_WRITE.as_raw(),
 );
 
 /// One write, or all reads in one layout until the next write or change of layout.

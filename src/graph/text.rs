@@ -109,16 +109,12 @@ fn access(access: Access) -> &'static str {
     match access {
         Access::ColorAttachment => "color attachment",
         Access::DepthAttachment => "depth attachment",
-        Access::VertexInput => "vertex input",
-        Access::UniformGraphics => "uniform, vertex and fragment",
         Access::UniformCompute => "uniform, compute",
-        Access::SampledFragment => "sampled, fragment",
         Access::SampledCompute => "sampled, compute",
-        Access::StorageReadGraphics => "storage, vertex and fragment",
         Access::StorageReadCompute | Access::StorageWriteCompute => "storage, compute",
         Access::Indirect => "indirect arguments",
         Access::TransferRead | Access::TransferWrite => "transfer",
-        Access::HostRead | Access::HostWrite => "host",
+        Access::HostRead => "host",
         Access::Present => "present",
     }
 }
@@ -142,10 +138,7 @@ fn scope(stages: PipelineStageFlags2, accesses: AccessFlags2) -> String {
     use {AccessFlags2 as A, PipelineStageFlags2 as S};
     let stage_words = [
         (S::DRAW_INDIRECT, "indirect"),
-        (S::VERTEX_INPUT, "vertex input"),
-        (S::VERTEX_SHADER, "vertex"),
         (S::EARLY_FRAGMENT_TESTS, "depth test"),
-        (S::FRAGMENT_SHADER, "fragment"),
         (S::COLOR_ATTACHMENT_OUTPUT, "color output"),
         (S::COMPUTE_SHADER, "compute"),
         (S::ALL_TRANSFER, "transfer"),
@@ -154,7 +147,6 @@ fn scope(stages: PipelineStageFlags2, accesses: AccessFlags2) -> String {
     ];
     let access_words = [
         (A::INDIRECT_COMMAND_READ, "read arguments"),
-        (A::VERTEX_ATTRIBUTE_READ, "read vertices"),
         (A::UNIFORM_READ, "read uniform"),
         (A::SHADER_SAMPLED_READ, "sample"),
         (A::SHADER_STORAGE_READ, "read"),
@@ -166,7 +158,6 @@ fn scope(stages: PipelineStageFlags2, accesses: AccessFlags2) -> String {
         (A::COLOR_ATTACHMENT_WRITE, "write"),
         (A::DEPTH_STENCIL_ATTACHMENT_WRITE, "write"),
         (A::TRANSFER_WRITE, "write"),
-        (A::HOST_WRITE, "write"),
         (A::MEMORY_WRITE, "write"),
     ];
     let stages: Vec<_> = stage_words.iter().filter(|(bit, _)| stages.contains(*bit)).map(|(_, word)| *word).collect();

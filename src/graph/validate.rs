@@ -148,7 +148,7 @@ fn misfit(access: Access, kind: &ResourceKind) -> Option<&'static str> {
         ResourceKind::Image(desc) => match (access, is_depth(desc.format)) {
             (Access::DepthAttachment, false) => Some("its format has no depth"),
             (Access::ColorAttachment, true) => Some("its format is a depth format"),
-            (Access::StorageReadGraphics | Access::StorageReadCompute | Access::StorageWriteCompute, true) => {
+            (Access::StorageReadCompute | Access::StorageWriteCompute, true) => {
                 Some("depth formats cannot be storage images")
             }
             _ => None,

@@ -161,20 +161,7 @@ pub fn parse_exr(path: &Path, bytes: &[u8]) -> Result<PictureFile> {
         )
     };
     let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(broken)?;
-    let area = |size: Vec2<usize>| size.0.saturating_mul(size.1);
-    // Every layer is read before one is chosen, tile by tile; a tile may claim to be larger than the picture.
-    let samples = meta.headers.iter().flat_map(|header| {
-        let tile = match &header.blocks {
-            BlockDescription::Tiles(tiles) => area(tiles.tile_size),
-            BlockDescription::ScanLines => 0,
-        };
-        std::iter::repeat_n(area(header.layer_size).max(tile) as u64, header.channels.list.len().max(1))
-    });
-    let most = meta.headers.iter().map(|header| max_samples_per_byte(header.compression)).max().unwrap_or_default();
-    check_pixels(path, samples, bytes.len(), most)?;
-    // However small the part is that has data.
-    let shown = meta.headers.first().map_or(0, |header| area(header.shared_attributes.display_window.size));
-    check_pixels(path, [shown as u64], bytes.len(), MAX_SAMPLES_PER_BYTE)?;
+    check_sizes(path, &meta, bytes.len())?;
     check_dwa_chunks(&meta, bytes).map_err(broken)?;
     let image: FlatImage = exr::prelude::read()
         .no_deep_data()
@@ -225,6 +212,28 @@ pub fn parse_exr(path: &Path, bytes: &[u8]) -> Result<PictureFile> {
         format: Format::Exr,
         attributes: attribute_texts(&image, layer),
     })
+}
+
+/// Columns times rows.
+fn area(size: Vec2<usize>) -> usize {
+    size.0.saturating_mul(size.1)
+}
+
+/// An error for a picture, or a layer of it, that claims to be larger than a file of so many bytes can hold.
+fn check_sizes(path: &Path, meta: &MetaData, file_bytes: usize) -> Result<()> {
+    // Every layer is read before one is chosen, tile by tile; a tile may claim to be larger than the picture.
+    let samples = meta.headers.iter().flat_map(|header| {
+        let tile = match &header.blocks {
+            BlockDescription::Tiles(tiles) => area(tiles.tile_size),
+            BlockDescription::ScanLines => 0,
+        };
+        std::iter::repeat_n(area(header.layer_size).max(tile) as u64, header.channels.list.len().max(1))
+    });
+    let most = meta.headers.iter().map(|header| max_samples_per_byte(header.compression)).max().unwrap_or_default();
+    check_pixels(path, samples, file_bytes, most)?;
+    // However small the part is that has data.
+    let shown = meta.headers.first().map_or(0, |header| area(header.shared_attributes.display_window.size));
+    check_pixels(path, [shown as u64], file_bytes, MAX_SAMPLES_PER_BYTE)
 }
 
 /// An error if a chunk that DWA has compressed claims more than can be deflated to its size: the crate allocates whatever such a chunk says.

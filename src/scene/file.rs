@@ -177,8 +177,13 @@ fn parse(text: &str, base_dir: &Path) -> Result<Scene, String> {
     if scene.objects.is_empty() {
         scene.objects = vec![ObjectSettings::new(Source::Builtin("sphere".into()), &first_material)];
     }
+    resolve_paths(&mut scene, base_dir)?;
+    Ok(scene)
+}
 
-    let resolve = |path: &mut PathBuf| *path = base_dir.join(&*path);
+/// Puts `folder` in front of the relative paths of `scene`.
+fn resolve_paths(scene: &mut Scene, folder: &Path) -> Result<(), String> {
+    let resolve = |path: &mut PathBuf| *path = folder.join(&*path);
     if let Source::File(path) = &mut scene.environment.source {
         resolve(path);
     }
@@ -186,7 +191,7 @@ fn parse(text: &str, base_dir: &Path) -> Result<Scene, String> {
         match &mut material.source {
             MaterialSource::File(path) => resolve(path),
             MaterialSource::Model { parameters, .. } => {
-                resolve_base_files(parameters, base_dir)
+                resolve_base_files(parameters, folder)
                     .map_err(|error| error.within(format!("material \"{}\"", material.name)).to_string())?;
             }
             MaterialSource::Builtin(_) | MaterialSource::Custom(_) => {}
@@ -197,7 +202,7 @@ fn parse(text: &str, base_dir: &Path) -> Result<Scene, String> {
             resolve(path);
         }
     }
-    Ok(scene)
+    Ok(())
 }
 
 /// Says of a problem in which line of `text` it is, that of the byte at `position`. Lines are counted for errors only: a scene may have tens of

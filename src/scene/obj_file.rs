@@ -142,6 +142,20 @@ fn geometry_lines(text: &str, is_textured: bool) -> Result<(String, Vec<Smoothin
         text.lines().filter(is_one).count() as i64
     };
     let (normals, uvs) = (count_of("vn"), count_of("vt"));
+    // Adds the corner `word`, with so many normals and texture coordinates before it, to `lines`; the error is what there is not.
+    let corner = |lines: &mut String, word: &str, [normals_before, uvs_before]: [i64; 2]| -> Result<(), String> {
+        let mut numbers = word.split('/');
+        let [position, uv, normal] = [(); 3].map(|()| numbers.next().unwrap_or_default());
+        let normal = index_among(normal, normals, normals_before).map_err(|number| format!("normal {number}"))?;
+        // Writing to a string cannot fail.
+        let _ = if is_textured {
+            let uv = index_among(uv, uvs, uvs_before).map_err(|number| format!("texture coordinate {number}"))?;
+            write!(lines, " {position}/{uv}/{normal}")
+        } else {
+            write!(lines, " {position}//{normal}")
+        };
+        Ok(())
+    };
     let (mut lines, mut normals_before, mut uvs_before) = (String::with_capacity(text.len()), 0, 0);
     let (mut groups, mut group) = (Vec::new(), SmoothingGroup::Unsaid);
     for (index, line) in text.lines().enumerate() {
@@ -163,21 +177,8 @@ fn geometry_lines(text: &str, is_textured: bool) -> Result<(String, Vec<Smoothin
             let is_flat = group == SmoothingGroup::Numbered(0);
             groups.push(if is_flat { SmoothingGroup::Flat(groups.len() as u32) } else { group });
             for word in words {
-                let mut numbers = word.split('/');
-                let position = numbers.next().unwrap_or_default();
-                let problem = |what| format!("line {}: there is no {what}", index + 1);
-                let uv = numbers.next().unwrap_or_default();
-                let normal = index_among(numbers.next().unwrap_or_default(), normals, normals_before)
-                    .map_err(|number| problem(format!("normal {number}")))?;
-                // Writing to a string cannot fail.
-                let _ = match is_textured {
-                    false => write!(lines, " {position}//{normal}"),
-                    true => {
-                        let uv = index_among(uv, uvs, uvs_before)
-                            .map_err(|number| problem(format!("texture coordinate {number}")))?;
-                        write!(lines, " {position}/{uv}/{normal}")
-                    }
-                };
+                corner(&mut lines, word, [normals_before, uvs_before])
+                    .map_err(|what| format!("line {}: there is no {what}", index + 1))?;
             }
         } else if keyword == "vt" {
             // The second one may be left out, a third has no meaning here.

@@ -29,14 +29,6 @@ impl TangentRule {
             Self::Uv => of_mesh,
         }
     }
-
-    /// The axis, not zero, of a rule that has one.
-    pub fn axis(self) -> Option<Vec3> {
-        match self {
-            Self::Around(axis) | Self::Along(axis) => Some(axis),
-            Self::Uv => None,
-        }
-    }
 }
 
 #[derive(Deserialize)]

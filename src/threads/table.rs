@@ -4,8 +4,6 @@ use std::f64::consts::FRAC_PI_2;
 
 use glam::{DVec3, Vec4, dvec3};
 
-use super::theta_o;
-
 /// One incident sample in the shading frame of its row.
 #[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
@@ -61,11 +59,6 @@ pub struct ThreadTable {
 }
 
 impl ThreadTable {
-    /// View angle of `row` in radians.
-    pub fn theta_o(&self, row: usize) -> f64 {
-        theta_o(row, self.rows)
-    }
-
     /// The samples of `row`, one per thread.
     pub fn row(&self, row: usize) -> &[Sample] {
         &self.samples[row * self.count..][..self.count]

@@ -156,24 +156,25 @@ impl Viewer {
             }
         }
         if let (Some(drawn), Some(view)) = (&drawn, &view) {
-            let frame = start.elapsed();
-            let size = [view.width, view.height];
-            if drawn.ran.iter().any(|pass| pass == "shade") {
-                let full = &self.session.shown().image;
-                // Drivers may compile a shader where it first runs.
-                if std::mem::replace(&mut self.is_compiled, true) {
-                    let time = drawn.picture_time().unwrap_or(frame);
-                    self.dynamic_resolution.drawn(size, [full.width, full.height], time);
-                }
-            }
-            tracing::debug!("{} x {} in {:.1} ms", size[0], size[1], frame.as_secs_f64() * 1e3);
-            self.measured.frames += 1;
-            (self.measured.frame, self.measured.size) = (frame, size);
-            self.measured.ran.clone_from(&drawn.ran);
-            self.measured.time(&drawn.passes);
-            self.measured.counted = drawn.counted.or(self.measured.counted);
+            self.note(drawn, [view.width, view.height], start.elapsed());
         }
         Ok(drawn)
+    }
+
+    /// Notes what is known of a frame whose picture has this `size`, which took `time` in all.
+    fn note(&mut self, drawn: &Drawn, size: [u32; 2], time: Duration) {
+        // Drivers may compile a shader where it first runs.
+        if drawn.ran.iter().any(|pass| pass == "shade") && std::mem::replace(&mut self.is_compiled, true) {
+            let full = &self.session.shown().image;
+            let of_picture = drawn.picture_time().unwrap_or(time);
+            self.dynamic_resolution.drawn(size, [full.width, full.height], of_picture);
+        }
+        tracing::debug!("{} x {} in {:.1} ms", size[0], size[1], time.as_secs_f64() * 1e3);
+        self.measured.frames += 1;
+        (self.measured.frame, self.measured.size) = (time, size);
+        self.measured.ran.clone_from(&drawn.ran);
+        self.measured.time(&drawn.passes);
+        self.measured.counted = drawn.counted.or(self.measured.counted);
     }
 
     /// There is too little memory for a frame of `view`: later ones have a quarter of its pixels at most.

@@ -129,13 +129,6 @@ impl Orbit {
         self.hold();
     }
 
-    /// The same orbit around other objects.
-    pub fn around(self, bounds: Bounds) -> Self {
-        let mut orbit = Self { bounds, ..self };
-        orbit.hold();
-        orbit
-    }
-
     fn turn_about_vertical(&mut self, angle_rad: f64) {
         if angle_rad.is_finite() {
             let turned = DQuat::from_axis_angle(self.vertical, angle_rad % TAU) * self.heading;
@@ -278,7 +271,7 @@ mod tests {
     #[test]
     fn framing_looks_from_the_same_side_as_large_as_the_default_view() {
         let bounds = Bounds { centre: DVec3::new(1.0, 2.0, 3.0), radius: 2.0 };
-        let mut orbit = Orbit::new(&start(), UNIT).around(bounds);
+        let mut orbit = Orbit::new(&start(), bounds);
         orbit.pan(DVec2::new(300.0, 20.0), 480.0);
         orbit.zoom(Scroll::Lines(7.0));
         for (aspect, fov_y_deg) in [(4.0 / 3.0, 36.0), (0.5, 36.0)] {

@@ -162,11 +162,6 @@ impl Presenter {
         })
     }
 
-    /// How frames reach the screen.
-    pub fn mode(&self) -> PresentMode {
-        self.swapchain.mode()
-    }
-
     /// Says that the window has another size.
     pub fn window_changed(&mut self) {
         self.swapchain.window_changed();

@@ -93,8 +93,6 @@ impl Drop for Memory {
 pub enum BufferUse {
     /// Fast for the GPU, out of the CPU's reach.
     Device,
-    /// Written by the CPU, read by the GPU.
-    Upload,
     /// Written by the GPU, read by the CPU.
     Readback,
 }
@@ -137,7 +135,6 @@ impl Buffer {
         let mut buffer = Self::unbound(device, name, size_bytes, usage)?;
         let location = match place {
             BufferUse::Device => MemoryLocation::GpuOnly,
-            BufferUse::Upload => MemoryLocation::CpuToGpu,
             BufferUse::Readback => MemoryLocation::GpuToCpu,
         };
         let memory = Memory::allocate(device, name, buffer.requirements(), location, true)?;

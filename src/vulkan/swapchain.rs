@@ -131,11 +131,6 @@ impl Swapchain {
         rgb8(self.format, texel)
     }
 
-    /// How frames reach the screen.
-    pub fn mode(&self) -> PresentMode {
-        self.mode
-    }
-
     /// Says that the window has changed: the next turn is one of images of its new size.
     pub fn window_changed(&mut self) {
         self.current.iter_mut().for_each(|current| current.stale = true);

@@ -8,6 +8,7 @@ use threadlight::low_level::memo::{Memo, Round};
 use threadlight::low_level::pipeline::{DeviceScene, Rendering, Wanted};
 use threadlight::low_level::prepare::{Prepared, prepare};
 use threadlight::low_level::scene::{MaterialSettings, MaterialSource, Scene, Source};
+use threadlight::low_level::shading::texels_of_pixel;
 use threadlight::low_level::vulkan::{Device, DeviceKind, Instance, Messages};
 
 /// A device with validation on; `finish` fails the test if validation said anything, from first call to last.
@@ -78,12 +79,7 @@ pub const EVERYTHING: Wanted = Wanted { radiance: true, display: false, geometry
 
 /// The texels of the geometry cache that a pixel sees.
 pub fn texels_of(prepared: &Prepared, rendering: &Rendering, pixel: UVec2) -> Vec<UVec2> {
-    let (s, stride) = (prepared.view.subpixels, prepared.view.width * prepared.view.subpixels);
-    let texel = |j: u32| {
-        let at = pixel * s + UVec2::new(j % s, j / s);
-        UVec2::from(rendering.geometry[(at.y * stride + at.x) as usize])
-    };
-    (0..s * s).map(texel).collect()
+    texels_of_pixel(&prepared.view, &rendering.geometry, pixel)
 }
 
 /// All pixels, row by row.

@@ -44,25 +44,12 @@ pub struct Use {
 }
 
 pub const COLOR_WRITES: [Access; 3] = [Access::ColorAttachment, Access::StorageWriteCompute, Access::TransferWrite];
-pub const COLOR_READS: [Access; 5] = [
-    Access::SampledFragment,
-    Access::SampledCompute,
-    Access::StorageReadGraphics,
-    Access::StorageReadCompute,
-    Access::TransferRead,
-];
+pub const COLOR_READS: [Access; 3] = [Access::SampledCompute, Access::StorageReadCompute, Access::TransferRead];
 pub const DEPTH_WRITES: [Access; 2] = [Access::DepthAttachment, Access::TransferWrite];
-pub const DEPTH_READS: [Access; 3] = [Access::SampledFragment, Access::SampledCompute, Access::TransferRead];
+pub const DEPTH_READS: [Access; 2] = [Access::SampledCompute, Access::TransferRead];
 pub const BUFFER_WRITES: [Access; 2] = [Access::StorageWriteCompute, Access::TransferWrite];
-pub const BUFFER_READS: [Access; 7] = [
-    Access::VertexInput,
-    Access::UniformGraphics,
-    Access::UniformCompute,
-    Access::StorageReadGraphics,
-    Access::StorageReadCompute,
-    Access::Indirect,
-    Access::TransferRead,
-];
+pub const BUFFER_READS: [Access; 4] =
+    [Access::UniformCompute, Access::StorageReadCompute, Access::Indirect, Access::TransferRead];
 
 pub fn writes_of(kind: &ResourceKind) -> &'static [Access] {
     match kind {
@@ -99,9 +86,9 @@ impl Frame {
             };
             let is_buffer = matches!(kind, ResourceKind::Buffer(_));
             let import = random.chance(30).then(|| {
-                let before = accesses(&mut random, Some(if is_buffer { Access::HostWrite } else { Access::Present }));
-                let after = accesses(&mut random, Some(if is_buffer { Access::HostRead } else { Access::Present }));
-                (before, if random.chance(40) { before.filter(|a| *a != Access::HostWrite) } else { after })
+                let outside = Some(if is_buffer { Access::HostRead } else { Access::Present });
+                let [before, after] = [(); 2].map(|()| accesses(&mut random, outside));
+                (before, if random.chance(40) { before } else { after })
             });
             frame.resources.push(Resource { name: format!("r{index}"), kind, import, versions: 0 });
         }

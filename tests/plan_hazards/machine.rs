@@ -35,8 +35,7 @@ pub const WRITES: vk::AccessFlags2 = vk::AccessFlags2::from_raw(
     vk::AccessFlags2::COLOR_ATTACHMENT_WRITE.as_raw()
         | vk::AccessFlags2::DEPTH_STENCIL_ATTACHMENT_WRITE.as_raw()
         | vk::AccessFlags2::SHADER_STORAGE_WRITE.as_raw()
-        | vk::AccessFlags2::TRANSFER_WRITE.as_raw()
-        | vk::AccessFlags2::HOST_WRITE.as_raw(),
+        | vk::AccessFlags2::TRANSFER_WRITE.as_raw(),
 );
 
 /// The accesses that write: the table counts the depth test among them, which reads.

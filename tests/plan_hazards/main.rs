@@ -63,7 +63,7 @@ fn every_pass_runs_after_what_it_depends_on_and_ties_keep_the_declared_order() {
 #[test]
 fn resources_alive_together_never_share_bytes() {
     let mut shared = 0;
-    for (_, plan) in plans(0..400) {
+    for (_, plan) in plans(0..600) {
         for (index, a) in plan.resources.iter().enumerate() {
             let Some(at) = a.placement else { continue };
             let (needs, block) = (memory(&a.info), plan.blocks[at.block]);

@@ -4,12 +4,13 @@ use crate::cli::scene_flags::parse_size;
 use crate::cli::{cache_folder, nameable, number, stem};
 use anyhow::Context;
 use clap::value_parser;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use threadlight::low_level::environment;
 use threadlight::low_level::evaluate::reference::{Processor, ReferenceSettings};
 use threadlight::low_level::evaluate::sweep::Measured;
-use threadlight::low_level::evaluate::{Cases, Shard, Sweep, reference_picture, sweep};
+use threadlight::low_level::evaluate::{Cases, Shard, Sweep, reference_picture, sweep, tables};
 use threadlight::low_level::memo::{Memo, Round};
 use threadlight::low_level::method::{Method, Variant};
 use threadlight::low_level::output;
@@ -133,8 +134,7 @@ impl CasesArguments {
 
 /// The device of this name or index, or the one that the program prefers; not validated, which would take time that is measured.
 pub fn open_device(device: Option<&str>) -> Result<Arc<Device>> {
-    let instance = Instance::new(false).map_err(Error::from)?;
-    Device::new(&instance, device).map_err(Error::from)
+    Ok(Device::new(&Instance::new(false)?, device)?)
 }
 
 /// Each of `texts` with the name that it has in tables: without folder and extension.
@@ -228,6 +228,19 @@ impl JsonArgument {
     pub fn check(&self, read: &[PathBuf]) -> Result<()> {
         self.json.as_deref().map_or(Ok(()), output::check_writable)?;
         output::check_not_read(&self.json, read)
+    }
+
+    /// Prints the tables of what was `found`, if anything was, and writes it.
+    pub fn report<T: serde::Serialize>(
+        &self,
+        found: &[T],
+        tables: impl FnOnce(&[T]) -> Vec<tables::Section>,
+    ) -> anyhow::Result<()> {
+        if found.is_empty() {
+            return Ok(());
+        }
+        write!(std::io::stdout().lock(), "{}", tables::text(&tables(found)))?;
+        self.write(&found)
     }
 
     pub fn write(&self, measurements: &impl serde::Serialize) -> anyhow::Result<()> {

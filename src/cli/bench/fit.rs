@@ -3,9 +3,7 @@ use super::arguments::{JsonArgument, files_of_materials, named_materials, once};
 use crate::cli::nameable;
 use crate::cli::progress::TerminalProgress;
 use clap::value_parser;
-use std::io::Write;
 use threadlight::low_level::evaluate::fit::{self, Fits};
-use threadlight::low_level::evaluate::tables;
 use threadlight::low_level::memo::Memo;
 use threadlight::low_level::threads::fitted::MAX_COUNT;
 
@@ -50,10 +48,7 @@ impl BenchFit {
         let mut found = Vec::new();
         let result = fit::run(&fits, &Memo::new(None), &progress, &mut found);
         progress.finish();
-        if !found.is_empty() {
-            write!(std::io::stdout().lock(), "{}", tables::text(&[fit::tables(&found)]))?;
-            self.json.write(&found)?;
-        }
+        self.json.report(&found, |found| vec![fit::tables(found)])?;
         Ok(result?)
     }
 }

@@ -5,13 +5,10 @@ use crate::cli::number;
 use crate::cli::progress::TerminalProgress;
 use crate::cli::scene_flags::{MachineFlags, SceneFlags};
 use clap::value_parser;
-use std::io::Write;
 use threadlight::low_level::evaluate::live::{self, Drag};
 use threadlight::low_level::evaluate::reference::ReferenceSettings;
-use threadlight::low_level::evaluate::tables;
 use threadlight::low_level::memo::Memo;
 use threadlight::low_level::scene::Scene;
-use threadlight::low_level::vulkan::{Device, Instance};
 use threadlight::{Error, Result};
 
 const EXAMPLES: &str = "\
@@ -69,10 +66,7 @@ impl BenchLive {
         let [from, to] = [("--from", &self.from), ("--to", &self.to)].map(|(flag, text)| numbers(flag, text));
         let values = between(&from?, &to?, self.steps)?;
         let drag = Drag { scene, material: material.to_owned(), key: key.to_owned(), values };
-        let instance = Instance::new(self.machine.validate).map_err(Error::from)?;
-        let messages = instance.messages();
-        let device = Device::new(&instance, self.machine.device.as_deref()).map_err(Error::from)?;
-        drop(instance);
+        let (device, messages) = self.machine.open()?;
         let memo = Memo::new(self.machine.cache().as_deref());
         let settings = ReferenceSettings { tolerance: self.reference_tolerance, ..ReferenceSettings::default() };
         let progress = TerminalProgress::of("bench live", "pictures")?;
@@ -80,10 +74,7 @@ impl BenchLive {
         let result = live::run(&drag, &settings, &device, &memo, &progress, &mut found);
         drop(device);
         progress.finish();
-        if !found.is_empty() {
-            write!(std::io::stdout().lock(), "{}", tables::text(&[live::table(&drag, &found)]))?;
-            self.json.write(&found)?;
-        }
+        self.json.report(&found, |found| vec![live::table(&drag, found)])?;
         result?;
         none_of(&messages.all())
     }

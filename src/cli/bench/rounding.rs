@@ -1,8 +1,7 @@
 //! `threadlight bench rounding`: what each rounding of a device costs.
 use super::arguments::{CasesArguments, Defaults, JsonArgument};
 use crate::cli::progress::TerminalProgress;
-use std::io::Write;
-use threadlight::low_level::evaluate::{rounding, tables};
+use threadlight::low_level::evaluate::rounding;
 use threadlight::low_level::method::Method;
 
 const EXAMPLES: &str = "\
@@ -46,10 +45,7 @@ impl BenchRounding {
         let mut found = Vec::new();
         let result = rounding::run(&cases, &device, &memo, &progress, &mut found);
         progress.finish();
-        if !found.is_empty() {
-            write!(std::io::stdout().lock(), "{}", tables::text(&[rounding::tables(&found)]))?;
-            self.json.write(&found)?;
-        }
+        self.json.report(&found, |found| vec![rounding::tables(found)])?;
         Ok(result?)
     }
 }

@@ -3,9 +3,8 @@ use super::arguments::JsonArgument;
 use crate::cli::cache_folder;
 use crate::cli::progress::TerminalProgress;
 use crate::cli::scene_flags::SceneFlags;
-use std::io::Write;
 use threadlight::Error;
-use threadlight::low_level::evaluate::{shaders, tables};
+use threadlight::low_level::evaluate::shaders;
 use threadlight::low_level::memo::Memo;
 use threadlight::low_level::method::Method;
 use threadlight::low_level::vulkan::{CompilingDevice, Instance};
@@ -61,12 +60,9 @@ impl BenchShaders {
         let mut costs = Vec::new();
         let result = shaders::run(&scene, &methods, &device, &memo, &progress, &mut costs);
         progress.finish();
-        if !costs.is_empty() {
-            let about = device.description();
-            let name = format!("{}, {}", about.name, about.driver);
-            write!(std::io::stdout().lock(), "{}", tables::text(&[shaders::table(&name, &costs)]))?;
-            self.json.write(&costs)?;
-        }
+        let about = device.description();
+        let name = format!("{}, {}", about.name, about.driver);
+        self.json.report(&costs, |costs| vec![shaders::table(&name, costs)])?;
         Ok(result?)
     }
 }

@@ -3,12 +3,8 @@ use super::arguments::JsonArgument;
 use crate::cli::none_of;
 use crate::cli::progress::TerminalProgress;
 use crate::cli::scene_flags::MachineFlags;
-use std::io::Write;
-use threadlight::Error;
 use threadlight::low_level::evaluate::stress::{self, Extent, Stressed};
-use threadlight::low_level::evaluate::tables;
 use threadlight::low_level::memo::Memo;
-use threadlight::low_level::vulkan::{Device, Instance};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -48,20 +44,14 @@ pub struct BenchStress {
 impl BenchStress {
     pub fn run(self) -> anyhow::Result<()> {
         self.json.check(&[])?;
-        let instance = Instance::new(self.machine.validate).map_err(Error::from)?;
-        let messages = instance.messages();
-        let device = Device::new(&instance, self.machine.device.as_deref()).map_err(Error::from)?;
-        drop(instance);
+        let (device, messages) = self.machine.open()?;
         let progress = TerminalProgress::of("bench stress", "cases")?;
         let mut found = Vec::new();
         let extent = Extent { all: self.all, only: self.only };
         let result = stress::run(&extent, &device, &Memo::new(self.machine.cache().as_deref()), &progress, &mut found);
         drop(device);
         progress.finish();
-        if !found.is_empty() {
-            write!(std::io::stdout().lock(), "{}", tables::text(&[stress::tables(&found)]))?;
-            self.json.write(&found)?;
-        }
+        self.json.report(&found, |found| vec![stress::tables(found)])?;
         result?;
         let broken = found.iter().filter(|case: &&Stressed| case.is_broken()).count();
         anyhow::ensure!(broken == 0, "bench stress: {broken} of {} cases break a bound", found.len());

@@ -4,10 +4,8 @@ use crate::cli::progress::TerminalProgress;
 use crate::cli::scene_flags::parse_size;
 use crate::cli::{cache_folder, nameable};
 use clap::value_parser;
-use std::io::Write;
 use std::path::PathBuf;
 use threadlight::low_level::brdf::Brdf;
-use threadlight::low_level::evaluate::tables;
 use threadlight::low_level::evaluate::together::{self, Together};
 use threadlight::low_level::memo::Memo;
 use threadlight::low_level::threads::fitted::MAX_COUNT;
@@ -79,10 +77,7 @@ impl BenchTogether {
         let mut found = Vec::new();
         let result = together::run(&together, &device, &memo, &progress, &mut found);
         progress.finish();
-        if !found.is_empty() {
-            write!(std::io::stdout().lock(), "{}", tables::text(&together::tables(&found)))?;
-            self.json.write(&found)?;
-        }
+        self.json.report(&found, together::tables)?;
         Ok(result?)
     }
 }

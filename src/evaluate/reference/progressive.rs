@@ -37,13 +37,6 @@ pub struct Estimate {
     pub error_estimate: f64,
 }
 
-impl Estimate {
-    /// Whether the pixel was estimated, or else is like another.
-    pub fn is_estimated(&self, x: usize, y: usize) -> bool {
-        x.is_multiple_of(self.stage.step) && y.is_multiple_of(self.stage.step)
-    }
-}
-
 /// Estimates the picture of `geometry` (texels as [`Rendering::geometry`](crate::pipeline::Rendering::geometry) has them) stage by
 /// stage, and hands each to `publish`. `observer` hears of rows of pixels.
 ///

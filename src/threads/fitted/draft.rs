@@ -61,59 +61,22 @@ pub fn draft(brdf: &Brdf, before: &FittedTable, observer: &dyn Observer) -> Resu
 
 /// The threads of `before`, but not those of its sub-pixels; what `share` is, [`Fit::in_sets`] says.
 fn continued(brdf: &Brdf, before: &FittedTable, share: f32, observer: &dyn Observer) -> Result<FittedTable> {
-    let FittedTable { rows, azimuths, count, sets, .. } = *before;
+    let FittedTable { rows, azimuths, sets, .. } = *before;
     let (mut places, columns) = (every(ROW_STEP, rows), every(AZIMUTH_STEP, azimuths));
     let before_rim = rows.saturating_sub(RIM_STEP + 1);
     if let (Err(place), 1) = (places.binary_search(&before_rim), azimuths) {
         places.insert(place, before_rim);
     }
-    let view = |index: usize| View::of_row(index, rows);
-    // The lights of a row, its albedo, and its kernels in units of the lights.
-    let of_row = |index: usize| {
-        let View { theta_o, phi_o } = view(index);
-        let slices = Slice::with_lobes(&SeenBrdf::from_azimuth(brdf, phi_o), theta_o, Resolution::DRAFT);
-        let lights = TestLights::new(&slices, FEWEST_LIGHTS + LIGHTS_A_THREAD * count, 0, Quadrature::DRAFT);
-        let albedo = slices[0].albedo();
-        let kernels = scaled(&in_proportion(before, index, albedo), 1.0 / lights.unit);
-        (lights, albedo, kernels)
-    };
-    let middle = places[places.len() / 2];
-    let edit = {
-        let (lights, albedo, kernels) = of_row(middle);
-        let fit = Fit::new(&lights, albedo / lights.unit).in_sets(sets, share);
-        Edit::found(&fit, &kernels, view(middle).theta_o)
-    };
-    let fit = |index: usize, neighbours: [Neighbour; 2]| -> Result<Row> {
-        observer.check()?;
-        let (lights, albedo, kernels) = of_row(index);
-        // Only directions and levels are tied, so weights may be in any unit.
-        let carried = |(from, (kernels, ..)): (usize, &Row)| carried(kernels, view(from), view(index));
-        let beside = match neighbours {
-            [Some(a), Some(b)] => Some(all_between(&carried(a), &carried(b), 0.5)),
-            [a, b] => a.or(b).map(carried),
-        };
-        let mut start = edit.applied(&kernels, view(index).theta_o, beside.as_deref());
-        let fit = Fit::new(&lights, albedo / lights.unit).in_sets(sets, share);
-        fit.solve_weights(&mut start);
-        let (tied_to, strength, effort) = match &beside {
-            Some(beside) => (beside, TIED, NEXT),
-            None => (&start, FIRST_TIED, FIRST),
-        };
-        let mut free = start.clone();
-        fit.tied(tied_to, strength).solve(&mut free, effort, observer)?;
-        let most = MOST_MOVED + MOST_MOVED_AN_OCTAVE * edit.octaves.abs();
-        let is_steady = |kernels: &[Kernel]| most_moved([&start, &start], kernels, albedo / lights.unit) < most;
-        let kernels = fit.part_of_the_way(&start, &free, is_steady);
-        let error = fit.relative_error(&kernels);
-        Ok((scaled(&kernels, lights.unit), albedo, error))
-    };
+    let drafting = Drafting { brdf, before, share };
+    let view = |index: usize| drafting.view(index);
+    let edit = drafting.edit(places[places.len() / 2]);
     let mut fitted: Vec<Vec<Row>> = Vec::new();
     let index = |column: usize, at: usize| columns[column] * rows + places[at];
     for column in 0..columns.len() {
         let rows_of_column = from_the_middle(places.len(), &|at, neighbour| {
             let of_column = neighbour.map(|(before, row)| (index(column, before), row));
             let of_azimuth = column.checked_sub(1).map(|before| (index(before, at), &fitted[before][at]));
-            fit(index(column, at), [of_column, of_azimuth])
+            drafting.fit(index(column, at), [of_column, of_azimuth], &edit, observer)
         })?;
         fitted.push(rows_of_column);
     }
@@ -138,6 +101,74 @@ fn continued(brdf: &Brdf, before: &FittedTable, share: f32, observer: &dyn Obser
         .collect();
     let row = |to: usize| with_rest(blend(&fitted, to), &blend(&edited_where_fitted, to), &edited[to]);
     Ok(FittedTable::pack(&(0..azimuths * rows).map(row).collect::<Vec<_>>(), azimuths, sets))
+}
+
+/// What rows are fitted by; what `share` is, [`Fit::in_sets`] says.
+struct Drafting<'a> {
+    brdf: &'a Brdf,
+    before: &'a FittedTable,
+    share: f32,
+}
+
+/// What a row is fitted to, and the kernels that it had, in units of the lights.
+struct Target {
+    lights: TestLights,
+    albedo: DVec3,
+    kernels: Vec<Kernel>,
+}
+
+impl Drafting<'_> {
+    fn view(&self, index: usize) -> View {
+        View::of_row(index, self.before.rows)
+    }
+
+    fn target(&self, index: usize) -> Target {
+        let View { theta_o, phi_o } = self.view(index);
+        let slices = Slice::with_lobes(&SeenBrdf::from_azimuth(self.brdf, phi_o), theta_o, Resolution::DRAFT);
+        let count = FEWEST_LIGHTS + LIGHTS_A_THREAD * self.before.count;
+        let lights = TestLights::new(&slices, count, 0, Quadrature::DRAFT);
+        let albedo = slices[0].albedo();
+        let kernels = scaled(&in_proportion(self.before, index, albedo), 1.0 / lights.unit);
+        Target { lights, albedo, kernels }
+    }
+
+    fn fit_to<'t>(&self, target: &'t Target) -> Fit<'t> {
+        let Target { lights, albedo, .. } = target;
+        Fit::new(lights, *albedo / lights.unit).in_sets(self.before.sets, self.share)
+    }
+
+    /// How the BRDF was edited, as seen in the row of this `index`.
+    fn edit(&self, index: usize) -> Edit {
+        let target = self.target(index);
+        Edit::found(&self.fit_to(&target), &target.kernels, self.view(index).theta_o)
+    }
+
+    /// The row of this `index`, beside `neighbours`.
+    fn fit(&self, index: usize, neighbours: [Neighbour; 2], edit: &Edit, observer: &dyn Observer) -> Result<Row> {
+        observer.check()?;
+        let target = self.target(index);
+        // Only directions and levels are tied, so weights may be in any unit.
+        let carried = |(from, (kernels, ..)): (usize, &Row)| carried(kernels, self.view(from), self.view(index));
+        let beside = match neighbours {
+            [Some(a), Some(b)] => Some(all_between(&carried(a), &carried(b), 0.5)),
+            [a, b] => a.or(b).map(carried),
+        };
+        let mut start = edit.applied(&target.kernels, self.view(index).theta_o, beside.as_deref());
+        let fit = self.fit_to(&target);
+        fit.solve_weights(&mut start);
+        let (tied_to, strength, effort) = match &beside {
+            Some(beside) => (beside, TIED, NEXT),
+            None => (&start, FIRST_TIED, FIRST),
+        };
+        let mut free = start.clone();
+        fit.tied(tied_to, strength).solve(&mut free, effort, observer)?;
+        let Target { lights, albedo, .. } = &target;
+        let most = MOST_MOVED + MOST_MOVED_AN_OCTAVE * edit.octaves.abs();
+        let is_steady = |kernels: &[Kernel]| most_moved([&start, &start], kernels, *albedo / lights.unit) < most;
+        let kernels = fit.part_of_the_way(&start, &free, is_steady);
+        let error = fit.relative_error(&kernels);
+        Ok((scaled(&kernels, lights.unit), *albedo, error))
+    }
 }
 
 /// Every so many of `count`, and the last.

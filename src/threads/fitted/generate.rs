@@ -165,18 +165,10 @@ fn fit_all(
             .no_sharper_than(sharpest_level(lobe_width_rad, to.theta_o));
         let start = match &neighbours[..] {
             [] => {
-                let View { theta_o, phi_o } = View::of_row(index, rows);
-                let [_, lobes] = Slice::with_lobes(&SeenBrdf::from_azimuth(brdf, phi_o), theta_o, Resolution::FULL);
-                let solved = |cells: Vec<Kernel>| {
-                    let mut kernels = in_units(&cells);
-                    kernels.iter_mut().for_each(|kernel| kernel.level = kernel.level.max(fit.sharpest_level()));
-                    fit.solve(&mut kernels, FIRST, observer)?;
-                    Ok((fit.cost(&kernels), kernels))
-                };
+                let seen = SeenBrdf::from_azimuth(brdf, to.phi_o);
+                let [_, lobes] = Slice::with_lobes(&seen, to.theta_o, Resolution::FULL);
                 let starts = in_sets(&lobes, settings.count, settings.sets);
-                let all = starts.into_par_iter().map(solved).collect::<Result<Vec<_>>>()?;
-                let best = all.into_iter().min_by(|(a, _), (b, _)| a.total_cmp(b));
-                best.map(|(_, kernels)| kernels).unwrap_or_default()
+                best_of(&fit, starts.into_iter().map(|cells| in_units(&cells)).collect(), observer)?
             }
             [one] => one.clone(),
             [a, b, ..] => all_between(a, b, 0.5),
@@ -213,6 +205,18 @@ fn fit_all(
         fitted.iter_mut().for_each(|(kernels, ..)| *kernels = scaled(kernels, 0.0));
     }
     Ok(FittedTable::pack(&fitted, targets.azimuths, settings.sets))
+}
+
+/// The solution of the least cost from any of these `starts`.
+fn best_of(fit: &Fit, starts: Vec<Vec<Kernel>>, observer: &dyn Observer) -> Result<Vec<Kernel>> {
+    let solved = |mut kernels: Vec<Kernel>| {
+        kernels.iter_mut().for_each(|kernel| kernel.level = kernel.level.max(fit.sharpest_level()));
+        fit.solve(&mut kernels, FIRST, observer)?;
+        Ok((fit.cost(&kernels), kernels))
+    };
+    let all = starts.into_par_iter().map(solved).collect::<Result<Vec<_>>>()?;
+    let best = all.into_iter().min_by(|(a, _), (b, _)| a.total_cmp(b));
+    Ok(best.map(|(_, kernels)| kernels).unwrap_or_default())
 }
 
 /// How far kernels have moved, at most, from where they were `before` or where they are carried to, whichever is nearer: in widths and in
