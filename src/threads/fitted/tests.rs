@@ -9,7 +9,7 @@ use super::lights::{Quadrature, TestLights};
 use super::sets::pixels_have_own;
 use super::solve::{Effort, Fit};
 use super::{FittedTable, MAX_COUNT, PackedKernel, draft, generate, validation_error};
-use crate::brdf::{Brdf, CustomBrdf, LobeShape, SeenBrdf};
+use crate::brdf::{Brdf, CustomBrdf, LobeShape, MIN_COS_THETA_D, SeenBrdf, half_vector_width};
 use crate::error::Error;
 use crate::progress::Observer;
 use crate::threads::azimuths::View;
@@ -61,6 +61,19 @@ fn kernels_do_not_jump_between_rows() {
         let moved = most_moved([&before, &carried(&before, from, to)], &at(row), albedo);
         // What is packed is rounded.
         assert!(moved < 1.05 * MOST_MOVED, "row {row}, {} sets: {moved}", table.sets);
+    }
+}
+
+#[test]
+fn many_kernels_of_a_near_mirror_are_no_narrower_than_its_lobe() {
+    // Else they are a comb, and each small lamp shows it.
+    let chrome = Brdf::builtin("chrome").unwrap();
+    let table = generate(&chrome, &small(96, 30), &()).unwrap();
+    for row in 0..table.rows {
+        let lobe_width_rad = half_vector_width(&chrome) * theta_o(row, table.rows).cos().max(MIN_COS_THETA_D);
+        for kernel in table.unpacked_row(row).iter().filter(|kernel| kernel.weight != DVec3::ZERO) {
+            assert!(scale_rad(kernel.level) > lobe_width_rad, "row {row}: {kernel:?}, a lobe of {lobe_width_rad}");
+        }
     }
 }
 
