@@ -6,7 +6,7 @@ use crate::output::{self, ExrHeader, Format};
 use crate::pipeline::{DeviceScene, Rendering, Wanted};
 use crate::prepare::{prepare, threads_of};
 use crate::progress::Observer;
-use crate::scene::{Background, MaterialSource, Scene, Source, mesh};
+use crate::scene::{Background, ImageSettings, MaterialSource, Scene, Source, mesh};
 use crate::threads::{ThreadSettings, Threads};
 use crate::vulkan::{Device, Instance};
 use crate::{Result, environment};
@@ -121,7 +121,8 @@ impl Renderer {
         let material = material.into();
         material.files().iter().for_each(|path| self.memo.look_again(path));
         let settings = ThreadSettings { count, ..Default::default() };
-        Ok((*threads_of(&material, settings, &self.memo.round(&()))?).clone())
+        let subpixels = ImageSettings::default().subpixels;
+        Ok((*threads_of(&material, settings, subpixels, &self.memo.round(&()))?).clone())
     }
 }
 

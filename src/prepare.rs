@@ -5,7 +5,7 @@ use crate::geometry_texel::MAX_MATERIALS;
 use crate::memo::{Key, Keyed, Memo, Round, Step};
 use crate::method::{Method, Variant};
 use crate::passes::{PlacedMesh, PlacedTangent, Sampling, SmoothVariance, View};
-use crate::scene::{Camera, ImageSettings, MaterialSource, Mesh, Scene, Source, TangentRule};
+use crate::scene::{Camera, MaterialSource, Mesh, Scene, Source, TangentRule};
 use crate::steps::{DraftThreads, FindLobe, FitThreads, LoadBrushedMesh, LoadEnvironment, LoadMaterial, LoadMesh};
 use crate::threads::azimuths::azimuth_count;
 use crate::threads::{ThreadSettings, Threads, WithThreads};
@@ -112,13 +112,18 @@ fn thread_settings(method: Method, lobe: &LobeShape, sampling: Sampling, subpixe
     Some(settings.for_picture(lobe, subpixels))
 }
 
-/// The threads of the material from `source` by itself, as a picture with the default number of sub-pixels has them.
+/// The threads of the material from `source` by itself, as a picture of `subpixels` x `subpixels` to the pixel has them.
 ///
 /// # Errors
 /// A material that cannot be used, settings that ask for no threads or too many; cancelled.
-pub fn threads_of(source: &MaterialSource, settings: ThreadSettings, round: &Round) -> Result<Keyed<Threads>> {
+pub fn threads_of(
+    source: &MaterialSource,
+    settings: ThreadSettings,
+    subpixels: u32,
+    round: &Round,
+) -> Result<Keyed<Threads>> {
     let (brdf, _) = in_own_axes(&round.ask(&LoadMaterial(source))?);
-    let settings = settings.for_picture(&*round.ask(&FindLobe(&brdf))?, ImageSettings::default().subpixels);
+    let settings = settings.for_picture(&*round.ask(&FindLobe(&brdf))?, subpixels);
     round.ask(&FitThreads { brdf: &brdf, settings })
 }
 

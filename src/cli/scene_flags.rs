@@ -1,6 +1,6 @@
 //! The flags that say what is rendered, and on what: `render` and `view` have them in common.
 use super::{cache_folder, nameable, number};
-use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use clap::builder::{PossibleValue, PossibleValuesParser, RangedI64ValueParser, TypedValueParser};
 use clap::value_parser;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -31,7 +31,7 @@ pub struct SceneFlags {
     #[arg(long, value_name = "per-pixel|fixed", value_parser = pattern(), hide_possible_values = true)]
     pub pattern: Option<Pattern>,
     /// Sub-pixels per axis, 1 to 4.
-    #[arg(long, value_name = "S", value_parser = value_parser!(u32).range(1..=i64::from(MAX_SUBPIXELS)))]
+    #[arg(long, value_name = "S", value_parser = subpixels())]
     pub subpixels: Option<u32>,
     /// Size of the picture in pixels, each side 1 to 16384.
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
@@ -123,6 +123,11 @@ impl SceneFlags {
     pub fn files(&self, scene: &Scene) -> Vec<PathBuf> {
         self.scene.iter().cloned().chain(scene.files()).collect()
     }
+}
+
+/// How many sub-pixels a pixel may have along an axis.
+pub fn subpixels() -> RangedI64ValueParser<u32> {
+    value_parser!(u32).range(1..=i64::from(MAX_SUBPIXELS))
 }
 
 /// `640x480`.

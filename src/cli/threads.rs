@@ -1,5 +1,6 @@
 //! `threadlight threads`: makes, writes and draws the sample threads of a material.
 use super::progress::TerminalProgress;
+use super::scene_flags::subpixels;
 use super::{cache_folder, nameable, say, stem};
 use std::path::PathBuf;
 use threadlight::Error;
@@ -7,7 +8,7 @@ use threadlight::low_level::memo::{Asked, Memo, Origin, Step};
 use threadlight::low_level::method::Method;
 use threadlight::low_level::output;
 use threadlight::low_level::prepare::threads_of;
-use threadlight::low_level::scene::MaterialSource;
+use threadlight::low_level::scene::{ImageSettings, MaterialSource};
 use threadlight::low_level::steps::FitThreads;
 use threadlight::low_level::threads::{self, ThreadKind, ThreadSettings};
 
@@ -31,6 +32,9 @@ pub struct Threads {
     /// Seed of everything random; the same seed gives the same threads.
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
+    /// Sub-pixels per axis of the pictures that they are for, 1 to 4: fitted threads are in as many sets.
+    #[arg(long, value_name = "S", default_value_t = ImageSettings::default().subpixels, value_parser = subpixels())]
+    subpixels: u32,
     /// Neither read nor write cached threads.
     #[arg(long)]
     no_cache: bool,
@@ -46,7 +50,8 @@ impl Threads {
     /// Those of `material` that are made where nothing else is asked for, to be written to `output`.
     pub fn of(material: String, output: PathBuf) -> Self {
         let method = ThreadKind::default().name().to_owned();
-        Self { material, count: None, method, seed: 0, no_cache: false, output: Some(output), plot: None }
+        let subpixels = ImageSettings::default().subpixels;
+        Self { material, count: None, method, seed: 0, subpixels, no_cache: false, output: Some(output), plot: None }
     }
 
     pub fn run(self) -> anyhow::Result<()> {
@@ -74,7 +79,7 @@ impl Threads {
         let memo = Memo::new(cache_folder(self.no_cache).as_deref());
         let round = memo.round(&progress);
         let settings = ThreadSettings { kind, count, seed: self.seed, ..Default::default() };
-        let threads = threads_of(&source, settings, &round)?;
+        let threads = threads_of(&source, settings, self.subpixels, &round)?;
         progress.finish();
         let Asked { origin, time, .. } = round.asked(FitThreads::NAME)[0];
         let threads = (*threads).clone().of_material(&name);

@@ -1,5 +1,6 @@
 //! What is listed, said and compared, and what happens to files.
 use super::*;
+use threadlight::low_level::threads::{Threads, read};
 
 #[test]
 fn the_plan_lists_passes_and_what_was_culled() {
@@ -162,6 +163,18 @@ fn a_material_is_exported_and_plotted() {
     let [exported, made] =
         ["exported", "made"].map(|name| fs::read(folder.path().join(name).with_extension("threads")).unwrap());
     assert!(exported == made);
+}
+
+#[test]
+fn threads_are_in_as_many_sets_as_pictures_have_subpixels() {
+    let folder = workplace();
+    let sets = |flags: &str| {
+        threadlight(&folder, &format!("threads gold --count 4 {flags} -o gold.threads")).assert().success();
+        let Threads::Fitted(table) = read(&folder.path().join("gold.threads")).unwrap() else { panic!("not fitted") };
+        table.for_subpixels().sets
+    };
+    assert_eq!([sets("--subpixels 1"), sets("")], [1, 4]);
+    threadlight(&folder, "threads gold --subpixels 5 -o gold.threads").assert().code(2);
 }
 
 #[test]
