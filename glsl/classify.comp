@@ -3,6 +3,7 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_samplerless_texture_functions : require
 #include "geometry_texel.glsl"
+#include "normal_variance.glsl"
 #include "tiles.glsl"
 
 layout(local_size_x = TILE_SIDE, local_size_y = TILE_SIDE) in;
@@ -95,7 +96,8 @@ void main() {
     if (inside) {
         uvec2 reference = uvec2(0);
         vec3 reference_normal = vec3(0.0);
-        vec3 normals = vec3(0.0);
+        vec3 differences = vec3(0.0);
+        float squares = 0.0;
         vec3 tangents = vec3(0.0);
         for (uint j = 0; j < SUBPIXELS * SUBPIXELS; ++j) {
             uvec2 texel = texelFetch(geometry, ivec2(pixel * SUBPIXELS + uvec2(j % SUBPIXELS, j / SUBPIXELS)), 0).xy;
@@ -103,7 +105,6 @@ void main() {
                 continue;
             }
             vec3 normal = geometry_normal(texel);
-            normals += normal;
             if (HAS_TANGENTS != 0 && has_tangent(texel)) {
                 tangents += geometry_tangent(texel, normal);
             }
@@ -113,12 +114,15 @@ void main() {
                 reference_normal = normal;
                 shader = own_shader;
             }
+            vec3 difference = normal - reference_normal;
+            differences += difference;
+            squares += dot(difference, difference);
             shader = own_shader == shader ? shader : push.shader_of_mixed;
             smooth_surface = smooth_surface && geometry_material(texel) == geometry_material(reference)
                 && dot(normal, reference_normal) >= push.cos_smooth;
         }
-        // With R the length of the mean normal, 1 - R is the variance.
-        smooth_surface = smooth_surface && 1.0 - length(normals) / float(covered) < push.smooth_variance.x;
+        // Of a pixel that sees nothing it is no number, and no interior.
+        smooth_surface = smooth_surface && normal_variance(differences, squares, covered) < push.smooth_variance.x;
         if (HAS_TANGENTS != 0 && has_tangent(reference)) {
             smooth_surface = smooth_surface && 1.0 - length(tangents) / float(covered) < push.smooth_variance.y;
         }

@@ -1,20 +1,24 @@
 // For methods that divide their samples among the sub-pixels of a pixel that lies on one smooth surface, as the paper does with its
 // threads (section 4.2). Of another pixel, each covered sub-pixel takes all samples. Twin: shade_partition in src/shading/mod.rs.
+#include "normal_variance.glsl"
 
 // The sum over samples first, first + stride, ... of weight times environment.
 vec3 estimate(Surface surface, Material material, uint first, uint stride);
 
 vec4 shade_pixel(uvec2 pixel, bool interior) {
     const uint subpixel_count = SUBPIXELS * SUBPIXELS;
-    vec3 normals = vec3(0.0);
+    vec3 differences = vec3(0.0);
+    float squares = 0.0;
     if (interior) {
+        vec3 first = geometry_normal(texelFetch(geometry, ivec2(pixel * SUBPIXELS), 0).xy);
         for (uint j = 0; j < subpixel_count; ++j) {
             uvec2 place = pixel * SUBPIXELS + uvec2(j % SUBPIXELS, j / SUBPIXELS);
-            normals += geometry_normal(texelFetch(geometry, ivec2(place), 0).xy);
+            vec3 difference = geometry_normal(texelFetch(geometry, ivec2(place), 0).xy) - first;
+            differences += difference;
+            squares += dot(difference, difference);
         }
     }
-    // With R the length of the mean normal, 1 - R is the variance along each of two axes.
-    float normal_variance = interior ? max(1.0 - length(normals) / float(subpixel_count), 0.0) : 0.0;
+    float variance = normal_variance(differences, squares, subpixel_count); // 0 of other pixels
     uint stride = interior ? subpixel_count : 1;
     vec3 sum = vec3(0.0);
     uint covered = 0;
@@ -24,7 +28,7 @@ vec4 shade_pixel(uvec2 pixel, bool interior) {
         if (is_covered(texel)) {
             ++covered;
             Surface surface = surface_of_subpixel(subpixel, texel);
-            surface.normal_variance = normal_variance;
+            surface.normal_variance = variance;
             sum += estimate(surface, material_of(texel), interior ? j : 0, stride);
         }
     }

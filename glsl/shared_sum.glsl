@@ -1,6 +1,7 @@
 // For methods by which the sub-pixels of a pixel that lies on one smooth surface share one sum over all threads, at their mean normal. Of
 // another pixel, each covered sub-pixel is a sum of its own, over one set of other threads: the partition of the paper's section 4.2, for
 // threads that are made such that each set does alone. Twin: shade_shared in src/shading/mod.rs.
+#include "normal_variance.glsl"
 
 // The mean over threads first, first + stride, ... of the material of what each makes of the environment, as if there were no others.
 vec3 estimate(Surface surface, Material material, uint first, uint stride);
@@ -10,20 +11,23 @@ bool needs_subpixels(Surface surface, Material material);
 
 // The mean of the surfaces that a pixel's sub-pixels see, all of them covered.
 Surface mean_surface(uvec2 pixel) {
-    vec3 normals = vec3(0.0);
+    vec3 first = geometry_normal(texelFetch(geometry, ivec2(pixel * SUBPIXELS), 0).xy);
+    vec3 differences = vec3(0.0);
+    float squares = 0.0;
     vec3 tangents = vec3(0.0);
     for (uint j = 0; j < SUBPIXELS * SUBPIXELS; ++j) {
         uvec2 place = pixel * SUBPIXELS + uvec2(j % SUBPIXELS, j / SUBPIXELS);
         uvec2 texel = texelFetch(geometry, ivec2(place), 0).xy;
         vec3 normal = geometry_normal(texel);
-        normals += normal;
+        vec3 difference = normal - first;
+        differences += difference;
+        squares += dot(difference, difference);
         if (HAS_TANGENTS != 0 && has_tangent(texel)) {
             tangents += geometry_tangent(texel, normal);
         }
     }
-    Surface mean = surface_at((vec2(pixel) + 0.5) / vec2(push.size_px), normalize(normals), tangents);
-    // With R the length of the mean normal, 1 - R is the variance along each of two axes.
-    mean.normal_variance = max(1.0 - length(normals) / float(SUBPIXELS * SUBPIXELS), 0.0);
+    Surface mean = surface_at((vec2(pixel) + 0.5) / vec2(push.size_px), normalize(first + differences / float(SUBPIXELS * SUBPIXELS)), tangents);
+    mean.normal_variance = normal_variance(differences, squares, SUBPIXELS * SUBPIXELS);
     return mean;
 }
 

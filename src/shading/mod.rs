@@ -118,7 +118,7 @@ pub fn is_interior(prepared: &Prepared, texels: &[UVec2]) -> bool {
     let SmoothVariance { of_normals, of_tangents } = prepared.smooth_variance();
     let tangents_agree =
         || first.tangent.is_none() || 1.0 - tangent_sum(texels).length() / (texels.len() as f32) < of_tangents;
-    texels.iter().all(is_near) && normal_variance(texels) < of_normals && tangents_agree()
+    texels.iter().all(is_near) && normal_moments(texels).1 < of_normals && tangents_agree()
 }
 
 /// The sum of the tangents of these sub-pixels, as far as they have any.
@@ -126,14 +126,19 @@ fn tangent_sum(texels: &[UVec2]) -> Vec3 {
     texels.iter().filter_map(|texel| GeometryTexel::unpack(*texel)?.tangent).sum()
 }
 
-/// The sum of the normals of these sub-pixels.
-fn normal_sum(texels: &[UVec2]) -> Vec3 {
-    texels.iter().filter_map(|texel| GeometryTexel::unpack(*texel)).map(|texel| texel.normal).sum()
-}
-
-/// Their variance along each of two axes, in rad^2: 1 less the length of the mean normal.
-fn normal_variance(texels: &[UVec2]) -> f32 {
-    (1.0 - normal_sum(texels).length() / texels.len() as f32).max(0.0)
+/// The mean of the normals of these sub-pixels, which all see a surface, and their variance along each of two axes, in rad^2. Twin of
+/// `normal_variance` in glsl/normal_variance.glsl.
+fn normal_moments(texels: &[UVec2]) -> (Vec3, f32) {
+    let normals = texels.iter().filter_map(|texel| GeometryTexel::unpack(*texel)).map(|texel| texel.normal);
+    let (first, count) = (normals.clone().next().unwrap_or_default(), texels.len() as f32);
+    let (mut differences, mut squares) = (Vec3::ZERO, 0.0);
+    for difference in normals.map(|normal| normal - first) {
+        differences += difference;
+        squares += difference.length_squared();
+    }
+    let mean = differences / count;
+    let one_minus_square = (squares / count - mean.length_squared()).clamp(0.0, 1.0);
+    (first + mean, one_minus_square / (1.0 + (1.0 - one_minus_square).sqrt()))
 }
 
 /// The CPU twin of pass 2 for one scene.
@@ -221,7 +226,7 @@ impl<'a> CpuShader<'a> {
 
     /// Twin of `shade_pixel` in glsl/partition.glsl.
     fn shade_partition(&self, pixel: UVec2, texels: &[UVec2], interior: bool) -> Vec4 {
-        let normal_variance = if interior { normal_variance(texels) } else { 0.0 };
+        let normal_variance = if interior { normal_moments(texels).1 } else { 0.0 };
         let stride = if interior { texels.len() } else { 1 };
         let mut sum = Vec4::ZERO;
         for (j, texel) in texels.iter().enumerate() {
@@ -240,8 +245,9 @@ impl<'a> CpuShader<'a> {
         if let Some(mut point) = mean {
             let View { width, height, .. } = self.prepared.view;
             let position = (pixel.as_vec2() + 0.5) / UVec2::new(width, height).as_vec2();
-            point.surface = self.surface_at(position, normal_sum(texels).normalize(), tangent_sum(texels));
-            point.surface.normal_variance = normal_variance(texels);
+            let (mean, normal_variance) = normal_moments(texels);
+            point.surface = self.surface_at(position, mean.normalize(), tangent_sum(texels));
+            point.surface.normal_variance = normal_variance;
             if !fitted::needs_subpixels(&point) {
                 point.is_pixel = true;
                 return point.estimate().extend(1.0);
