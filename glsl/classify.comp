@@ -95,9 +95,7 @@ void main() {
     bool smooth_surface = true;
     if (inside) {
         uvec2 reference = uvec2(0);
-        vec3 reference_normal = vec3(0.0);
-        vec3 differences = vec3(0.0);
-        float squares = 0.0;
+        NormalMoments normals = normal_moments(vec3(0.0));
         vec3 tangents = vec3(0.0);
         for (uint j = 0; j < SUBPIXELS * SUBPIXELS; ++j) {
             uvec2 texel = texelFetch(geometry, ivec2(pixel * SUBPIXELS + uvec2(j % SUBPIXELS, j / SUBPIXELS)), 0).xy;
@@ -111,18 +109,16 @@ void main() {
             uint own_shader = CLASSES != 2 ? shaders[geometry_material(texel)] : 0;
             if (covered++ == 0) {
                 reference = texel;
-                reference_normal = normal;
+                normals = normal_moments(normal);
                 shader = own_shader;
             }
-            vec3 difference = normal - reference_normal;
-            differences += difference;
-            squares += dot(difference, difference);
+            add_normal(normals, normal);
             shader = own_shader == shader ? shader : push.shader_of_mixed;
             smooth_surface = smooth_surface && geometry_material(texel) == geometry_material(reference)
-                && dot(normal, reference_normal) >= push.cos_smooth;
+                && dot(normal, normals.first) >= push.cos_smooth;
         }
         // Of a pixel that sees nothing it is no number, and no interior.
-        smooth_surface = smooth_surface && normal_variance(differences, squares, covered) < push.smooth_variance.x;
+        smooth_surface = smooth_surface && normal_variance(normals, covered) < push.smooth_variance.x;
         if (HAS_TANGENTS != 0 && has_tangent(reference)) {
             smooth_surface = smooth_surface && 1.0 - length(tangents) / float(covered) < push.smooth_variance.y;
         }

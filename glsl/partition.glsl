@@ -7,18 +7,15 @@ vec3 estimate(Surface surface, Material material, uint first, uint stride);
 
 vec4 shade_pixel(uvec2 pixel, bool interior) {
     const uint subpixel_count = SUBPIXELS * SUBPIXELS;
-    vec3 differences = vec3(0.0);
-    float squares = 0.0;
+    float variance = 0.0;
     if (interior) {
-        vec3 first = geometry_normal(texelFetch(geometry, ivec2(pixel * SUBPIXELS), 0).xy);
-        for (uint j = 0; j < subpixel_count; ++j) {
+        NormalMoments normals = normal_moments(geometry_normal(texelFetch(geometry, ivec2(pixel * SUBPIXELS), 0).xy));
+        for (uint j = 1; j < subpixel_count; ++j) {
             uvec2 place = pixel * SUBPIXELS + uvec2(j % SUBPIXELS, j / SUBPIXELS);
-            vec3 difference = geometry_normal(texelFetch(geometry, ivec2(place), 0).xy) - first;
-            differences += difference;
-            squares += dot(difference, difference);
+            add_normal(normals, geometry_normal(texelFetch(geometry, ivec2(place), 0).xy));
         }
+        variance = normal_variance(normals, subpixel_count);
     }
-    float variance = normal_variance(differences, squares, subpixel_count); // 0 of other pixels
     uint stride = interior ? subpixel_count : 1;
     vec3 sum = vec3(0.0);
     uint covered = 0;

@@ -11,23 +11,19 @@ bool needs_subpixels(Surface surface, Material material);
 
 // The mean of the surfaces that a pixel's sub-pixels see, all of them covered.
 Surface mean_surface(uvec2 pixel) {
-    vec3 first = geometry_normal(texelFetch(geometry, ivec2(pixel * SUBPIXELS), 0).xy);
-    vec3 differences = vec3(0.0);
-    float squares = 0.0;
+    NormalMoments normals = normal_moments(geometry_normal(texelFetch(geometry, ivec2(pixel * SUBPIXELS), 0).xy));
     vec3 tangents = vec3(0.0);
     for (uint j = 0; j < SUBPIXELS * SUBPIXELS; ++j) {
         uvec2 place = pixel * SUBPIXELS + uvec2(j % SUBPIXELS, j / SUBPIXELS);
         uvec2 texel = texelFetch(geometry, ivec2(place), 0).xy;
         vec3 normal = geometry_normal(texel);
-        vec3 difference = normal - first;
-        differences += difference;
-        squares += dot(difference, difference);
+        add_normal(normals, normal);
         if (HAS_TANGENTS != 0 && has_tangent(texel)) {
             tangents += geometry_tangent(texel, normal);
         }
     }
-    Surface mean = surface_at((vec2(pixel) + 0.5) / vec2(push.size_px), normalize(first + differences / float(SUBPIXELS * SUBPIXELS)), tangents);
-    mean.normal_variance = normal_variance(differences, squares, SUBPIXELS * SUBPIXELS);
+    Surface mean = surface_at((vec2(pixel) + 0.5) / vec2(push.size_px), normalize(mean_normal(normals, SUBPIXELS * SUBPIXELS)), tangents);
+    mean.normal_variance = normal_variance(normals, SUBPIXELS * SUBPIXELS);
     return mean;
 }
 

@@ -129,7 +129,8 @@ Lobe lobe_of(Surface surface, Material material) {
 const float NEARLY_FLAT_RAD = 0.01;
 
 // A sum at one normal does not do where normals vary more than half vectors within a narrow lobe, as thin as that is across the plane of
-// incidence, or by a good part of a wide one: what sub-pixels mirror there is not one blur. Nor where a sun is mirrored within the pixel, or so near that its highlight bends within it.
+// incidence, or by a good part of a wide one: what sub-pixels mirror there is not one blur. Nor where a sun is mirrored within the pixel, or
+// so near that its highlight bends within it.
 bool needs_subpixels(Surface surface, Material material) {
     float deviation = sqrt(surface.normal_variance);
     Lobe lobe = lobe_of(surface, material);

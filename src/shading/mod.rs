@@ -127,7 +127,7 @@ fn tangent_sum(texels: &[UVec2]) -> Vec3 {
 }
 
 /// The mean of the normals of these sub-pixels, which all see a surface, and their variance along each of two axes, in rad^2. Twin of
-/// `normal_variance` in glsl/normal_variance.glsl.
+/// glsl/normal_variance.glsl.
 fn normal_moments(texels: &[UVec2]) -> (Vec3, f32) {
     let normals = texels.iter().filter_map(|texel| GeometryTexel::unpack(*texel)).map(|texel| texel.normal);
     let (first, count) = (normals.clone().next().unwrap_or_default(), texels.len() as f32);

@@ -10,7 +10,7 @@ use super::lights::{Quadrature, TestLights};
 use super::sets::{pixels_have_own, share_of_sets};
 use super::solve::{Effort, Fit};
 use super::table::FittedTable;
-use crate::brdf::{Brdf, MIN_COS_THETA_D, SeenBrdf, half_vector_width, luminance};
+use crate::brdf::{Brdf, LobeShape, MIN_COS_THETA_D, SeenBrdf, luminance};
 use crate::error::Result;
 use crate::progress::Observer;
 use crate::threads::azimuths::{View, azimuth_count};
@@ -72,6 +72,8 @@ struct Targets {
     azimuths: usize,
     /// The lights and the albedo.
     rows: Vec<(TestLights, DVec3)>,
+    /// Of the BRDF, seen along the normal.
+    lobe: LobeShape,
 }
 
 /// How many lights there are in a row for so many threads.
@@ -104,7 +106,7 @@ impl Targets {
             Ok((lights, slices[0].albedo()))
         };
         let rows = (0..azimuths * rows).into_par_iter().map(target).collect::<Result<_>>()?;
-        Ok(Self { azimuths, rows })
+        Ok(Self { azimuths, rows, lobe: LobeShape::of(brdf) })
     }
 
     /// Whether the cosine kernel alone does in all rows.
@@ -124,7 +126,7 @@ pub fn generate(brdf: &Brdf, settings: &ThreadSettings, observer: &dyn Observer)
     settings.check()?;
     let targets = Targets::new(brdf, settings, observer)?;
     let done = AtomicUsize::new(0);
-    let are_two = settings.sets > 1 && pixels_have_own(brdf);
+    let are_two = settings.sets > 1 && pixels_have_own(&targets.lobe);
     let total = if are_two { 2 * targets.rows.len() } else { targets.rows.len() };
     let row_is_done = || observer.progress(done.fetch_add(1, Ordering::Relaxed) + 1, total);
     let share = share_of_sets(targets.azimuths, are_two);
@@ -146,7 +148,6 @@ fn fit_all(
     row_is_done: &(impl Fn() + Sync),
 ) -> Result<FittedTable> {
     let rows = settings.rows;
-    let lobe_width_rad = half_vector_width(brdf);
     // Row `index` of all azimuths, from what its neighbours' kernels are there: those of the view angle before and of the azimuth before.
     let fit = |index: usize, neighbours: &[(usize, &Row)]| -> Result<Row> {
         observer.check()?;
@@ -162,7 +163,7 @@ fn fit_all(
         let (before, neighbours): (Vec<_>, Vec<_>) = neighbours.unzip();
         let fit = Fit::new(lights, *albedo / lights.unit)
             .in_sets(settings.sets, share)
-            .no_sharper_than(sharpest_level(lobe_width_rad, to.theta_o));
+            .no_sharper_than(sharpest_level(targets.lobe.width_rad, to.theta_o));
         let start = match &neighbours[..] {
             [] => {
                 let seen = SeenBrdf::from_azimuth(brdf, to.phi_o);

@@ -1,6 +1,6 @@
 //! How many sets threads are made in, each of which does alone: the partition of the paper's section 4.2.
 use super::table::FittedTable;
-use crate::brdf::{Brdf, LobeShape};
+use crate::brdf::LobeShape;
 
 /// Fewest threads of a set of an anisotropic BRDF, if it has as many: fewer leave gaps in a long lobe. Of a metal of roughness_alpha
 /// 0.05 x 0.3, 4 threads err by 0.066 of the radiance, 8 by 0.024, 16 by 0.010.
@@ -35,8 +35,7 @@ pub const NEARLY_FLAT_RAD: f64 = 0.01;
 /// Whether pixels that share one sum have threads of their own, not in sets. Not of a narrow lobe, for which there are few such pixels, and whose
 /// free threads are so sharp that all pixels pay for looking that up: 26 ms become 35 with 16 threads of alumina-oxide on a dragon. Nor of
 /// an anisotropic BRDF, whose fits take ten times as long.
-pub fn pixels_have_own(brdf: &Brdf) -> bool {
-    let lobe = LobeShape::of(brdf);
+pub fn pixels_have_own(lobe: &LobeShape) -> bool {
     lobe.is_isotropic && lobe.width_rad >= NEARLY_FLAT_RAD
 }
 
