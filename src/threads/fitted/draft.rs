@@ -3,12 +3,13 @@ use glam::DVec3;
 
 use super::edit::Edit;
 use super::generate::{Neighbour, Row, carried, from_the_middle, most_moved, scaled};
-use super::kernel::{Kernel, SHARPEST_LEVEL, WIDEST_LEVEL, all_between};
+use super::kernel::{Kernel, WIDEST_LEVEL, all_between};
 use super::lights::{Quadrature, TestLights};
 use super::sets::share_of_sets;
+use super::sharpest::SharpestKernels;
 use super::solve::{Effort, Fit};
 use super::table::FittedTable;
-use crate::brdf::{Brdf, SeenBrdf, luminance};
+use crate::brdf::{Brdf, LobeShape, SeenBrdf, luminance};
 use crate::error::Result;
 use crate::progress::Observer;
 use crate::threads::azimuths::View;
@@ -67,7 +68,7 @@ fn continued(brdf: &Brdf, before: &FittedTable, share: f32, observer: &dyn Obser
     if let (Err(place), 1) = (places.binary_search(&before_rim), azimuths) {
         places.insert(place, before_rim);
     }
-    let drafting = Drafting { brdf, before, share };
+    let drafting = Drafting { brdf, before, share, sharpest: SharpestKernels::of(brdf, &LobeShape::of(brdf)) };
     let view = |index: usize| drafting.view(index);
     let edit = drafting.edit(places[places.len() / 2]);
     let mut fitted: Vec<Vec<Row>> = Vec::new();
@@ -99,7 +100,10 @@ fn continued(brdf: &Brdf, before: &FittedTable, share: f32, observer: &dyn Obser
     let edited_where_fitted: Vec<Vec<Row>> = (0..columns.len())
         .map(|column| (0..places.len()).map(|at| edited[index(column, at)].clone()).collect())
         .collect();
-    let row = |to: usize| with_rest(blend(&fitted, to), &blend(&edited_where_fitted, to), &edited[to]);
+    let row = |to: usize| {
+        let sharpest = drafting.sharpest.level(view(to).theta_o);
+        with_rest(blend(&fitted, to), &blend(&edited_where_fitted, to), &edited[to], sharpest)
+    };
     Ok(FittedTable::pack(&(0..azimuths * rows).map(row).collect::<Vec<_>>(), azimuths, sets))
 }
 
@@ -108,6 +112,7 @@ struct Drafting<'a> {
     brdf: &'a Brdf,
     before: &'a FittedTable,
     share: f32,
+    sharpest: SharpestKernels,
 }
 
 /// What a row is fitted to, and the kernels that it had, in units of the lights.
@@ -132,15 +137,18 @@ impl Drafting<'_> {
         Target { lights, albedo, kernels }
     }
 
-    fn fit_to<'t>(&self, target: &'t Target) -> Fit<'t> {
+    /// The fit of the row of this `index` to `target`.
+    fn fit_to<'t>(&self, target: &'t Target, index: usize) -> Fit<'t> {
         let Target { lights, albedo, .. } = target;
-        Fit::new(lights, *albedo / lights.unit).in_sets(self.before.sets, self.share)
+        Fit::new(lights, *albedo / lights.unit)
+            .in_sets(self.before.sets, self.share)
+            .no_sharper_than(self.sharpest.level(self.view(index).theta_o))
     }
 
     /// How the BRDF was edited, as seen in the row of this `index`.
     fn edit(&self, index: usize) -> Edit {
         let target = self.target(index);
-        Edit::found(&self.fit_to(&target), &target.kernels, self.view(index).theta_o)
+        Edit::found(&self.fit_to(&target, index), &target.kernels, self.view(index).theta_o)
     }
 
     /// The row of this `index`, beside `neighbours`.
@@ -154,7 +162,8 @@ impl Drafting<'_> {
             [a, b] => a.or(b).map(carried),
         };
         let mut start = edit.applied(&target.kernels, self.view(index).theta_o, beside.as_deref());
-        let fit = self.fit_to(&target);
+        let fit = self.fit_to(&target, index);
+        fit.bound(&mut start);
         fit.solve_weights(&mut start);
         let (tied_to, strength, effort) = match &beside {
             Some(beside) => (beside, TIED, NEXT),
@@ -191,8 +200,8 @@ fn between((a, albedo_a, error_a): &Row, (b, albedo_b, error_b): &Row, t: f64) -
     (kernels, albedo_a.lerp(*albedo_b, t), error_a + t * (error_b - error_a))
 }
 
-/// The row `blended` with the part [`REST`] of what `before` has besides its own blend.
-fn with_rest((kernels, albedo, error): Row, blended_before: &Row, before: &Row) -> Row {
+/// The row `blended` with the part [`REST`] of what `before` has besides its own blend, but no kernel sharper than the level `sharpest`.
+fn with_rest((kernels, albedo, error): Row, blended_before: &Row, before: &Row, sharpest: f64) -> Row {
     let (kernels_blended, albedo_blended, _) = blended_before;
     let (kernels_before, albedo_before, _) = before;
     let albedo = albedo * DVec3::ONE.lerp(ratio_or(*albedo_before, *albedo_blended, DVec3::ONE), REST);
@@ -202,7 +211,7 @@ fn with_rest((kernels, albedo, error): Row, blended_before: &Row, before: &Row) 
         Kernel {
             direction: (kernel.direction + REST * (before.direction - blended.direction))
                 .normalize_or(kernel.direction),
-            level: (kernel.level + REST * (before.level - blended.level)).clamp(SHARPEST_LEVEL, WIDEST_LEVEL),
+            level: (kernel.level + REST * (before.level - blended.level)).clamp(sharpest, WIDEST_LEVEL),
             weight: (kernel.weight + REST * albedo * part).max(DVec3::ZERO),
         }
     };

@@ -5,12 +5,13 @@ use glam::{DVec2, DVec3, dvec3};
 use rayon::prelude::*;
 
 use super::cells::in_sets;
-use super::kernel::{FINEST_WIDTH_RAD, Kernel, SHARPEST_LEVEL, all_between, scale_rad};
+use super::kernel::{Kernel, all_between, scale_rad};
 use super::lights::{Quadrature, TestLights};
 use super::sets::{pixels_have_own, share_of_sets};
+use super::sharpest::SharpestKernels;
 use super::solve::{Effort, Fit};
 use super::table::FittedTable;
-use crate::brdf::{Brdf, LobeShape, MIN_COS_THETA_D, SeenBrdf, luminance};
+use crate::brdf::{Brdf, LobeShape, SeenBrdf, luminance};
 use crate::error::Result;
 use crate::progress::Observer;
 use crate::threads::azimuths::{View, azimuth_count};
@@ -54,12 +55,6 @@ const LEAST_ERROR: f64 = 3e-3;
 /// Kernels narrower than this, in radians, stay where a facet mirrors the view to; wider ones stay where they are.
 const FOLLOWS_BELOW_RAD: f64 = 0.15;
 
-/// No kernel is narrower than this part of the lobe's width in half vectors: a Gaussian as wide as the lobe has 2.6 times that. Narrower
-/// ones would answer the lights of the fit, not those between them: a comb, if there are many. Lights tell kernels that are wider than
-/// [`TOLD_RAD`], so these have no such bound. Chrome beside 300 small lamps, close to the limb, errs by 0.0032 with 128 threads, not by 0.0074.
-const NARROWEST_IN_LOBE: f64 = 1.25;
-const TOLD_RAD: f64 = 0.02;
-
 /// A row: its kernels, the albedo and the relative error.
 pub(super) type Row = (Vec<Kernel>, DVec3, f64);
 
@@ -74,17 +69,12 @@ struct Targets {
     rows: Vec<(TestLights, DVec3)>,
     /// Of the BRDF, seen along the normal.
     lobe: LobeShape,
+    sharpest: SharpestKernels,
 }
 
 /// How many lights there are in a row for so many threads.
 fn light_count(threads: usize) -> usize {
     FEWEST_LIGHTS + LIGHTS_A_THREAD * threads.max(FEWEST_THREADS)
-}
-
-/// The level that kernels of a row are no sharper than, for a lobe of this width in half vectors, in radians.
-fn sharpest_level(lobe_width_rad: f64, theta_o: f64) -> f64 {
-    let narrowest = (NARROWEST_IN_LOBE * lobe_width_rad).min(TOLD_RAD) * theta_o.cos().max(MIN_COS_THETA_D);
-    (narrowest / FINEST_WIDTH_RAD).log2().max(SHARPEST_LEVEL)
 }
 
 impl Targets {
@@ -106,7 +96,8 @@ impl Targets {
             Ok((lights, slices[0].albedo()))
         };
         let rows = (0..azimuths * rows).into_par_iter().map(target).collect::<Result<_>>()?;
-        Ok(Self { azimuths, rows, lobe: LobeShape::of(brdf) })
+        let lobe = LobeShape::of(brdf);
+        Ok(Self { azimuths, rows, lobe, sharpest: SharpestKernels::of(brdf, &lobe) })
     }
 
     /// Whether the cosine kernel alone does in all rows.
@@ -163,7 +154,7 @@ fn fit_all(
         let (before, neighbours): (Vec<_>, Vec<_>) = neighbours.unzip();
         let fit = Fit::new(lights, *albedo / lights.unit)
             .in_sets(settings.sets, share)
-            .no_sharper_than(sharpest_level(targets.lobe.width_rad, to.theta_o));
+            .no_sharper_than(targets.sharpest.level(to.theta_o));
         let start = match &neighbours[..] {
             [] => {
                 let seen = SeenBrdf::from_azimuth(brdf, to.phi_o);
@@ -211,7 +202,7 @@ fn fit_all(
 /// The solution of the least cost from any of these `starts`.
 fn best_of(fit: &Fit, starts: Vec<Vec<Kernel>>, observer: &dyn Observer) -> Result<Vec<Kernel>> {
     let solved = |mut kernels: Vec<Kernel>| {
-        kernels.iter_mut().for_each(|kernel| kernel.level = kernel.level.max(fit.sharpest_level()));
+        fit.bound(&mut kernels);
         fit.solve(&mut kernels, FIRST, observer)?;
         Ok((fit.cost(&kernels), kernels))
     };

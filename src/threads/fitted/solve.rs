@@ -80,9 +80,9 @@ impl<'a> Fit<'a> {
         Self { sharpest_level: self.sharpest_level.max(level), ..self }
     }
 
-    /// The level that no step leaves a kernel sharper than.
-    pub fn sharpest_level(&self) -> f64 {
-        self.sharpest_level
+    /// Makes `kernels` that are sharper than any step leaves them as wide as that.
+    pub fn bound(&self, kernels: &mut [Kernel]) {
+        kernels.iter_mut().for_each(|kernel| kernel.level = kernel.level.max(self.sharpest_level));
     }
 
     /// How many sets of kernels there are.
