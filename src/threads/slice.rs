@@ -219,11 +219,6 @@ impl<'a> Slice<'a> {
         f.into_iter().zip(w_i).map(|(f, w_i)| above_base(f, self.base) * w_i.z).collect()
     }
 
-    /// The part of the mass that half vectors within the angle `theta_h` of the normal mirror the view to, in radians.
-    pub fn mass_within(&self, theta_h: f64) -> f64 {
-        interpolate(&self.ring_cdf, (theta_h / FRAC_PI_2).sqrt()).1
-    }
-
     /// Where the pdf is greatest.
     pub fn peak(&self) -> DVec3 {
         self.peak

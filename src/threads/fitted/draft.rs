@@ -3,10 +3,9 @@ use glam::DVec3;
 
 use super::edit::Edit;
 use super::generate::{Neighbour, Row, carried, from_the_middle, most_moved, scaled};
-use super::kernel::{Kernel, WIDEST_LEVEL, all_between};
+use super::kernel::{Kernel, WIDEST_LEVEL, all_between, sharpest_level};
 use super::lights::{Quadrature, TestLights};
 use super::sets::share_of_sets;
-use super::sharpest::SharpestKernels;
 use super::solve::{Effort, Fit};
 use super::table::FittedTable;
 use crate::brdf::{Brdf, LobeShape, SeenBrdf, luminance};
@@ -68,7 +67,7 @@ fn continued(brdf: &Brdf, before: &FittedTable, share: f32, observer: &dyn Obser
     if let (Err(place), 1) = (places.binary_search(&before_rim), azimuths) {
         places.insert(place, before_rim);
     }
-    let drafting = Drafting { brdf, before, share, sharpest: SharpestKernels::of(brdf, &LobeShape::of(brdf)) };
+    let drafting = Drafting { brdf, before, share, lobe: LobeShape::of(brdf) };
     let view = |index: usize| drafting.view(index);
     let edit = drafting.edit(places[places.len() / 2]);
     let mut fitted: Vec<Vec<Row>> = Vec::new();
@@ -101,7 +100,7 @@ fn continued(brdf: &Brdf, before: &FittedTable, share: f32, observer: &dyn Obser
         .map(|column| (0..places.len()).map(|at| edited[index(column, at)].clone()).collect())
         .collect();
     let row = |to: usize| {
-        let sharpest = drafting.sharpest.level(view(to).theta_o);
+        let sharpest = sharpest_level(&drafting.lobe, view(to).theta_o);
         with_rest(blend(&fitted, to), &blend(&edited_where_fitted, to), &edited[to], sharpest)
     };
     Ok(FittedTable::pack(&(0..azimuths * rows).map(row).collect::<Vec<_>>(), azimuths, sets))
@@ -112,7 +111,7 @@ struct Drafting<'a> {
     brdf: &'a Brdf,
     before: &'a FittedTable,
     share: f32,
-    sharpest: SharpestKernels,
+    lobe: LobeShape,
 }
 
 /// What a row is fitted to, and the kernels that it had, in units of the lights.
@@ -142,7 +141,7 @@ impl Drafting<'_> {
         let Target { lights, albedo, .. } = target;
         Fit::new(lights, *albedo / lights.unit)
             .in_sets(self.before.sets, self.share)
-            .no_sharper_than(self.sharpest.level(self.view(index).theta_o))
+            .no_sharper_than(sharpest_level(&self.lobe, self.view(index).theta_o))
     }
 
     /// How the BRDF was edited, as seen in the row of this `index`.

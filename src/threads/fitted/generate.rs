@@ -5,10 +5,9 @@ use glam::{DVec2, DVec3, dvec3};
 use rayon::prelude::*;
 
 use super::cells::in_sets;
-use super::kernel::{Kernel, all_between, scale_rad};
+use super::kernel::{Kernel, all_between, scale_rad, sharpest_level};
 use super::lights::{Quadrature, TestLights};
 use super::sets::{pixels_have_own, share_of_sets};
-use super::sharpest::SharpestKernels;
 use super::solve::{Effort, Fit};
 use super::table::FittedTable;
 use crate::brdf::{Brdf, LobeShape, SeenBrdf, luminance};
@@ -69,7 +68,6 @@ struct Targets {
     rows: Vec<(TestLights, DVec3)>,
     /// Of the BRDF, seen along the normal.
     lobe: LobeShape,
-    sharpest: SharpestKernels,
 }
 
 /// How many lights there are in a row for so many threads.
@@ -96,8 +94,7 @@ impl Targets {
             Ok((lights, slices[0].albedo()))
         };
         let rows = (0..azimuths * rows).into_par_iter().map(target).collect::<Result<_>>()?;
-        let lobe = LobeShape::of(brdf);
-        Ok(Self { azimuths, rows, lobe, sharpest: SharpestKernels::of(brdf, &lobe) })
+        Ok(Self { azimuths, rows, lobe: LobeShape::of(brdf) })
     }
 
     /// Whether the cosine kernel alone does in all rows.
@@ -154,7 +151,7 @@ fn fit_all(
         let (before, neighbours): (Vec<_>, Vec<_>) = neighbours.unzip();
         let fit = Fit::new(lights, *albedo / lights.unit)
             .in_sets(settings.sets, share)
-            .no_sharper_than(targets.sharpest.level(to.theta_o));
+            .no_sharper_than(sharpest_level(&targets.lobe, to.theta_o));
         let start = match &neighbours[..] {
             [] => {
                 let seen = SeenBrdf::from_azimuth(brdf, to.phi_o);

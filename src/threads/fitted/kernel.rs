@@ -7,6 +7,8 @@ use std::f64::consts::PI;
 
 use glam::DVec3;
 
+use crate::brdf::{LobeShape, MIN_COS_THETA_D};
+
 /// Width of the kernel of level 0 in radians: 0.22 degrees, two texels in the middle of a face of 1024.
 pub const FINEST_WIDTH_RAD: f64 = 1.0 / 256.0;
 
@@ -76,6 +78,23 @@ pub fn level_of_variance(variance: f32) -> f32 {
 pub fn sharp_part(level: f32, finest: f32) -> f32 {
     const AS_SHARP: f32 = 0.625;
     (1.0 - variance_of_level(level) / (AS_SHARP * variance_of_level(finest))).max(0.0)
+}
+
+/// No kernel is narrower than this part of the lobe's width in half vectors: a Gaussian as wide as the lobe has 2.6 times that. Narrower
+/// ones would answer the lights of the fit, not those between them: a comb, if there are many. Lights tell kernels that are wider than
+/// [`TOLD_RAD`], so these have no such bound. Chrome beside 300 small lamps, close to the limb, errs by 0.0032 with 128 threads, not by 0.0074.
+const NARROWEST_IN_LOBE: f64 = 1.25;
+const TOLD_RAD: f64 = 0.02;
+
+/// No kernel of a cusp is sharper than this: shading would look up a map of 1024 columns as it is, which costs several lookups.
+/// [`sharp_part`] is 0 there from 0.5 on, and half floats round levels by less than a thousandth.
+const SHARPEST_OF_CUSP: f64 = 0.51;
+
+/// The level that kernels of a BRDF with this lobe are no sharper than, at the view angle `theta_o` in radians.
+pub fn sharpest_level(lobe: &LobeShape, theta_o: f64) -> f64 {
+    let narrowest_rad = (NARROWEST_IN_LOBE * lobe.width_rad).min(TOLD_RAD) * theta_o.cos().max(MIN_COS_THETA_D);
+    let least = if lobe.is_cusp { SHARPEST_OF_CUSP } else { SHARPEST_LEVEL };
+    (narrowest_rad / FINEST_WIDTH_RAD).log2().max(least)
 }
 
 /// A length on the scale of a kernel of `level`: its width; for those sharper than level 0, as if widths went on halving.

@@ -9,7 +9,6 @@
 //! | how kernels answer them | [`answers`] |
 //! | the fit of one row | [`solve`] |
 //! | of all rows | [`generate()`] |
-//! | how sharp kernels may be | `sharpest` |
 //! | sets of them, for sub-pixels | [`ThreadSettings::for_picture`](super::ThreadSettings::for_picture) |
 //! | of an edited BRDF, at once and coarsely | [`draft()`] |
 //! | what the edit does to all rows | `edit` |
@@ -26,7 +25,6 @@ mod giving_way;
 pub mod kernel;
 pub mod lights;
 mod sets;
-mod sharpest;
 pub mod solve;
 mod table;
 #[cfg(test)]

@@ -77,6 +77,32 @@ fn many_kernels_of_a_near_mirror_are_no_narrower_than_its_lobe() {
     }
 }
 
+#[test]
+fn no_kernel_of_a_cusp_looks_up_the_environment_as_it_is() {
+    // A spike like those of MERL's tables on gold.
+    struct Spike(Brdf);
+    impl CustomBrdf for Spike {
+        fn name(&self) -> &str {
+            "a spike on gold"
+        }
+        fn key(&self) -> Vec<u8> {
+            Vec::new()
+        }
+        fn evaluate(&self, w_i: DVec3, w_o: DVec3) -> DVec3 {
+            let away = (w_i + w_o).truncate().length() / (w_i + w_o).length().max(1e-9);
+            self.0.evaluate(w_i, w_o) * (1.0 + 3.0 * (-away / 1e-3).exp())
+        }
+    }
+    let brdf = Brdf::custom(Spike(gold(0.05)));
+    assert!(LobeShape::of(&brdf).is_cusp);
+    // The pyramid of a map of 1024 columns begins at level 1.
+    let table = generate(&brdf, &small(64, 10), &()).unwrap();
+    assert_eq!(table.used().sharp_count(1.0), 0);
+    // Nor does one of a draft.
+    let table = draft(&brdf, &generate(&gold(0.02), &small(16, 30), &()).unwrap(), &()).unwrap();
+    assert_eq!(table.used().sharp_count(1.0), 0);
+}
+
 /// The lights of a view of gold, and its albedo in their units.
 fn seen_gold() -> (TestLights, DVec3) {
     let gold = gold(0.3);
