@@ -126,10 +126,14 @@ fn the_shader_agrees_with_its_cpu_twin_on_long_lobes() {
         let prepared = ready(&scene);
         let rendering = gpu.render(&prepared, EVERYTHING);
         let twin = CpuShader::new(&prepared, &cpu.round(&())).unwrap();
-        // What the twin draws may fall on the other side of a step of a CDF.
-        let (most, outliers) = match method {
-            "fitted" | "paper" => (2e-3, 0),
-            _ => (2e-3, 25),
+        const MOST: f32 = 2e-3;
+        let outliers = match method {
+            "fitted" => 0,
+            "paper" if gpu.has_exact_functions() => 0,
+            // An H200 has two pixels that are off by 0.22 %.
+            "paper" => 5,
+            // What the twin draws may fall on the other side of a step of a CDF.
+            _ => 25,
         };
         let (mut compared, mut off) = (0, Vec::new());
         for pixel in pixels(&prepared) {
@@ -137,7 +141,7 @@ fn the_shader_agrees_with_its_cpu_twin_on_long_lobes() {
             let found = Vec4::from(rendering.radiance[(pixel.y * 80 + pixel.x) as usize]);
             assert_eq!(found.w, expected.w, "{method}: coverage at {pixel}");
             compared += usize::from(expected.w > 0.0);
-            if (found - expected).abs().max_element() > most * expected.truncate().max_element() {
+            if (found - expected).abs().max_element() > MOST * expected.truncate().max_element() {
                 off.push((pixel, found, expected));
             }
         }
