@@ -230,16 +230,17 @@ impl JsonArgument {
         output::check_not_read(&self.json, read)
     }
 
-    /// Prints the tables of what was `found`, if anything was, and writes it.
+    /// Prints the tables of what was `found`, if anything was, and writes it if that is all: a file that is there is whole.
     pub fn report<T: serde::Serialize>(
         &self,
+        result: Result<()>,
         found: &[T],
         tables: impl FnOnce(&[T]) -> Vec<tables::Section>,
     ) -> anyhow::Result<()> {
-        if found.is_empty() {
-            return Ok(());
+        if !found.is_empty() {
+            write!(std::io::stdout().lock(), "{}", tables::text(&tables(found)))?;
         }
-        write!(std::io::stdout().lock(), "{}", tables::text(&tables(found)))?;
+        result?;
         self.write(&found)
     }
 

@@ -48,7 +48,6 @@ impl BenchFit {
         let mut found = Vec::new();
         let result = fit::run(&fits, &Memo::new(None), &progress, &mut found);
         progress.finish();
-        self.json.report(&found, |found| vec![fit::tables(found)])?;
-        Ok(result?)
+        self.json.report(result, &found, |found| vec![fit::tables(found)])
     }
 }

@@ -74,8 +74,7 @@ impl BenchLive {
         let result = live::run(&drag, &settings, &device, &memo, &progress, &mut found);
         drop(device);
         progress.finish();
-        self.json.report(&found, |found| vec![live::table(&drag, found)])?;
-        result?;
+        self.json.report(result, &found, |found| vec![live::table(&drag, found)])?;
         none_of(&messages.all())
     }
 }

@@ -45,7 +45,6 @@ impl BenchRounding {
         let mut found = Vec::new();
         let result = rounding::run(&cases, &device, &memo, &progress, &mut found);
         progress.finish();
-        self.json.report(&found, |found| vec![rounding::tables(found)])?;
-        Ok(result?)
+        self.json.report(result, &found, |found| vec![rounding::tables(found)])
     }
 }

@@ -62,7 +62,6 @@ impl BenchShaders {
         progress.finish();
         let about = device.description();
         let name = format!("{}, {}", about.name, about.driver);
-        self.json.report(&costs, |costs| vec![shaders::table(&name, costs)])?;
-        Ok(result?)
+        self.json.report(result, &costs, |costs| vec![shaders::table(&name, costs)])
     }
 }

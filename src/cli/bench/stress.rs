@@ -51,8 +51,7 @@ impl BenchStress {
         let result = stress::run(&extent, &device, &Memo::new(self.machine.cache().as_deref()), &progress, &mut found);
         drop(device);
         progress.finish();
-        self.json.report(&found, |found| vec![stress::tables(found)])?;
-        result?;
+        self.json.report(result, &found, |found| vec![stress::tables(found)])?;
         let broken = found.iter().filter(|case: &&Stressed| case.is_broken()).count();
         anyhow::ensure!(broken == 0, "bench stress: {broken} of {} cases break a bound", found.len());
         none_of(&messages.all())

@@ -77,7 +77,6 @@ impl BenchTogether {
         let mut found = Vec::new();
         let result = together::run(&together, &device, &memo, &progress, &mut found);
         progress.finish();
-        self.json.report(&found, together::tables)?;
-        Ok(result?)
+        self.json.report(result, &found, together::tables)
     }
 }
