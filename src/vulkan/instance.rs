@@ -4,6 +4,7 @@ use super::error::During;
 use super::error::{Result, VulkanError, call};
 use ash::{ext, khr, vk};
 use std::ffi::{CStr, c_void};
+use std::ops::Range;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
@@ -125,9 +126,15 @@ impl Drop for Instance {
     }
 }
 
+/// Versions of the validation layer that compare submissions without knowing that a wait for a timeline semaphore lies between them, and so find
+/// hazards where there are none (issue 7457 of Vulkan-ValidationLayers). Ubuntu 24.04 has 1.3.275. Within a submission they look all the same.
+const WITHOUT_TIMELINES: Range<u32> = vk::make_api_version(0, 1, 3, 272)..vk::make_api_version(0, 1, 3, 297);
+
 /// What the loader offers.
 struct Offer {
     version: u32,
+    /// The version of Vulkan that the validation layer is of; 0 without one.
+    validation: u32,
     extensions: Vec<vk::ExtensionProperties>,
 }
 
@@ -140,14 +147,16 @@ impl Offer {
         let layers = call("vkEnumerateInstanceLayerProperties", NAME, || unsafe {
             entry.enumerate_instance_layer_properties()
         })?;
-        if needs_validation && !layers.iter().any(|layer| layer.layer_name_as_c_str() == Ok(VALIDATION_LAYER)) {
+        let validation = layers.iter().find(|layer| layer.layer_name_as_c_str() == Ok(VALIDATION_LAYER));
+        if needs_validation && validation.is_none() {
             return Err(VulkanError::NoValidationLayer);
         }
         // SAFETY: plain query of the loader.
         let extensions = call("vkEnumerateInstanceExtensionProperties", NAME, || unsafe {
             entry.enumerate_instance_extension_properties(None)
         })?;
-        Ok(Self { version: version.unwrap_or(vk::API_VERSION_1_0), extensions })
+        let validation = validation.map_or(0, |layer| layer.spec_version);
+        Ok(Self { version: version.unwrap_or(vk::API_VERSION_1_0), validation, extensions })
     }
 
     fn has(&self, wanted: &CStr) -> bool {
@@ -187,8 +196,19 @@ fn create(
         .application_info(&application)
         .enabled_layer_names(&layers)
         .enabled_extension_names(&extensions);
+    let no = [vk::FALSE];
+    let across_submissions = [vk::LayerSettingEXT {
+        ty: vk::LayerSettingTypeEXT::BOOL32,
+        value_count: 1,
+        p_values: no.as_ptr().cast(),
+        ..vk::LayerSettingEXT::default().layer_name(VALIDATION_LAYER).setting_name(c"sync_queue_submit")
+    }];
+    let mut settings = vk::LayerSettingsCreateInfoEXT::default().settings(&across_submissions);
     if let Some(messenger_info) = &mut messenger_info {
         info = info.push_next(&mut features).push_next(messenger_info);
+        if WITHOUT_TIMELINES.contains(&offer.validation) {
+            info = info.push_next(&mut settings);
+        }
     }
     // SAFETY: `info` and all it points to outlive the call; whoever listens does so for as long as there is the instance.
     call("vkCreateInstance", NAME, || unsafe { entry.create_instance(&info, None) }).map_err(|error| match error {
