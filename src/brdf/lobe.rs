@@ -216,8 +216,18 @@ mod tests {
         assert_eq!((half_vector_width(&lambert), lobe_radius(&lambert, 0.0)), (FRAC_PI_2, FRAC_PI_2));
     }
 
-    /// A clear coat of this roughness_alpha over a rough one, which has this part of the sum.
-    struct TwoLobes(f64, f64);
+    /// A narrow lobe and a wide one, which has this part of the sum.
+    struct TwoLobes([Brdf; 2], f64);
+
+    impl TwoLobes {
+        fn of(narrow_alpha: f64, part_of_wide: f64) -> Self {
+            let lobe = |alpha: f64| {
+                let parameters = format!("distribution = 'beckmann'\nalpha = {alpha}\neta = 0.2\nk = 3.9");
+                Brdf::from_parameters("conductor", parameters.parse().unwrap()).unwrap()
+            };
+            Self([narrow_alpha, 0.05].map(lobe), part_of_wide)
+        }
+    }
 
     impl CustomBrdf for TwoLobes {
         fn name(&self) -> &str {
@@ -225,15 +235,12 @@ mod tests {
         }
 
         fn key(&self) -> Vec<u8> {
-            [self.0, self.1].into_iter().flat_map(f64::to_le_bytes).collect()
+            [self.0[0].fingerprint().as_bytes().as_slice(), &self.1.to_le_bytes()].concat()
         }
 
         fn evaluate(&self, w_i: DVec3, w_o: DVec3) -> DVec3 {
-            let lobe = |alpha: f64| {
-                let parameters = format!("distribution = 'beckmann'\nalpha = {alpha}\neta = 0.2\nk = 3.9");
-                Brdf::from_parameters("conductor", parameters.parse().unwrap()).unwrap().evaluate(w_i, w_o)
-            };
-            (1.0 - self.1) * lobe(self.0) + self.1 * lobe(0.05)
+            let [narrow, wide] = self.0.each_ref().map(|lobe| lobe.evaluate(w_i, w_o));
+            narrow.lerp(wide, self.1)
         }
     }
 
@@ -242,7 +249,7 @@ mod tests {
         for (alpha, part_of_wide, is_cusp) in
             [(0.001, 0.98, true), (0.001, 0.9, false), (0.001, 0.0, false), (0.02, 0.98, false)]
         {
-            let lobe = LobeShape::of(&Brdf::custom(TwoLobes(alpha, part_of_wide)));
+            let lobe = LobeShape::of(&Brdf::custom(TwoLobes::of(alpha, part_of_wide)));
             assert_eq!(lobe.is_cusp, is_cusp, "{alpha} {part_of_wide}: {lobe:?}");
         }
         // A twentieth of what white paint under a coat without colour reflects is the coat's, but all of the lobe.

@@ -126,8 +126,9 @@ impl Drop for Instance {
     }
 }
 
-/// Versions of the validation layer that compare submissions without knowing that a wait for a timeline semaphore lies between them, and so find
-/// hazards where there are none (issue 7457 of Vulkan-ValidationLayers). Ubuntu 24.04 has 1.3.275. Within a submission they look all the same.
+/// Versions of the validation layer that look for hazards across submissions, but do not know of waits for timeline semaphores between them:
+/// they find some where there are none (issue 7457 of Vulkan-ValidationLayers). Ubuntu 24.04 has 1.3.275. They are told to look within each
+/// submission alone.
 const WITHOUT_TIMELINES: Range<u32> = vk::make_api_version(0, 1, 3, 272)..vk::make_api_version(0, 1, 3, 297);
 
 /// What the loader offers.

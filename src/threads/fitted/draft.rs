@@ -53,21 +53,23 @@ const LIGHTS_A_THREAD: usize = 16;
 /// Cancelled by `observer`.
 pub fn draft(brdf: &Brdf, before: &FittedTable, observer: &dyn Observer) -> Result<FittedTable> {
     let share = share_of_sets(before.azimuths, before.of_subpixels.is_some());
-    let Some(of_subpixels) = &before.of_subpixels else { return continued(brdf, before, share, observer) };
+    let of_pixels = Drafting { brdf, before, share, lobe: LobeShape::of(brdf) };
+    let Some(of_subpixels) = &before.of_subpixels else { return continued(&of_pixels, observer) };
+    let of_subpixels = Drafting { before: of_subpixels, ..of_pixels };
     let (of_pixels, of_subpixels) =
-        rayon::join(|| continued(brdf, before, share, observer), || continued(brdf, of_subpixels, share, observer));
+        rayon::join(|| continued(&of_pixels, observer), || continued(&of_subpixels, observer));
     Ok(of_pixels?.with_subpixels(of_subpixels?))
 }
 
-/// The threads of `before`, but not those of its sub-pixels; what `share` is, [`Fit::in_sets`] says.
-fn continued(brdf: &Brdf, before: &FittedTable, share: f32, observer: &dyn Observer) -> Result<FittedTable> {
+/// The threads that `drafting` continues, but not those of their sub-pixels.
+fn continued(drafting: &Drafting, observer: &dyn Observer) -> Result<FittedTable> {
+    let before = drafting.before;
     let FittedTable { rows, azimuths, sets, .. } = *before;
     let (mut places, columns) = (every(ROW_STEP, rows), every(AZIMUTH_STEP, azimuths));
     let before_rim = rows.saturating_sub(RIM_STEP + 1);
     if let (Err(place), 1) = (places.binary_search(&before_rim), azimuths) {
         places.insert(place, before_rim);
     }
-    let drafting = Drafting { brdf, before, share, lobe: LobeShape::of(brdf) };
     let view = |index: usize| drafting.view(index);
     let edit = drafting.edit(places[places.len() / 2]);
     let mut fitted: Vec<Vec<Row>> = Vec::new();

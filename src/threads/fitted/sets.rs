@@ -33,8 +33,8 @@ pub fn shared_deviation(lobe: &LobeShape, table: &FittedTable) -> f64 {
 pub const NEARLY_FLAT_RAD: f64 = 0.01;
 
 /// Whether pixels that share one sum have threads of their own, not in sets. Not of a narrow lobe, for which there are few such pixels, and whose
-/// free threads are so sharp that all pixels pay for looking that up: 26 ms become 35 with 16 threads of alumina-oxide on a dragon. Nor of
-/// an anisotropic BRDF, whose fits take ten times as long.
+/// free threads are so sharp that all pixels pay for looking that up: 26 ms became 35 with 16 threads of alumina-oxide on a dragon, when its
+/// kernels were as sharp as its cusp. Nor of an anisotropic BRDF, whose fits take ten times as long.
 pub fn pixels_have_own(lobe: &LobeShape) -> bool {
     lobe.is_isotropic && lobe.width_rad >= NEARLY_FLAT_RAD
 }
