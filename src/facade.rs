@@ -204,7 +204,7 @@ impl Scene {
 
     /// The same by this method, with as many threads or samples as suit it.
     pub fn with_method(mut self, method: Method) -> Self {
-        (self.shading.method, self.shading.threads) = (method.name().to_owned(), None);
+        (self.shading.method, self.shading.threads) = (method, None);
         self
     }
 

@@ -3,6 +3,7 @@
 //! A method is one GLSL file in `glsl/methods/` that defines `estimate`, its CPU twin in `shading/`, and an entry in the table
 //! `shading/methods.rs`.
 use crate::environment::Environment;
+pub use crate::scene::Method;
 use crate::scene::Pattern;
 use crate::threads::ThreadKind;
 use crate::vulkan::{Shader, compiled};
@@ -16,8 +17,6 @@ pub const DEFAULT_SAMPLES: u32 = 100;
 struct Properties {
     /// What it does, for help texts: one sentence.
     summary: &'static str,
-    /// Its name in older scene files and scripts.
-    older_name: Option<&'static str>,
     /// The threads that it shades by; the others draw that many samples instead.
     threads: Option<ThreadKind>,
     /// What its shader looks up.
@@ -47,7 +46,7 @@ pub struct Lookups {
 
 impl Properties {
     const fn new(summary: &'static str, lookups: Lookups) -> Self {
-        Self { summary, older_name: None, threads: None, lookups, shares_surface: false, has_pattern: false }
+        Self { summary, threads: None, lookups, shares_surface: false, has_pattern: false }
     }
 }
 
@@ -66,29 +65,10 @@ impl Lookups {
     }
 }
 
-/// Makes the enum and its properties from the table in shading/methods.rs.
+/// Makes the properties from the table in shading/methods.rs.
 macro_rules! methods {
-    ($($name:ident => $Method:ident: $properties:expr,)+) => {
-        /// A way to estimate the radiance that leaves a surface; [`Method::summary`] says which.
-        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-        pub enum Method {
-            $(#[doc = concat!("Method `", stringify!($name), "`.")] $Method,)+
-            /// Quadrature on the CPU: the truth.
-            Reference,
-        }
-
+    ($($name:ident $(| $older:ident)? => $Method:ident: $properties:expr,)+) => {
         impl Method {
-            /// All of them.
-            pub const ALL: &[Self] = &[$(Self::$Method,)+ Self::Reference];
-
-            /// What the command line and scene files call it.
-            pub fn name(self) -> &'static str {
-                match self {
-                    $(Self::$Method => stringify!($name),)+
-                    Self::Reference => "reference",
-                }
-            }
-
             fn properties(self) -> Properties {
                 match self {
                     $(Self::$Method => $properties,)+
@@ -101,23 +81,6 @@ macro_rules! methods {
 include!("shading/methods.rs");
 
 impl Method {
-    /// The method of that name.
-    ///
-    /// # Errors
-    /// There is none.
-    pub fn from_name(name: &str) -> Result<Self> {
-        let is_called = |method: &Self| method.name() == name || method.older_name() == Some(name);
-        Self::ALL.iter().copied().find(is_called).ok_or_else(|| {
-            let known: Vec<_> = Self::ALL.iter().map(|method| method.name()).collect();
-            Error::input(format!("method \"{name}\""), "is not known", format!("use one of: {}", known.join(", ")))
-        })
-    }
-
-    /// Its name in older scene files and scripts, if it had another.
-    pub fn older_name(self) -> Option<&'static str> {
-        self.properties().older_name
-    }
-
     /// What it does, in a sentence.
     pub fn summary(self) -> &'static str {
         self.properties().summary
@@ -247,13 +210,6 @@ mod tests {
             assert_eq!(method.shader().unwrap().name(), format!("shade_{}", method.name()));
         }
         assert!(Method::Reference.shader().is_err());
-    }
-
-    #[test]
-    fn older_names_are_still_read() {
-        assert_eq!(Method::from_name("resampled").unwrap(), Method::Ris);
-        assert_eq!(Method::from_name("combined").unwrap(), Method::Mis);
-        assert!(Method::from_name("resample").unwrap_err().to_string().contains("fitted, paper"));
     }
 
     #[test]

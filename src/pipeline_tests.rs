@@ -2,7 +2,7 @@
 use super::*;
 use crate::memo::Memo;
 use crate::prepare::prepare;
-use crate::scene::{Scene, Source};
+use crate::scene::{Method, Scene, Source};
 use crate::vulkan::Instance;
 use crate::vulkan::faults::{Fault, with_fault};
 use ash::vk::Result as Call;
@@ -31,7 +31,7 @@ fn wherever_the_device_fails_it_is_said_and_nothing_is_left() {
     let mut scene = Scene::default();
     (scene.image.width, scene.image.height) = (8, 6);
     scene.environment.source = Source::Builtin("white".to_owned());
-    scene.shading.method = "cosine".to_owned();
+    scene.shading.method = Method::Cosine;
     let prepared = prepare(&scene, &Memo::default().round(&())).expect("a scene that can be prepared");
     let (pixels, calls) = render(&prepared, None);
     assert_eq!(pixels.expect("a picture"), 48);

@@ -139,7 +139,7 @@ pub fn prepare(scene: &Scene, round: &Round) -> Result<Prepared> {
 
 /// Whether threads of `scene` can be drafted from those of `before`: fitted ones, as many, of models whose parameters were changed.
 pub fn can_draft(scene: &Scene, before: &Prepared) -> bool {
-    let Ok(method) = Method::from_name(&scene.shading.method) else { return false };
+    let method = scene.shading.method;
     fn source<'s>(scene: &'s Scene, name: &str) -> Option<&'s MaterialSource> {
         scene.materials.iter().find(|material| material.name == name).map(|material| &material.source)
     }
@@ -205,7 +205,7 @@ pub fn prepare_draft(scene: &Scene, before: &Prepared, round: &Round) -> Result<
 type AskThreads<'a> = dyn Fn(Method, &PreparedMaterial, Sampling) -> Result<Option<Keyed<Threads>>> + 'a;
 
 fn prepare_by(scene: &Scene, round: &Round, ask_threads: &AskThreads) -> Result<Prepared> {
-    let method = Method::from_name(&scene.shading.method)?;
+    let method = scene.shading.method;
     let count = scene.shading.threads.unwrap_or(method.default_count());
     check_count(method, count, scene.image.subpixels)?;
     let Variant { pattern, .. } = Variant::new(method, scene.shading.pattern);
@@ -251,7 +251,7 @@ fn prepare_by(scene: &Scene, round: &Round, ask_threads: &AskThreads) -> Result<
 /// # Errors
 /// A file that cannot be read, a model or method that there is not.
 pub fn key_of(scene: &Scene, memo: &Memo) -> Result<Key> {
-    let method = Method::from_name(&scene.shading.method)?;
+    let method = scene.shading.method;
     let count = scene.shading.threads.unwrap_or(method.default_count());
     let image = &scene.image;
     let shows_environment = image.background == crate::scene::Background::Environment;

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
+use threadlight::Method;
 use threadlight::low_level::brdf::Brdf;
 use threadlight::low_level::evaluate::reference::{ReferenceSettings, STAGES, progressive, reference};
 use threadlight::low_level::pipeline::{Wanted, render_geometry};
@@ -69,7 +70,7 @@ fn hard_scene() -> Prepared {
     if let Some(map) = map {
         scene.environment.source = Source::File(map);
     }
-    scene.shading.method = "reference".into();
+    scene.shading.method = Method::Reference;
     ready(&scene)
 }
 
@@ -86,7 +87,7 @@ fn the_reference_stops_at_once_and_comes_in_stages() {
     }
 
     let mut small = sphere(MaterialSource::Builtin("gold".into()), "studio", 1, (48, 36));
-    small.shading.method = "reference".into();
+    small.shading.method = Method::Reference;
     let prepared = ready(&small);
     let geometry = render_geometry(&gpu.device, &prepared, &gpu.round()).unwrap();
     let truth = reference(&prepared, &gpu.device, &ReferenceSettings::default(), &gpu.round()).unwrap();
@@ -135,7 +136,7 @@ fn the_first_stages_of_a_large_reference_come_soon() {
     let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
     let gpu = Validated::new();
     let mut scene = sphere(MaterialSource::Builtin("gold".into()), "studio", 1, (640, 480));
-    scene.shading.method = "reference".into();
+    scene.shading.method = Method::Reference;
     let prepared = ready(&scene);
     let geometry = render_geometry(&gpu.device, &prepared, &gpu.round()).unwrap();
     let start = Instant::now();

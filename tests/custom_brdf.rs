@@ -3,6 +3,7 @@ mod common;
 
 use common::{EVERYTHING, Validated, model, ready, sphere};
 use glam::{DVec3, Vec4};
+use threadlight::Method;
 use threadlight::low_level::brdf::{Brdf, Custom, CustomBrdf};
 use threadlight::low_level::scene::{MaterialSource, Source};
 
@@ -42,18 +43,18 @@ fn a_custom_brdf_looks_like_the_model_with_its_values() {
     let (sunny, white) = (Source::File(map), Source::Builtin("white".to_owned()));
     let (round, long) = ("alpha = 0.15", "alpha_x = 0.15\nalpha_y = 0.4\nrotation_deg = 20");
     for (roughness, method, environment, threads, tolerance) in [
-        (round, "fitted", &white, 8, 0.0),
-        (round, "fitted", &sunny, 8, 1e-4),
-        (round, "paper", &sunny, 32, 1e-4),
-        (round, "mis", &sunny, 16, 2e-4),
+        (round, Method::Fitted, &white, 8, 0.0),
+        (round, Method::Fitted, &sunny, 8, 1e-4),
+        (round, Method::Paper, &sunny, 32, 1e-4),
+        (round, Method::Mis, &sunny, 16, 2e-4),
         // The axes of the model are not the tangent's, those of the function are.
-        (long, "fitted", &sunny, 8, 1e-2),
-        (long, "mis", &sunny, 16, 1e-2),
+        (long, Method::Fitted, &sunny, 8, 1e-2),
+        (long, Method::Mis, &sunny, 16, 1e-2),
     ] {
         let [expected, found] = materials(roughness).map(|material| {
             let mut scene = sphere(material, "white", threads, (48, 36));
             scene.environment.source = environment.clone();
-            scene.shading.method = method.to_owned();
+            scene.shading.method = method;
             gpu.render(&ready(&scene), EVERYTHING).radiance
         });
         let difference = |(a, b): (&[f32; 4], &[f32; 4])| (Vec4::from(*a) - Vec4::from(*b)).abs().element_sum();

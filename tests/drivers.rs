@@ -6,6 +6,7 @@ mod common;
 use common::{EVERYTHING, Validated, analytic_materials, sphere, texels_of};
 use glam::UVec2;
 use std::path::Path;
+use threadlight::Method;
 use threadlight::low_level::evaluate::{Comparable, Display};
 use threadlight::low_level::geometry_texel::GeometryTexel;
 use threadlight::low_level::memo::Memo;
@@ -32,10 +33,10 @@ fn scenes(folder: &Path) -> Vec<(String, Scene)> {
     write_exr(&path, 64, 32, &(0..64 * 32).map(texel).collect::<Vec<_>>(), false, &Default::default()).unwrap();
     let cases = analytic_materials().into_iter().skip(1).flat_map(|(name, material)| {
         let path = path.clone();
-        ["fitted", "paper"].map(move |method| {
+        [Method::Fitted, Method::Paper].map(move |method| {
             let mut scene = sphere(material.clone(), "white", 8, (160, 120));
             scene.environment.source = Source::File(path.clone());
-            scene.shading.method = method.to_owned();
+            scene.shading.method = method;
             // Not in the middle of faces.
             scene.environment.rotation_deg = 73.0;
             scene.image.exposure = 0.3;

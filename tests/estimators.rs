@@ -47,7 +47,7 @@ fn scene(
     let Variant { method, pattern } = variant.into();
     let mut scene = sphere(material, "white", samples, size);
     scene.environment.source = environment;
-    (scene.shading.method, scene.shading.pattern) = (method.name().to_owned(), pattern);
+    (scene.shading.method, scene.shading.pattern) = (method, pattern);
     scene.image.background = Background::None;
     scene
 }

@@ -3,6 +3,7 @@ mod common;
 
 use common::{Validated, model, ready, sphere};
 use tempfile::TempDir;
+use threadlight::Method;
 use threadlight::low_level::evaluate::expected::{TrueSample, prepare_within};
 use threadlight::low_level::evaluate::metrics::{Comparable, Display, compare};
 use threadlight::low_level::evaluate::reference::{ReferenceSettings, reference};
@@ -33,8 +34,8 @@ fn what_is_expected_is_within_a_factor_of_two_of_what_is_measured() {
     let mut scene = glossy(&folder);
     let truth = reference(&ready(&scene), &gpu.device, &ReferenceSettings::default(), &gpu.round()).unwrap();
     let sample = TrueSample::new(&ready(&scene), &gpu.device, &gpu.round()).unwrap();
-    for (method, threads) in [("fitted", 1), ("fitted", 6), ("paper", 8), ("importance", 16)] {
-        (scene.shading.method, scene.shading.threads) = (method.to_owned(), Some(threads));
+    for (method, threads) in [(Method::Fitted, 1), (Method::Fitted, 6), (Method::Paper, 8), (Method::Importance, 16)] {
+        (scene.shading.method, scene.shading.threads) = (method, Some(threads));
         let rendering = gpu.render(&ready(&scene), RADIANCE);
         let expected = sample.expected_rms(&rendering.radiance);
         let comparable = |radiance| Comparable::from_radiance(48, 36, radiance, true, Display::default());
@@ -70,7 +71,7 @@ fn the_fewest_threads_that_are_within_an_error_are_chosen() {
 fn an_error_that_no_number_of_threads_reaches_is_refused_with_the_one_that_is() {
     let (gpu, folder) = (Validated::new(), TempDir::new().unwrap());
     let mut scene = glossy(&folder);
-    scene.shading.method = "cosine".to_owned();
+    scene.shading.method = Method::Cosine;
     let error = prepare_within(&scene, 1e-6, &gpu.device, &gpu.round()).err().unwrap().to_string();
     assert!(error.contains("--error") && error.contains("8192") && error.contains("cosine"), "{error}");
     gpu.finish();

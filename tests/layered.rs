@@ -2,6 +2,7 @@
 mod common;
 
 use common::{EVERYTHING, Validated, model, ready, sphere};
+use threadlight::Method;
 use threadlight::low_level::evaluate::reference::{ReferenceSettings, reference};
 use threadlight::low_level::scene::Background;
 use threadlight::low_level::shading::display_value;
@@ -12,14 +13,17 @@ fn every_way_of_shading_comes_near_to_the_reference() {
     let coat = "coat = { alpha = 0.1, ior = 1.5, thickness = 0.2, absorption = [0.1, 1, 4] }";
     let material = model(&format!("model = 'layered'\nbase = 'satin'\n{coat}"));
     let mut scene = sphere(material, "studio", 16, (48, 36));
-    scene.shading.method = "reference".into();
+    scene.shading.method = Method::Reference;
     scene.image.background = Background::None;
     let truth = reference(&ready(&scene), &gpu.device, &ReferenceSettings::default(), &gpu.round()).unwrap();
     let shown = |rgba: &[f32; 4]| [0, 1, 2].map(|channel| f64::from(display_value(rgba[channel], 1.0, 2.2)));
-    for (method, count, limit) in
-        [("fitted", 16, 0.007), ("mis", 64, 0.015), ("importance", 64, 0.05), ("filtered", 64, 0.03)]
-    {
-        (scene.shading.method, scene.shading.threads) = (method.to_owned(), Some(count));
+    for (method, count, limit) in [
+        (Method::Fitted, 16, 0.007),
+        (Method::Mis, 64, 0.015),
+        (Method::Importance, 64, 0.05),
+        (Method::Filtered, 64, 0.03),
+    ] {
+        (scene.shading.method, scene.shading.threads) = (method, Some(count));
         let found = gpu.render(&ready(&scene), EVERYTHING).radiance;
         let square = |(a, b): (&[f32; 4], &[f32; 4])| -> f64 {
             shown(a).iter().zip(shown(b)).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / 3.0

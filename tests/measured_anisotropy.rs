@@ -6,6 +6,7 @@ use std::path::Path;
 
 use common::{EVERYTHING, Validated, pixels, ready, sphere, texels_of};
 use glam::{DMat3, DVec2, DVec3, UVec2, Vec4};
+use threadlight::Method;
 use threadlight::low_level::brdf::{Brdf, Symmetry};
 use threadlight::low_level::evaluate::{Comparable, Display, compare, reference::reference};
 use threadlight::low_level::scene::{Background, MaterialSource, Scene};
@@ -176,9 +177,9 @@ fn values_are_finite_and_not_negative_for_any_pair_of_directions() {
 }
 
 /// A sphere of the material in `file` under the sun.
-fn scene(file: &Path, method: &str, threads: u32) -> Scene {
+fn scene(file: &Path, method: Method, threads: u32) -> Scene {
     let mut scene = sphere(MaterialSource::File(file.to_owned()), "sun", threads, (40, 30));
-    scene.shading.method = method.to_owned();
+    scene.shading.method = method;
     scene.image.background = Background::None;
     scene
 }
@@ -189,7 +190,7 @@ fn shaders_look_measured_anisotropy_up_in_a_table() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("brushed.bsdf");
     std::fs::write(&file, rgl_file(&brushed(), false)).unwrap();
-    for method in ["fitted", "importance", "mis"] {
+    for method in [Method::Fitted, Method::Importance, Method::Mis] {
         let prepared = ready(&scene(&file, method, 4));
         assert!(!prepared.environment.small_sources().nodes.is_empty(), "the sun is one");
         let rendering = gpu.render(&prepared, EVERYTHING);
@@ -201,11 +202,11 @@ fn shaders_look_measured_anisotropy_up_in_a_table() {
         let mut differences: Vec<_> = pixels(&prepared).zip(&rendering.radiance).map(difference).collect();
         differences.sort_by(f32::total_cmp);
         // A sample on the other side of a step of a CDF makes another pixel: seldom.
-        let most = differences[differences.len() * if method == "fitted" { 100 } else { 97 } / 100 - 1];
+        let most = differences[differences.len() * if method == Method::Fitted { 100 } else { 97 } / 100 - 1];
         println!("{method}: {most:.1e}");
         assert!(most < 1e-3, "{method}: {most}");
         drop(twin);
-        if method == "fitted" {
+        if method == Method::Fitted {
             let truth = reference(&prepared, &gpu.device, &Default::default(), &gpu.round()).unwrap();
             let display = Display { exposure: 1.0, gamma: 2.2 };
             let comparable = |radiance: &[[f32; 4]]| Comparable::from_radiance(40, 30, radiance, true, display);

@@ -4,6 +4,7 @@ use common::{Validated, sphere};
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
+use threadlight::Method;
 use threadlight::low_level::brdf::{Brdf, Custom, CustomBrdf};
 use threadlight::low_level::memo::Memo;
 use threadlight::low_level::pipeline::{DeviceScene, Wanted};
@@ -54,7 +55,7 @@ fn each_change_makes_what_it_needs_and_nothing_else() {
         ("threads", |scene| scene.shading.threads = Some(2), &["threads", "upload of materials"]),
         (
             "method",
-            |scene| scene.shading.method = "uniform".into(),
+            |scene| scene.shading.method = Method::Uniform,
             &["upload of materials", "upload of the environment", "shaders"],
         ),
         (
@@ -223,9 +224,11 @@ fn files_count_by_content() {
 #[test]
 fn what_a_seed_does_not_change_is_not_made_again() {
     let gpu = Validated::new();
-    for (method, made) in [("fitted", &[][..]), ("gaussian", &[]), ("paper", &["threads", "upload of materials"])] {
+    for (method, made) in
+        [(Method::Fitted, &[][..]), (Method::Gaussian, &[]), (Method::Paper, &["threads", "upload of materials"])]
+    {
         let mut scene = small();
-        scene.shading.method = method.into();
+        scene.shading.method = method;
         let (first, _) = ask(&gpu, &scene);
         scene.shading.seed = 7;
         assert_eq!(ask(&gpu, &scene).1, made, "{method}");

@@ -1,6 +1,7 @@
 //! Changes of a scene do not grow memory: the only test of this process, whose memory it measures.
 mod common;
 use common::{Validated, sphere};
+use threadlight::Method;
 use threadlight::low_level::pipeline::{DeviceScene, Wanted};
 use threadlight::low_level::prepare::prepare;
 use threadlight::low_level::scene::{MaterialSource, Source};
@@ -24,7 +25,7 @@ fn two_hundred_changes_do_not_grow_memory() {
         let parameters = format!("reflectance = [{alpha}, 0.5, 0.5]").parse().unwrap();
         scene.materials[0].source = MaterialSource::Model { model: "lambert".into(), parameters };
         scene.environment.source = Source::Builtin(environments[change as usize / 10 % 2].into());
-        scene.shading.method = if change % 7 == 0 { "cosine" } else { "paper" }.into();
+        scene.shading.method = if change % 7 == 0 { Method::Cosine } else { Method::Paper };
         scene.objects[0].scale = 1.0 + change as f32 / 100.0;
         let next = {
             let round = gpu.round();

@@ -6,6 +6,7 @@ mod common;
 mod graphs;
 use ash::vk;
 use graphs::*;
+use threadlight::Method;
 use threadlight::low_level::graph::*;
 use threadlight::low_level::pipeline::Wanted;
 
@@ -18,7 +19,7 @@ fn frame(wanted: Wanted) -> Option<String> {
     let renderer = common::Validated::new();
     let mut scene =
         common::sphere(common::model("model = 'lambert'\nreflectance = [0.8, 0.5, 0.2]"), "studio", 16, (640, 480));
-    scene.shading.method = "cosine".to_owned();
+    scene.shading.method = Method::Cosine;
     let is_lavapipe = renderer.device.description().driver.starts_with("llvmpipe");
     let plan = is_lavapipe.then(|| renderer.render(&common::ready(&scene), wanted).plan);
     renderer.finish();

@@ -6,6 +6,7 @@ use common::{Validated, model, ready, sphere};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
+use threadlight::Method;
 use threadlight::low_level::evaluate::Display;
 use threadlight::low_level::evaluate::reference::{Integrator, Processor, ReferenceSettings, TOLERANCE, reference};
 use threadlight::low_level::output::{read_image, write_exr};
@@ -77,7 +78,7 @@ fn the_reference_agrees_with_mitsuba() {
     }
     for (name, material, environment) in scenes {
         let mut scene = scene_of(&folder, material, environment);
-        scene.shading.method = "reference".to_owned();
+        scene.shading.method = Method::Reference;
         let prepared = ready(&scene);
         let Prepared { view, environment, materials, .. } = &prepared;
         let geometry = render_geometry(&gpu.device, &prepared, &gpu.round()).expect("a geometry cache");
@@ -115,9 +116,9 @@ fn threads_come_near_to_mitsuba() {
         ("ggx02__proc_nosun", conductor(0.2), "proc_nosun", [0.02, 0.002]),
         ("ggx005__proc_sun", conductor(0.05), "proc_sun", [0.06, 0.01]),
     ] {
-        for (method, threads, limit) in [("paper", 100, limits[0]), ("fitted", 16, limits[1])] {
+        for (method, threads, limit) in [(Method::Paper, 100, limits[0]), (Method::Fitted, 16, limits[1])] {
             let mut scene = scene_of(&folder, material.clone(), environment);
-            (scene.shading.method, scene.shading.threads) = (method.to_owned(), Some(threads));
+            (scene.shading.method, scene.shading.threads) = (method, Some(threads));
             let rendering = gpu.render(&ready(&scene), Wanted { radiance: true, ..Wanted::default() });
             let reference = read_image(&folder.join(format!("images/{name}.exr"))).expect("a reference picture");
             let rms = rms_inside(&rendering.radiance, &reference.rgba, 640);
@@ -134,7 +135,7 @@ fn the_reference_on_the_gpu_converges_on_that_of_the_cpu() {
     for (name, material, environment) in [("diffuse", diffuse(), "sky"), ("conductor 0.2", conductor(0.2), "studio")] {
         let mut scene = sphere(material, environment, 1, (32, 24));
         scene.image.background = Background::None;
-        scene.shading.method = "reference".to_owned();
+        scene.shading.method = Method::Reference;
         let prepared = ready(&scene);
         let picture = |processor, tolerance| {
             let settings = ReferenceSettings { tolerance, processor };
@@ -196,7 +197,7 @@ fn a_brushed_sphere_looks_as_mitsuba_has_it() {
     for roughness in ["alpha_x = 0.1\nalpha_y = 0.4", "alpha_x = 0.4\nalpha_y = 0.1\nrotation_deg = 90"] {
         let mut scene = sphere(model(&format!("{metal}\n{roughness}")), "white", 1, SIZE);
         scene.environment.source = Source::File(path.clone());
-        scene.shading.method = "reference".to_owned();
+        scene.shading.method = Method::Reference;
         scene.image.subpixels = 1;
         scene.image.background = Background::None;
         let eye = DVec3::new(1.5, 1.0, 3.5);

@@ -4,6 +4,7 @@ mod common;
 use common::{EVERYTHING, Validated, analytic_materials, model, pixels, ready, sphere, texels_of};
 use glam::{DVec3, UVec2, Vec3, Vec4};
 use rayon::prelude::*;
+use threadlight::Method;
 use threadlight::low_level::brdf::{Brdf, Custom, CustomBrdf};
 use threadlight::low_level::evaluate::reference::{ReferenceSettings, reference};
 use threadlight::low_level::evaluate::{Comparable, Display, compare};
@@ -90,13 +91,13 @@ fn the_shader_agrees_with_its_cpu_twin() {
     let (lamp, soft) = (write("lamp.exr", [90.0, 70.0, 50.0, 1.0]), write("soft.exr", [1.0; 4]));
     let builtin = |name: &str| Source::Builtin(name.to_owned());
     let cases = [
-        ("paper", builtin("studio"), 100, 2),
-        ("paper", builtin("sky"), 7, 3),
-        ("fitted", lamp.clone(), 4, 2),
-        ("fitted", soft.clone(), 4, 3),
-        ("gaussian", lamp, 4, 2),
-        ("gaussian", soft.clone(), 4, 3),
-        ("split_sum", soft.clone(), 1, 2),
+        (Method::Paper, builtin("studio"), 100, 2),
+        (Method::Paper, builtin("sky"), 7, 3),
+        (Method::Fitted, lamp.clone(), 4, 2),
+        (Method::Fitted, soft.clone(), 4, 3),
+        (Method::Gaussian, lamp, 4, 2),
+        (Method::Gaussian, soft.clone(), 4, 3),
+        (Method::SplitSum, soft.clone(), 1, 2),
     ];
     // Case by case, so that what is filtered of its environment is held from material to material.
     for (method, environment, threads, subpixels) in cases {
@@ -109,7 +110,7 @@ fn the_shader_agrees_with_its_cpu_twin() {
             let name = format!("{name}, {method}, {environment:?}");
             let mut scene = sphere(material.clone(), "white", threads, (80, 60));
             scene.environment.source = environment.clone();
-            scene.shading.method = method.to_owned();
+            scene.shading.method = method;
             scene.image.subpixels = subpixels;
             scene.image.background = threadlight::low_level::scene::Background::None;
             scene.environment.rotation_deg = 73.0;
@@ -124,8 +125,8 @@ fn the_shader_agrees_with_its_cpu_twin() {
             _held = Some(round.held());
             // SwiftShader: 0.015 in one pixel of the narrow lobe, 0.003 in 99 % of them. Fitted threads evaluate no BRDF.
             let most = match method {
-                "fitted" | "gaussian" if gpu.has_exact_lookups() => 1e-3,
-                "fitted" | "gaussian" => 0.01,
+                Method::Fitted | Method::Gaussian if gpu.has_exact_lookups() => 1e-3,
+                Method::Fitted | Method::Gaussian => 0.01,
                 _ if gpu.has_exact_functions() => 1e-3,
                 _ => 0.03,
             };
@@ -193,14 +194,14 @@ fn materials_that_need_different_shaders_are_shaded_as_their_cpu_twin_side_by_si
             ..object.clone()
         })
         .collect();
-    for method in ["fitted", "paper"] {
-        scene.shading.method = method.to_owned();
+    for method in [Method::Fitted, Method::Paper] {
+        scene.shading.method = method;
         let prepared = ready(&scene);
         let rendering = gpu.render(&prepared, EVERYTHING);
         let memo = Memo::default();
         let twin = shading::CpuShader::new(&prepared, &memo.round(&())).unwrap();
         let most = if gpu.has_exact_functions() { 2e-3 } else { 0.03 };
-        let (interior, edge) = compare_with_twin(&prepared, &rendering, &twin, most, method);
+        let (interior, edge) = compare_with_twin(&prepared, &rendering, &twin, most, method.name());
         assert!(interior > 300 && edge > 150, "{interior} interior and {edge} edge pixels are no test");
     }
     gpu.finish();
@@ -251,12 +252,15 @@ fn a_white_furnace_shows_the_albedo() {
     }
     let albedos: Vec<_> = materials.iter().map(|(_, material)| albedos(material)).collect();
     // Weights of fitted threads sum to the albedo, and it is linear between rows but for what rounds it off there: 1e-3.
-    for (method, threads, largest) in
-        [("paper", 100, 0.02), ("fitted", 4, 1e-3), ("gaussian", 4, 1e-3), ("split_sum", 1, 1e-3)]
-    {
+    for (method, threads, largest) in [
+        (Method::Paper, 100, 0.02),
+        (Method::Fitted, 4, 1e-3),
+        (Method::Gaussian, 4, 1e-3),
+        (Method::SplitSum, 1, 1e-3),
+    ] {
         for ((name, material), albedos) in materials.iter().zip(&albedos) {
             let mut scene = sphere(material.clone(), "white", threads, (160, 120));
-            scene.shading.method = method.to_owned();
+            scene.shading.method = method;
             scene.image.subpixels = 1;
             let (error, theta_o_deg) = furnace_error(&gpu, &scene, albedos);
             println!("{name}, {method}: at most {:.3} % from its albedo, at {theta_o_deg:.1} degrees", 100.0 * error);
@@ -278,7 +282,7 @@ fn the_split_sum_of_a_metal_is_its_albedos_times_light_weighted_by_ggx_and_by_th
     let material = model("model = 'conductor'\ndistribution = 'ggx'\nalpha = 0.3\neta = 1.0\nk = 100.0");
     let mut scene = sphere(material.clone(), "white", 1, (80, 60));
     scene.environment.source = Source::File(path);
-    scene.shading.method = "split_sum".to_owned();
+    scene.shading.method = Method::SplitSum;
     scene.image.subpixels = 1;
     scene.image.background = threadlight::low_level::scene::Background::None;
     let prepared = ready(&scene);
@@ -333,7 +337,7 @@ fn a_diffuse_material_has_one_lookup_a_surface_whatever_the_number_of_threads() 
     let gpu = Validated::new();
     for threads in [1, 16, 64] {
         let mut scene = sphere(model("model = 'lambert'\nreflectance = [0.8, 0.4, 0.1]"), "sky", threads, (80, 60));
-        scene.shading.method = "fitted".to_owned();
+        scene.shading.method = Method::Fitted;
         let rendering = gpu.render(&ready(&scene), EVERYTHING);
         let Counters { interior_pixels, covered_edge_subpixels, .. } = rendering.counters;
         assert!(interior_pixels > 0 && covered_edge_subpixels > 0);
@@ -426,8 +430,8 @@ fn a_sun_of_a_million_stays_finite() {
 fn a_planted_nan_is_counted() {
     let gpu = Validated::new();
     let mut scene = sphere(model("model = 'lambert'\nreflectance = [0.8, 0.5, 0.2]"), "sky", 4, (32, 24));
-    for method in ["paper", "uniform"] {
-        scene.shading.method = method.to_owned();
+    for method in [Method::Paper, Method::Uniform] {
+        scene.shading.method = method;
         let mut prepared = ready(&scene);
         let count = |prepared: &Prepared| {
             let radiance = gpu.render(prepared, EVERYTHING).radiance;
@@ -470,7 +474,7 @@ fn pictures_are_the_same_whether_or_not_geometry_is_drawn_where_no_object_is() {
     ] {
         for background in [Background::Environment, Background::None] {
             let mut scene = sphere(model("model = 'lambert'\nreflectance = 0.5"), "sky", 4, (75, 53));
-            scene.shading.method = "cosine".to_owned();
+            scene.shading.method = Method::Cosine;
             scene.image.background = background;
             (scene.objects[0].translate, scene.objects[0].scale) = (translate, scale);
             scene.objects[0].rotate_deg = Vec3::new(10.0, 20.0, 30.0);

@@ -3,6 +3,7 @@ mod common;
 
 use common::{EVERYTHING, Validated, model, pixels, ready, sphere, texels_of};
 use glam::{DVec3, Mat3, UVec2, Vec3, Vec4};
+use threadlight::Method;
 use threadlight::low_level::evaluate::{Comparable, Display, compare};
 use threadlight::low_level::geometry_texel::GeometryTexel;
 use threadlight::low_level::memo::Memo;
@@ -19,9 +20,9 @@ fn brushed(roughness: &str) -> MaterialSource {
 }
 
 /// A sphere of it, seen from above so that a pole is in sight, without a background.
-fn scene(material: MaterialSource, method: &str, threads: u32) -> Scene {
+fn scene(material: MaterialSource, method: Method, threads: u32) -> Scene {
     let mut scene = sphere(material, "studio", threads, (80, 60));
-    scene.shading.method = method.to_owned();
+    scene.shading.method = method;
     scene.image.background = Background::None;
     scene.camera = Some(Camera { eye: DVec3::new(1.0, 2.5, 3.0), target: DVec3::ZERO, up: DVec3::Y, fov_y_deg: 36.0 });
     scene
@@ -43,7 +44,7 @@ fn tangents_go_around_an_axis_or_along_it_on_the_turned_object() {
     let gpu = Validated::new();
     let axis = Vec3::new(0.2, 1.0, -0.3).normalize();
     for rule in [None, Some(TangentRule::Around(axis)), Some(TangentRule::Along(axis))] {
-        let mut scene = scene(brushed("alpha_x = 0.1; alpha_y = 0.4"), "uniform", 1);
+        let mut scene = scene(brushed("alpha_x = 0.1; alpha_y = 0.4"), Method::Uniform, 1);
         scene.objects[0].tangent = rule;
         scene.objects[0].rotate_deg = Vec3::new(20.0, 70.0, -10.0);
         scene.objects[0].scale = 0.7;
@@ -66,7 +67,7 @@ fn tangents_go_around_an_axis_or_along_it_on_the_turned_object() {
             assert!(away < most, "{rule:?} at {pixel}: {tangent:?}, not {}", expected.normalize());
         }
     }
-    let isotropic = ready(&scene(brushed("alpha = 0.2"), "uniform", 1));
+    let isotropic = ready(&scene(brushed("alpha = 0.2"), Method::Uniform, 1));
     let rendering = gpu.render(&isotropic, EVERYTHING);
     assert!(seen(&isotropic, &rendering).iter().all(|(_, texel, _)| texel.tangent.is_none()));
     gpu.finish();
@@ -77,7 +78,7 @@ fn a_rotated_material_is_the_same_one_on_a_turned_tangent() {
     let gpu = Validated::new();
     let of = |rotation_deg: f64, rule: TangentRule| {
         let mut scene =
-            scene(brushed(&format!("alpha_x = 0.05; alpha_y = 0.3; rotation_deg = {rotation_deg}")), "fitted", 1);
+            scene(brushed(&format!("alpha_x = 0.05; alpha_y = 0.3; rotation_deg = {rotation_deg}")), Method::Fitted, 1);
         scene.objects[0].tangent = Some(rule);
         scene.image.subpixels = 1;
         let prepared = ready(&scene);
@@ -113,11 +114,11 @@ fn the_shader_agrees_with_its_cpu_twin_on_long_lobes() {
     let cpu = Memo::default();
     let turned = "alpha_x = 0.05; alpha_y = 0.3; rotation_deg = 30";
     for (method, threads, roughness) in [
-        ("fitted", 8, "alpha_x = 0.05; alpha_y = 0.3"),
-        ("fitted", 1, turned),
-        ("paper", 16, turned),
-        ("importance", 8, turned),
-        ("filtered", 8, turned),
+        (Method::Fitted, 8, "alpha_x = 0.05; alpha_y = 0.3"),
+        (Method::Fitted, 1, turned),
+        (Method::Paper, 16, turned),
+        (Method::Importance, 8, turned),
+        (Method::Filtered, 8, turned),
     ] {
         let mut scene = scene(brushed(roughness), method, threads);
         scene.environment.source = Source::File(path.clone());
@@ -128,10 +129,10 @@ fn the_shader_agrees_with_its_cpu_twin_on_long_lobes() {
         let twin = CpuShader::new(&prepared, &cpu.round(&())).unwrap();
         const MOST: f32 = 2e-3;
         let outliers = match method {
-            "fitted" => 0,
-            "paper" if gpu.has_exact_functions() => 0,
+            Method::Fitted => 0,
+            Method::Paper if gpu.has_exact_functions() => 0,
             // An H200 has two pixels that are off by 0.22 %.
-            "paper" => 5,
+            Method::Paper => 5,
             // What the twin draws may fall on the other side of a step of a CDF.
             _ => 25,
         };
@@ -163,7 +164,7 @@ fn a_white_furnace_shows_the_albedo_of_every_azimuth() {
     for (roughness, most) in
         [("alpha_x = 0.1; alpha_y = 0.4", 4e-3), ("alpha_x = 0.8; alpha_y = 0.1; rotation_deg = 25", 0.025)]
     {
-        let mut scene = scene(brushed(roughness), "fitted", 4);
+        let mut scene = scene(brushed(roughness), Method::Fitted, 4);
         scene.environment.source = Source::Builtin("white".to_owned());
         scene.image.subpixels = 1;
         let prepared = ready(&scene);
@@ -205,7 +206,7 @@ fn turning_object_camera_and_light_together_changes_nothing() {
     let gpu = Validated::new();
     let material = brushed("alpha_x = 0.05; alpha_y = 0.3");
     let turn = |degrees: f64| {
-        let mut scene = scene(material.clone(), "fitted", 8);
+        let mut scene = scene(material.clone(), Method::Fitted, 8);
         let (sin, cos) = degrees.to_radians().sin_cos();
         let camera = scene.camera.as_mut().unwrap();
         camera.eye =
@@ -231,7 +232,7 @@ fn turning_object_camera_and_light_together_changes_nothing() {
 fn a_lobe_as_long_as_wide_is_a_round_one_and_one_that_is_hardly_long_looks_like_it() {
     let gpu = Validated::new();
     let picture = |roughness: &str| {
-        let mut scene = scene(brushed(roughness), "fitted", 16);
+        let mut scene = scene(brushed(roughness), Method::Fitted, 16);
         // Sub-pixels of an anisotropic material have more threads.
         scene.image.subpixels = 1;
         let prepared = ready(&scene);
@@ -251,13 +252,13 @@ fn sampling_has_the_reference_as_its_limit() {
     let gpu = Validated::new();
     let material = brushed("alpha_x = 0.1; alpha_y = 0.4; rotation_deg = 35");
     let truth = threadlight::low_level::evaluate::reference::reference(
-        &ready(&scene(material.clone(), "mis", 1)),
+        &ready(&scene(material.clone(), Method::Mis, 1)),
         &gpu.device,
         &Default::default(),
         &gpu.round(),
     );
     let truth = Rendering { radiance: truth.unwrap().radiance, ..Rendering::default() };
-    let mut prepared = ready(&scene(material, "mis", 1));
+    let mut prepared = ready(&scene(material, Method::Mis, 1));
     for (count, most) in [(64, 0.05), (4096, 0.006)] {
         prepared.sampling = Sampling { count, seed: 7, ..prepared.sampling };
         let error = rms(&gpu.render(&prepared, EVERYTHING), &truth);
@@ -269,7 +270,7 @@ fn sampling_has_the_reference_as_its_limit() {
 #[test]
 fn a_pole_of_tangents_is_finite_and_no_tangent_is_ever_missing() {
     let gpu = Validated::new();
-    let mut scene = scene(brushed("alpha_x = 0.02; alpha_y = 0.5"), "fitted", 4);
+    let mut scene = scene(brushed("alpha_x = 0.02; alpha_y = 0.5"), Method::Fitted, 4);
     // Straight down on the pole, where tangents around the axis have no direction.
     scene.camera = Some(Camera { eye: 4.0 * DVec3::Y, target: DVec3::ZERO, up: DVec3::Z, fov_y_deg: 2.0 });
     for rule in [TangentRule::Around(Vec3::Y), TangentRule::Along(Vec3::Y)] {
@@ -312,7 +313,7 @@ fn tangents_of_texture_coordinates_are_those_of_the_mesh_and_only_where_a_materi
     let path = folder.path().join("globe.obj");
     let globe_of = |textured: bool, roughness: &str| {
         std::fs::write(&path, globe(textured)).unwrap();
-        let mut scene = scene(brushed(roughness), "uniform", 1);
+        let mut scene = scene(brushed(roughness), Method::Uniform, 1);
         scene.objects[0].mesh = Source::File(path.clone());
         scene.objects[0].tangent = Some(TangentRule::Uv);
         scene.objects[0].rotate_deg = Vec3::new(20.0, 70.0, -10.0);

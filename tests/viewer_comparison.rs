@@ -2,6 +2,7 @@
 #![cfg(feature = "viewer")]
 mod common;
 use common::{Validated, ready, sphere};
+use threadlight::Method;
 use threadlight::low_level::scene::{MaterialSource, ShadingSettings};
 use threadlight::low_level::viewer::comparison::{Compared, Other, compare_with};
 
@@ -9,7 +10,7 @@ use threadlight::low_level::viewer::comparison::{Compared, Other, compare_with};
 fn a_picture_is_compared_with_another_method_with_itself_and_with_the_reference() {
     let gpu = Validated::new();
     let mut scene = sphere(MaterialSource::Builtin("gold".into()), "studio", 16, (96, 72));
-    scene.shading.method = "paper".into();
+    scene.shading.method = Method::Paper;
     let prepared = ready(&scene);
     let compared = |other: Other| {
         let mut all: Vec<Compared> = Vec::new();
@@ -23,7 +24,7 @@ fn a_picture_is_compared_with_another_method_with_itself_and_with_the_reference(
     assert_eq!((metrics.rms, itself.part, itself.error_estimate, itself.size), (0.0, 1.0, None, [96, 72]));
     assert_eq!((itself.display.len(), itself.heat_map.len()), (4 * 96 * 72, 4 * 96 * 72));
 
-    let fitted = ShadingSettings { method: "fitted".into(), threads: Some(16), ..ShadingSettings::default() };
+    let fitted = ShadingSettings { method: Method::Fitted, threads: Some(16), ..ShadingSettings::default() };
     let fitted = compared(Other::Shading(fitted)).remove(0);
     assert_eq!(fitted.name, "fitted, 16");
     let between = fitted.metrics.unwrap();

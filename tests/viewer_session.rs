@@ -5,6 +5,7 @@ mod common;
 use common::{Validated, sphere};
 use glam::DVec3;
 use std::time::{Duration, Instant};
+use threadlight::Method;
 use threadlight::low_level::memo::Memo;
 use threadlight::low_level::prepare::{Prepared, PreparedMaterial};
 use threadlight::low_level::scene::{MaterialSettings, MaterialSource, ObjectSettings, Scene, ShadingSettings, Source};
@@ -238,7 +239,7 @@ fn lines_and_keys_that_there_are_not_are_told_and_change_nothing() {
 /// A scene of which no drafts are made.
 fn quick() -> Scene {
     let mut scene = sphere(MaterialSource::Builtin("clay".into()), "white", 2, (32, 24));
-    scene.shading.method = "cosine".into();
+    scene.shading.method = Method::Cosine;
     scene
 }
 

@@ -101,7 +101,7 @@ impl Render {
         output::check_all_writable(self.output.iter().chain(&self.stats))?;
         let scene = self.scene.scene()?;
         output::check_not_read(self.output.iter().chain(&self.stats), &self.scene.files(&scene))?;
-        let method = Method::from_name(&scene.shading.method)?;
+        let method = scene.shading.method;
         let is_reference = method == Method::Reference;
         let useless = [
             ("--tolerance", self.tolerance.is_some() && !is_reference),

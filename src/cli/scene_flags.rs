@@ -24,7 +24,7 @@ pub struct SceneFlags {
     pub environment: Option<String>,
     /// Shading method.
     #[arg(long, value_name = "NAME", value_parser = methods())]
-    pub method: Option<String>,
+    pub method: Option<Method>,
     #[arg(long, help = nameable::counts(), value_name = "N", value_parser = value_parser!(u32).range(1..=i64::from(MAX_SAMPLES)))]
     pub threads: Option<u32>,
     /// Where methods filtered and importance draw samples: at random numbers of each pixel's own (noise), or at one fixed set (bias).
@@ -87,9 +87,6 @@ impl SceneFlags {
             Some(path) => Scene::load(path)?,
             None => Scene::default(),
         };
-        if let (Some(path), None) = (&self.scene, &self.method) {
-            Method::from_name(&scene.shading.method).map_err(|error| error.within(path.display()))?;
-        }
         if let Some(material) = &self.material {
             scene.use_material(material, MaterialSource::named(material));
         }
@@ -138,11 +135,12 @@ pub fn parse_size(text: &str) -> Result<(u32, u32), String> {
 }
 
 /// The name of a method; an older one is read too.
-fn methods() -> PossibleValuesParser {
-    PossibleValuesParser::new(Method::ALL.iter().map(|method| {
+fn methods() -> impl TypedValueParser<Value = Method> {
+    let names = Method::ALL.iter().map(|method| {
         let value = PossibleValue::new(method.name()).help(method.summary());
         method.older_name().into_iter().fold(value, PossibleValue::alias)
-    }))
+    });
+    PossibleValuesParser::new(names).try_map(|name| Method::from_name(&name))
 }
 
 /// `per-pixel` or `fixed`.

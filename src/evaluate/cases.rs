@@ -223,7 +223,7 @@ impl Cases {
         scene.objects.iter_mut().for_each(|object| object.material = "placeholder".to_owned());
         scene.environment.source = Source::Builtin("white".to_owned());
         scene.image.background = Background::None;
-        scene.shading.method = Method::Uniform.name().to_owned();
+        scene.shading.method = Method::Uniform;
         prepare(&scene, round)
     }
 }

@@ -7,7 +7,6 @@ use super::metrics::{Comparable, Differences, Display};
 use super::reference::{Integrator, TOLERANCE};
 use crate::error::{Error, Result};
 use crate::memo::Round;
-use crate::method::Method;
 use crate::pipeline::{DeviceScene, Wanted, render_geometry};
 use crate::prepare::{Prepared, check_count, prepare};
 use crate::scene::{MAX_SAMPLES, Scene};
@@ -75,7 +74,7 @@ fn spread(all: &[usize], count: usize) -> Vec<usize> {
 /// # Errors
 /// As for [`prepare`]; whatever Vulkan refuses; as many as there can be are not enough.
 pub fn prepare_within(scene: &Scene, most: f64, device: &Arc<Device>, round: &Round) -> Result<(Prepared, f64)> {
-    let method = Method::from_name(&scene.shading.method)?;
+    let method = scene.shading.method;
     let mut scene = scene.clone();
     let subpixels = scene.image.subpixels;
     let mut sample = None;

@@ -70,10 +70,10 @@ pub fn run(
 ) -> Result<()> {
     let image = &drag.scene.image;
     check_size(image.width as usize, image.height as usize)?;
-    let method = &drag.scene.shading.method;
-    if Method::from_name(method)? != Method::Fitted {
+    let method = drag.scene.shading.method;
+    if method != Method::Fitted {
         let remedy = format!("use method {}", Method::Fitted.name());
-        return Err(Error::input(format!("method \"{method}\""), "has no drafts", remedy));
+        return Err(Error::input(format!("method \"{}\"", method.name()), "has no drafts", remedy));
     }
     let values = &drag.values;
     let total = 3 * values.len() - 2;

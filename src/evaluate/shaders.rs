@@ -76,7 +76,7 @@ pub fn run(
     add(compute(&compiled::BARE_LOOKUPS, "any", Vec::new())?)?;
     for (index, &method) in methods.iter().enumerate() {
         let mut scene = scene.clone();
-        scene.shading.method = method.name().to_owned();
+        scene.shading.method = method;
         let most = method.max_count(scene.image.subpixels);
         scene.shading.threads = scene.shading.threads.map(|count| count.min(most));
         let round = memo.round(observer);

@@ -1,7 +1,7 @@
 //! Scene files: all keys are read, written and checked.
 use glam::{DVec3, Vec3};
 
-use super::super::{Background, Pattern};
+use super::super::{Background, Method, Pattern};
 use super::*;
 
 const FULL: &str = r#"
@@ -83,7 +83,7 @@ fn every_key_is_read_and_paths_start_at_the_file() {
     assert_eq!(scene.environment, expected);
     assert_eq!(
         scene.shading,
-        ShadingSettings { method: "paper".into(), threads: Some(64), seed: 7, pattern: Pattern::Fixed }
+        ShadingSettings { method: Method::Paper, threads: Some(64), seed: 7, pattern: Pattern::Fixed }
     );
     assert_eq!(scene.materials[0].source, MaterialSource::File("/base/x.binary".into()));
     let MaterialSource::Model { model, parameters } = &scene.materials[1].source else { panic!("not a model") };

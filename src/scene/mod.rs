@@ -13,6 +13,7 @@ pub mod camera;
 mod drawing_order;
 mod file;
 pub mod mesh;
+mod method;
 mod parameter;
 mod pattern;
 mod polygon;
@@ -21,6 +22,7 @@ mod texture_tangents;
 
 pub use camera::Camera;
 pub use mesh::Mesh;
+pub use method::Method;
 pub use obj_file::TexturedMesh;
 pub use pattern::Pattern;
 pub use tangent_rule::TangentRule;
@@ -40,7 +42,7 @@ pub const DEFAULT_MATERIAL: &str = "gold";
 /// The built-in environment of a scene that names none.
 pub const DEFAULT_ENVIRONMENT: &str = "studio";
 /// The shading method of a scene that names none.
-pub const DEFAULT_METHOD: &str = "fitted";
+pub const DEFAULT_METHOD: Method = Method::Fitted;
 
 /// Most columns and most rows of an image.
 pub const MAX_SIZE_PX: u32 = 16384;
@@ -164,8 +166,8 @@ pub struct EnvironmentSettings {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct ShadingSettings {
-    /// Name of the estimator.
-    pub method: String,
+    /// By which estimator.
+    pub method: Method,
     /// Threads, or samples of methods that have none, 1 to [`MAX_SAMPLES`]; without it, as many as suit the method.
     #[serde(deserialize_with = "file::threads", skip_serializing_if = "Option::is_none")]
     pub threads: Option<u32>,
@@ -317,7 +319,7 @@ impl Default for EnvironmentSettings {
 
 impl Default for ShadingSettings {
     fn default() -> Self {
-        Self { method: DEFAULT_METHOD.into(), threads: None, pattern: Pattern::default(), seed: 0 }
+        Self { method: DEFAULT_METHOD, threads: None, pattern: Pattern::default(), seed: 0 }
     }
 }
 

@@ -1,6 +1,6 @@
-// The table of shading methods: an entry each, `name => Variant: properties`. A method `name` is glsl/methods/name.glsl, its twin
-// src/shading/name.rs and its entry here. Included by src/method.rs (enum and properties) and by src/shading/mod.rs (modules and
-// dispatch); each defines `methods!` first. (Hence no inner doc comment at the top.)
+// The table of shading methods: an entry each, `name => Variant: properties`, or `name | older_name`, by which older scene files and scripts call
+// it. A method `name` is glsl/methods/name.glsl, its twin src/shading/name.rs and its entry here. Included by src/scene/method.rs (names),
+// src/method.rs (properties) and src/shading/mod.rs (modules and dispatch); each defines `methods!` first. (Hence no inner doc comment at the top.)
 methods! {
     fitted => Fitted: Properties {
         threads: Some(ThreadKind::Fitted),
@@ -31,12 +31,6 @@ methods! {
         ..Properties::new("As importance, with filtered lookups (Colbert and Krivanek 2007); biased.", BOX_FILTERED.and_slices())
     },
     environment => Environment: Properties::new("Monte Carlo by the environment's light (Agarwal et al. 2003).", MAP_BY_LIGHT),
-    ris => Ris: Properties {
-        older_name: Some("resampled"),
-        ..Properties::new("Resampled importance sampling of the whole product (Talbot et al. 2005).", MAP_BY_LIGHT.and_slices())
-    },
-    mis => Mis: Properties {
-        older_name: Some("combined"),
-        ..Properties::new("Multiple importance sampling of lobe and light (Veach and Guibas 1995) at Sobol's points: the reference's form on the GPU.", MAP_BY_LIGHT.and_slices())
-    },
+    ris | resampled => Ris: Properties::new("Resampled importance sampling of the whole product (Talbot et al. 2005).", MAP_BY_LIGHT.and_slices()),
+    mis | combined => Mis: Properties::new("Multiple importance sampling of lobe and light (Veach and Guibas 1995) at Sobol's points: the reference's form on the GPU.", MAP_BY_LIGHT.and_slices()),
 }

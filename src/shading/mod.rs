@@ -26,7 +26,7 @@ pub(crate) mod random;
 
 /// Makes the modules and the dispatch from the table in methods.rs.
 macro_rules! methods {
-    ($($name:ident => $Method:ident: $properties:expr,)+) => {
+    ($($name:ident $(| $older:ident)? => $Method:ident: $properties:expr,)+) => {
         $(mod $name;)+
 
         /// The estimate of `method` for `point`.

@@ -6,7 +6,7 @@ use crate::method::Method;
 use crate::prepare::check_count;
 use crate::scene::{
     Background, Camera, EXPOSURE, GAMMA, INTENSITY, MAX_SAMPLES, MAX_SIZE_PX, MAX_SUBPIXELS, MaterialSource, Pattern,
-    Scene, Source,
+    Scene, ShadingSettings, Source,
 };
 use std::fmt::Debug;
 use std::ops::RangeInclusive;
@@ -44,7 +44,7 @@ pub enum Change {
     /// The mesh in place of all objects.
     Mesh(Source),
     /// Name of the shading method. The number of threads becomes what suits it.
-    Method(String),
+    Method(Method),
     /// Number of threads or samples; none for as many as suit the method.
     Threads(Option<u32>),
     /// Where methods that can choose draw their samples.
@@ -126,10 +126,7 @@ impl Change {
             }
             Self::Intensity(factor) => environment.intensity = within("intensity", *factor, &INTENSITY)?,
             Self::Mesh(source) => changed.use_mesh(source.clone()),
-            Self::Method(name) => {
-                Method::from_name(name)?;
-                (shading.method, shading.threads) = (name.clone(), None);
-            }
+            Self::Method(method) => (shading.method, shading.threads) = (*method, None),
             Self::Threads(count) => {
                 count.map(|count| within("threads", count, &(1..=MAX_SAMPLES))).transpose()?;
                 shading.threads = *count;
@@ -151,10 +148,8 @@ impl Change {
                 changed.camera = *camera;
             }
         }
-        let (method, count) = sampling(&changed);
-        if let Some(method) = method {
-            check_count(method, count, changed.image.subpixels)?;
-        }
+        let ShadingSettings { method, threads, .. } = changed.shading;
+        check_count(method, threads.unwrap_or(method.default_count()), changed.image.subpixels)?;
         *scene = changed;
         Ok(())
     }
@@ -178,13 +173,6 @@ pub(super) fn within<T: PartialOrd + Debug + Copy>(name: &str, value: T, range: 
     // Debug's form of large and small numbers has an exponent.
     let remedy = format!("use a value from {:?} to {:?}", range.start(), range.end());
     Err(Error::input(name, format!("{value:?} is out of range"), remedy))
-}
-
-/// The method of `scene`, if there is one of that name, and its number of threads.
-fn sampling(scene: &Scene) -> (Option<Method>, u32) {
-    let method = Method::from_name(&scene.shading.method).ok();
-    let default_count = method.map_or(0, Method::default_count);
-    (method, scene.shading.threads.unwrap_or(default_count))
 }
 
 #[cfg(test)]
@@ -229,7 +217,6 @@ mod tests {
             (Change::Subpixels(5), "subpixels"),
             (Change::Threads(Some(0)), "threads"),
             (Change::Threads(Some(129)), "threads"),
-            (Change::Method("magic".into()), "magic"),
             (Change::Camera(Some(Camera { fov_y_deg: 0.0, ..Camera::framing(glam::DVec3::ZERO, 1.0, 1.0) })), "fov"),
         ] {
             let mut scene = Scene::default();
@@ -258,9 +245,9 @@ mod tests {
     #[test]
     fn another_method_has_as_many_threads_as_suit_it() {
         let mut scene = Scene::default();
-        Change::Method("paper".into()).apply(&mut scene).unwrap();
+        Change::Method(Method::Paper).apply(&mut scene).unwrap();
         Change::Threads(Some(1000)).apply(&mut scene).unwrap();
-        Change::Method("fitted".into()).apply(&mut scene).unwrap();
+        Change::Method(Method::Fitted).apply(&mut scene).unwrap();
         assert_eq!(scene.shading.threads, None);
     }
 }

@@ -14,7 +14,6 @@ use super::orbit::{Bounds, Orbit, environment_turn_deg};
 use super::plots::Plotter;
 use super::session::{Edit, Session};
 use crate::memo::{Key, Memo};
-use crate::method::Method;
 use crate::passes::Area;
 use crate::pipeline::DeviceScene;
 use crate::prepare::{Prepared, view_of};
@@ -247,7 +246,7 @@ impl Viewer {
             "-" => self.change(&Change::Exposure(image.exposure * 0.5f64.powf(1.0 / 3.0))),
             "0" => self.change(&Change::Exposure(1.0)),
             "[" | "]" => {
-                let method = Method::from_name(&shading.method)?;
+                let method = shading.method;
                 let count = shading.threads.unwrap_or(method.default_count());
                 let count = if key == "[" { count / 2 } else { count.saturating_mul(2) };
                 let count = count.clamp(1, most_count(method, self.session.wanted()));

@@ -2,7 +2,7 @@
 use super::*;
 use crate::graph::{Kept, MemoryRequirement, Plan, ResourceInfo, ResourceKind, Work};
 use crate::prepare::prepare;
-use crate::scene::Scene;
+use crate::scene::{Method, Scene};
 use crate::vulkan::Instance;
 
 /// Memory as a plain device would ask for it, so that plans are the same on all: 16 bytes a texel, multiples of 64 KiB.
@@ -28,7 +28,7 @@ impl Stage {
         let device = Device::new(&instance, asked.as_deref()).expect("a device");
         let mut scene = Scene::default();
         (scene.image.width, scene.image.height) = (640, 480);
-        scene.shading.method = "cosine".to_owned();
+        scene.shading.method = Method::Cosine;
         let memo = crate::memo::Memo::default();
         let round = memo.round(&());
         let prepared = prepare(&scene, &round).expect("a scene that can be prepared");

@@ -133,7 +133,7 @@ impl Edit {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{Background, MaterialSource, Source};
+    use crate::scene::{Background, MaterialSource, Method, Source};
 
     fn material(name: &str) -> Change {
         Change::Material(MaterialSource::Builtin(name.into()))
@@ -190,8 +190,8 @@ mod tests {
         session.change(&Change::Environment(Source::Builtin("sky".into())), 2).unwrap();
         let mut expected = session.wanted().clone();
         session.change(&Change::Mesh(Source::File("broken.obj".into())), 3).unwrap();
-        session.change(&Change::Method("paper".into()), 4).unwrap();
-        expected.shading.method = "paper".into();
+        session.change(&Change::Method(Method::Paper), 4).unwrap();
+        expected.shading.method = Method::Paper;
         assert_eq!(session.failed(is_broken), [3]);
         assert_eq!(session.wanted(), &expected);
         // Nor those before another scene, which is broken.

@@ -183,12 +183,12 @@ mod tests {
     use super::*;
     use crate::evaluate::reference::MAX_THETA_O_DEG;
     use crate::prepare::prepare;
-    use crate::scene::{Scene, Source};
+    use crate::scene::{Method, Scene, Source};
 
     /// The built-in sphere, with few threads.
-    fn sphere(method: &str) -> Prepared {
+    fn sphere(method: Method) -> Prepared {
         let mut scene = Scene::default();
-        scene.shading.method = method.into();
+        scene.shading.method = method;
         scene.shading.threads = Some(4);
         scene.environment.source = Source::Builtin("white".into());
         scene.environment.rotation_deg = 90.0;
@@ -197,7 +197,7 @@ mod tests {
 
     #[test]
     fn the_surface_under_the_cursor_is_that_of_the_sphere() {
-        let prepared = sphere("uniform");
+        let prepared = sphere(Method::Uniform);
         assert!((MAX_THETA_O_RAD.to_degrees() - MAX_THETA_O_DEG).abs() < 1e-9);
         assert_eq!(Surface::under(&prepared, &prepared.view, 1.0, 1.0), None);
         // In the middle the normal points at the eye.
@@ -223,7 +223,7 @@ mod tests {
 
     #[test]
     fn samples_are_those_that_shading_uses_and_share_all_of_the_light() {
-        for method in ["fitted", "paper"] {
+        for method in [Method::Fitted, Method::Paper] {
             let prepared = sphere(method);
             let threads = &prepared.materials[0].threads.as_ref().unwrap();
             for row in [0, 30, 89] {
@@ -248,7 +248,7 @@ mod tests {
 
     #[test]
     fn insets_draw_without_a_window() {
-        let prepared = sphere("fitted");
+        let prepared = sphere(Method::Fitted);
         let threads = &prepared.materials[0].threads.as_ref().unwrap();
         let surface = Surface::under(&prepared, &prepared.view, 400.0, 240.0);
         let shapes = |surface: Option<&Surface>| {

@@ -10,7 +10,7 @@ use std::fs;
 use std::path::Path;
 use tempfile::TempDir;
 use threadlight::low_level::output::{PictureFile, read_image};
-use threadlight::low_level::scene::{ImageSettings, MaterialSource, Pattern, Scene, ShadingSettings, Source};
+use threadlight::low_level::scene::{ImageSettings, MaterialSource, Method, Pattern, Scene, ShadingSettings, Source};
 
 /// What makes a render quick: few pixels, few threads, and an environment that takes no time.
 const SMALL: &str = "--size 96x72 --threads 8 --environment map.hdr";

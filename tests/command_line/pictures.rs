@@ -226,7 +226,7 @@ fn a_saved_scene_renders_to_the_same_bits() {
     scene.environment.source = Source::File(folder.path().join("map.hdr"));
     scene.environment.rotation_deg = 33.3;
     scene.image = ImageSettings { width: 96, height: 72, subpixels: 3, exposure: 0.7, gamma: 1.9, ..scene.image };
-    scene.shading = ShadingSettings { method: "filtered".into(), threads: Some(8), pattern: Pattern::Fixed, seed: 5 };
+    scene.shading = ShadingSettings { method: Method::Filtered, threads: Some(8), pattern: Pattern::Fixed, seed: 5 };
     let two_spheres = Scene::load(&folder.path().join("scene/scene.toml")).unwrap();
     printed(&mut render(&folder, "scene/scene.toml -o two.exr"));
     fs::create_dir(folder.path().join("elsewhere")).unwrap();

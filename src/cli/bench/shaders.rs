@@ -50,7 +50,7 @@ impl BenchShaders {
         let scene = self.scene.scene()?;
         self.json.check(&self.scene.files(&scene))?;
         let methods = match &self.scene.method {
-            Some(name) => vec![Method::from_name(name)?],
+            Some(method) => vec![*method],
             None => Method::ALL.iter().copied().filter(|method| method.runs_on_gpu()).collect(),
         };
         let instance = Instance::new(false).map_err(Error::from)?;

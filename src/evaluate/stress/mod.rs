@@ -139,7 +139,7 @@ fn stress(
     held: &mut Held,
 ) -> Result<Option<Stressed>> {
     let mut scene = case.scene.clone();
-    scene.shading.method = method.name().to_owned();
+    scene.shading.method = method;
     let most = method.max_count(scene.image.subpixels);
     scene.shading.threads = scene.shading.threads.map(|count| count.min(most));
     let round = memo.round(&());

@@ -138,18 +138,18 @@ fn choose(ui: &mut Ui, other: Option<&Other>, scene: &Scene, inputs: &mut Vec<In
     let name = match other {
         None => "nothing",
         Some(Other::Reference) => Method::Reference.name(),
-        Some(Other::Shading(shading)) => &shading.method,
+        Some(Other::Shading(shading)) => shading.method.name(),
     };
     let list = ComboBox::from_id_salt("compared with").selected_text(name).show_ui(ui, |ui| {
         if ui.selectable_label(other.is_none(), "nothing").clicked() {
             inputs.push(Input::Compare(None));
         }
-        for method in Method::ALL {
+        for &method in Method::ALL {
             if ui.selectable_label(method.name() == name, method.name()).clicked() {
                 inputs.push(Input::Compare(Some(match method {
                     Method::Reference => Other::Reference,
                     _ => Other::Shading(ShadingSettings {
-                        method: method.name().into(),
+                        method,
                         seed: scene.shading.seed,
                         ..ShadingSettings::default()
                     }),
@@ -158,9 +158,8 @@ fn choose(ui: &mut Ui, other: Option<&Other>, scene: &Scene, inputs: &mut Vec<In
         }
     });
     list.response.on_hover_text("What is right of the line: the same view by another method or number of threads, or the reference, which goes on while the picture stands still.");
-    if let Some(Other::Shading(shading)) = other
-        && let Ok(method) = Method::from_name(&shading.method)
-    {
+    if let Some(Other::Shading(shading)) = other {
+        let method = shading.method;
         let most = most_count(method, scene);
         let mut count = shading.threads.unwrap_or(method.default_count());
         if most == 1 {

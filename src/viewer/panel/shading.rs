@@ -20,16 +20,16 @@ pub fn what_is_counted(method: Method) -> &'static str {
 
 pub fn show(ui: &mut Ui, viewer: &Viewer, inputs: &mut Vec<Input>) {
     let scene = viewer.session.wanted();
-    let Ok(method) = Method::from_name(&scene.shading.method) else { return };
+    let method = scene.shading.method;
     group(ui, "Shading", |ui| {
         egui::ComboBox::from_id_salt("method")
             .selected_text(method.name())
             .width(160.0)
             .show_ui(ui, |ui| {
-                for other in Method::ALL.iter().filter(|method| method.runs_on_gpu()) {
-                    let label = ui.selectable_label(*other == method, other.name()).on_hover_text(other.summary());
-                    if label.clicked() && *other != method {
-                        inputs.push(Input::Set(Change::Method(other.name().to_owned())));
+                for &other in Method::ALL.iter().filter(|method| method.runs_on_gpu()) {
+                    let label = ui.selectable_label(other == method, other.name()).on_hover_text(other.summary());
+                    if label.clicked() && other != method {
+                        inputs.push(Input::Set(Change::Method(other)));
                     }
                 }
             })
