@@ -4,5 +4,7 @@ const float LARGEST_RADIANCE = 3.40282347e38; // of single precision
 
 // Radiance that is finite; what is no number stays so. Twin: bounded in src/shading/mod.rs.
 vec3 bounded(vec3 radiance) {
-    return mix(radiance, vec3(LARGEST_RADIANCE), greaterThan(radiance, vec3(LARGEST_RADIANCE)));
+    // By its bits: compilers may take it that no number is infinite, and leave a comparison out.
+    const uint INFINITE = 0x7F800000;
+    return mix(radiance, vec3(LARGEST_RADIANCE), equal(floatBitsToUint(radiance), uvec3(INFINITE)));
 }

@@ -5,7 +5,7 @@ use super::input::Input;
 use super::interaction::Viewer;
 use super::latency::{Answer, Latency, Record, Stats};
 use super::loaded::Loaded;
-use super::presenter::{Drawn, Extras, Presenter, ShownPicture};
+use super::presenter::{Drawn, Extras, Presenter, SHADE, ShownPicture};
 use crate::output::{self, Format};
 use crate::passes::{Area, View};
 use crate::pipeline::{Wanted, check_size};
@@ -138,6 +138,7 @@ impl Viewer {
             renderer: &loaded.renderer,
             view,
             area: self.area,
+            is_compiled: self.is_compiled,
         });
         let change = loaded.as_ref().map_or(0, |loaded| loaded.change);
         let is_awaited = loaded.is_some() && self.latency.is_awaited(change, is_draft);
@@ -163,11 +164,10 @@ impl Viewer {
 
     /// Notes what is known of a frame whose picture has this `size`, which took `time` in all.
     fn note(&mut self, drawn: &Drawn, size: [u32; 2], time: Duration) {
-        // Drivers may compile a shader where it first runs.
-        if drawn.ran.iter().any(|pass| pass == "shade") && std::mem::replace(&mut self.is_compiled, true) {
+        self.is_compiled |= drawn.ran.iter().any(|pass| pass == SHADE);
+        if let Some(cost) = drawn.cost {
             let full = &self.session.shown().image;
-            let of_picture = drawn.picture_time().unwrap_or(time);
-            self.dynamic_resolution.drawn(size, [full.width, full.height], of_picture);
+            self.dynamic_resolution.drawn(cost.size, [full.width, full.height], cost.time);
         }
         tracing::debug!("{} x {} in {:.1} ms", size[0], size[1], time.as_secs_f64() * 1e3);
         self.measured.frames += 1;

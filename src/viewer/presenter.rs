@@ -8,11 +8,15 @@ use crate::vulkan::{
 };
 use crate::{Error, Result};
 use egui::TexturesDelta;
+use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Duration;
 
 /// Frames in flight.
 const FRAMES: usize = 2;
+
+/// The pass by which a picture is known to be made anew.
+pub const SHADE: &str = "shade";
 
 /// What a frame shows.
 #[derive(Clone, Copy)]
@@ -23,6 +27,8 @@ pub struct ShownPicture<'a> {
     pub view: &'a View,
     /// Where it is in the window.
     pub area: Area,
+    /// Whether its shaders have run before: drivers may compile one where it first runs, so the time of such a frame tells nothing.
+    pub is_compiled: bool,
 }
 
 /// What became of a frame.
@@ -35,17 +41,29 @@ pub struct Drawn {
     pub counted: Option<(Counters, u64)>,
     /// What the window shows, if that was asked for: RGBA, 8 bits each, and its size.
     pub screenshot: Option<(Vec<u8>, [u32; 2])>,
+    /// What a picture took, without what a window of that size always takes: of an earlier frame, as `passes`. None if that shaded none.
+    pub cost: Option<PictureCost>,
     /// What there was too little memory for, if the picture is missing: it is to be drawn with fewer pixels.
     pub lack: Option<Error>,
 }
 
-impl Drawn {
-    /// What the picture took, without what a window of that size always takes; none if it is not known of this frame.
-    pub fn picture_time(&self) -> Option<Duration> {
+/// What a picture took that was shaded.
+#[derive(Clone, Copy, Debug)]
+pub struct PictureCost {
+    /// Columns and rows.
+    pub size: [u32; 2],
+    /// In which all of it was made.
+    pub time: Duration,
+}
+
+impl PictureCost {
+    /// That of a picture of this size in a frame of these passes; none where the device cannot tell.
+    fn of(size: [u32; 2], passes: &[PassTime]) -> Option<Self> {
         let is_of_window = |pass: &&PassTime| ["clear_window", "present", "ui"].contains(&pass.name.as_str());
-        let ms: f64 =
-            self.passes.iter().filter(|pass| !is_of_window(pass) && !pass.is_readback()).map(|pass| pass.gpu_ms).sum();
-        self.passes.iter().any(|pass| pass.name == "shade").then(|| Duration::from_secs_f64(ms * 1e-3))
+        let of_picture = passes.iter().filter(|pass| !is_of_window(pass) && !pass.is_readback());
+        let ms: f64 = of_picture.map(|pass| pass.gpu_ms).sum();
+        let shades = passes.iter().any(|pass| pass.name == SHADE);
+        shades.then(|| Self { size, time: Duration::from_secs_f64(ms * 1e-3) })
     }
 }
 
@@ -142,6 +160,8 @@ pub struct Presenter {
     store: Store,
     painter: UiPainter,
     frames: Frames,
+    /// Of each frame in flight, the size of its picture if what that takes tells of others.
+    sizes: VecDeque<Option<[u32; 2]>>,
     swapchain: Swapchain,
     device: Arc<Device>,
 }
@@ -157,6 +177,7 @@ impl Presenter {
             store: Store::default(),
             painter: UiPainter::new(device, swapchain.format(), FRAMES)?,
             frames: Frames::new(device, "window", FRAMES)?,
+            sizes: VecDeque::new(),
             swapchain,
             device: device.clone(),
         })
@@ -200,22 +221,24 @@ impl Presenter {
             ready = make_ready(&mut self.store, picture);
         }
         let ReadyFrame { executable, counts, screenshot } = ready?;
-        let passes = match self.device.times_passes() {
+        let ran: Vec<_> = executable.plan.passes.iter().map(|pass| pass.name.clone()).collect();
+        let shades = ran.iter().any(|pass| pass == SHADE);
+        let told = picture.filter(|picture| shades && picture.is_compiled);
+        let size = told.map(|picture| [picture.view.width, picture.view.height]);
+        let (passes, size) = match self.device.times_passes() {
             true => {
                 let passes = self.frames.oldest_pass_times()?;
                 executable.execute_between(&mut self.frames, turn.semaphores)?;
-                passes
+                self.sizes.push_back(size);
+                (passes, if self.sizes.len() > FRAMES { self.sizes.pop_front().flatten() } else { None })
             }
-            false => executable.execute_pass_by_pass(&mut self.frames, turn.semaphores)?,
+            false => (executable.execute_pass_by_pass(&mut self.frames, turn.semaphores)?, size),
         };
+        let cost = size.and_then(|size| PictureCost::of(size, &passes));
         if counts.is_some() || screenshot.is_some() || extras.completion {
             self.frames.wait()?;
         }
-        let ran = executable.plan.passes.iter().map(|pass| pass.name.clone()).collect();
-        tracing::debug!(
-            "frame: {}",
-            executable.plan.passes.iter().map(|pass| pass.name.as_str()).collect::<Vec<_>>().join(" ")
-        );
+        tracing::debug!("frame: {}", ran.join(" "));
         drop(executable);
         if self.swapchain.present(turn)? == Presented::Again && screenshot.is_none() {
             return Ok(None);
@@ -233,7 +256,7 @@ impl Presenter {
             };
             (texels(Some(&image)).into_iter().flat_map(opaque).collect(), [width, height])
         });
-        Ok(Some(Drawn { passes, ran, counted, screenshot, lack }))
+        Ok(Some(Drawn { passes, ran, counted, screenshot, cost, lack }))
     }
 }
 

@@ -43,7 +43,7 @@ impl Stage {
     fn plan<'a>(&'a self, renderer: &'a DeviceScene, view: &'a View, kept: Option<&Kept>) -> Plan<Work<'a>> {
         let mut graph = FrameGraph::new();
         let area = Area { left: 0, top: 0, width: view.width, height: view.height };
-        let picture = ShownPicture { renderer, view, area };
+        let picture = ShownPicture { renderer, view, area, is_compiled: true };
         declare_window(&mut graph, Some(&picture), &self.painter, &self.panel, [940, 480]);
         match kept {
             Some(kept) => graph.compile_keeping(kept, &mut memory),

@@ -79,6 +79,7 @@ fn a_lost_surface_is_made_anew() {
         ("vkQueuePresentKHR", 7, 0),
         ("vkQueuePresentKHR", 7, 1),
         ("vkGetPhysicalDeviceSurfaceCapabilitiesKHR", 0, 0),
+        ("vkCreateSwapchainKHR", 0, 0),
     ] {
         if child("the_surface_is_lost", of, shown, result).is_none() {
             return;

@@ -4,6 +4,9 @@ use super::instance::Instance;
 use ash::{khr, vk};
 use std::ffi::CStr;
 
+/// Storage buffers of the shader that has most. Vulkan promises four, desktop GPUs have many more.
+const STORAGE_BUFFERS: u32 = 7;
+
 /// What a device is, in the order in which one is preferred when none is named.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum DeviceKind {
@@ -114,6 +117,9 @@ fn candidate(instance: &Instance, index: usize, physical: vk::PhysicalDevice) ->
     if properties.api_version < vk::API_VERSION_1_2 {
         lacks.push("Vulkan 1.2");
     }
+    if properties.limits.max_per_stage_descriptor_storage_buffers < STORAGE_BUFFERS {
+        lacks.push("seven storage buffers in a shader (maxPerStageDescriptorStorageBuffers)");
+    }
     let extensions = extensions(instance, physical, &name, &mut lacks)?;
     let (queue_family, timestamp_valid_bits) = queue_family(instance, physical, &mut lacks);
     let description = DeviceDescription {
@@ -212,6 +218,16 @@ fn text<E>(name: std::result::Result<&CStr, E>) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::vulkan::compiled;
+
+    #[test]
+    fn devices_are_asked_for_as_many_storage_buffers_as_a_shader_has() {
+        let count = |shader: &&crate::vulkan::Shader| {
+            let kinds = shader.reflect().unwrap().bindings.into_values().map(|binding| binding.kind);
+            kinds.filter(|kind| *kind == vk::DescriptorType::STORAGE_BUFFER).count()
+        };
+        assert_eq!(compiled::ALL.iter().map(|shader| count(&shader)).max(), Some(STORAGE_BUFFERS as usize));
+    }
 
     #[test]
     fn numbers_are_indices_where_there_is_one_and_else_parts_of_names() {

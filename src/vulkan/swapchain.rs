@@ -216,7 +216,7 @@ impl Swapchain {
         self.surface.renew()
     }
 
-    /// Makes the images anew for the window as it is now. False if it has no area, or more than an image can have.
+    /// Makes the images anew for the window as it is now. False if it has no area, or more than an image can have, or lost its surface meanwhile.
     fn renew(&mut self, size: [u32; 2]) -> Result<bool> {
         let capabilities = match self.capabilities() {
             Err(VulkanError::Call { result: vk::Result::ERROR_SURFACE_LOST_KHR, .. }) => {
@@ -240,7 +240,13 @@ impl Swapchain {
             return Ok(false);
         }
         let usage = Self::USAGE & capabilities.supported_usage_flags;
-        let raw = self.create(&capabilities, extent, usage)?;
+        let raw = match self.create(&capabilities, extent, usage) {
+            Err(VulkanError::Call { result: vk::Result::ERROR_SURFACE_LOST_KHR, .. }) => {
+                self.renew_surface()?;
+                return Ok(false);
+            }
+            other => other?,
+        };
         // SAFETY: plain query of the swapchain just made.
         let images = unsafe { self.functions.get_swapchain_images(raw) };
         let shape = ImageShape::plane(self.format, extent.width, extent.height);

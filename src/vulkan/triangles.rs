@@ -40,6 +40,11 @@ impl Triangles {
         if let Some(stray) = indices.iter().find(|index| **index as usize >= vertex_count) {
             return Err(VulkanError::unfit(name, format!("index {stray} is of none of its {vertex_count} vertices")));
         }
+        let most = device.limits().max_draw_indexed_index_value;
+        if vertex_count as u64 > u64::from(most) + 1 {
+            let problem = format!("{vertex_count} vertices are more than this device draws, {most}; it takes smaller meshes");
+            return Err(VulkanError::unfit(name, problem));
+        }
         let (vertex, index) = (vk::BufferUsageFlags::VERTEX_BUFFER, vk::BufferUsageFlags::INDEX_BUFFER);
         let upload =
             |part: &str, usage, bytes: &[u8]| Buffer::with_contents(device, &format!("{name} {part}"), usage, bytes);

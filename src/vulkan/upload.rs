@@ -30,7 +30,17 @@ impl Buffer {
         let usage = usage | vk::BufferUsageFlags::TRANSFER_DST;
         let buffer = Self::new(device, name, contents.len() as u64, usage, BufferUse::Device)?;
         let staging = staging(device, name, contents)?;
-        submit_and_wait(device, |commands| commands.copy_buffer(&staging, &buffer))?;
+        // That the CPU waits makes what was written available; to be visible to later frames it takes a barrier.
+        let to_all = vk::MemoryBarrier2::default()
+            .src_stage_mask(vk::PipelineStageFlags2::COPY)
+            .src_access_mask(vk::AccessFlags2::TRANSFER_WRITE)
+            .dst_stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)
+            .dst_access_mask(vk::AccessFlags2::MEMORY_READ | vk::AccessFlags2::MEMORY_WRITE);
+        submit_and_wait(device, |commands| {
+            commands.copy_buffer(&staging, &buffer)?;
+            commands.barriers(&[], &[], &[to_all]);
+            Ok(())
+        })?;
         Ok(buffer)
     }
 }
