@@ -40,6 +40,7 @@ layout(set = 0, binding = 8, std430) buffer Lookups {
 layout(push_constant) uniform Push {
     Camera camera;
     uvec2 size_px;
+    uvec2 portion; // which portion of the listed parts, of how many
     uint pixel_class;
     float face_size;        // of level 0 of the environment pyramid
     vec2 rotation;          // cosine and sine of the environment's rotation about +Y
@@ -103,12 +104,15 @@ void main() {
     }
     uvec2 tiles = (push.size_px + TILE_SIDE - 1) / TILE_SIDE;
     uint part_count = counters.classes[push.pixel_class].part_count;
+    uint portion_size = (part_count + push.portion.y - 1) / push.portion.y;
+    uint portion_start = min(push.portion.x * portion_size, part_count);
+    uint portion_end = min(portion_start + portion_size, part_count);
     // The last workgroup may have fewer parts. With the test at the end of a loop no driver that masks lanes out runs the body once more for none.
-    uint p = PARTS * gl_WorkGroupID.x + gl_LocalInvocationIndex / PART_PIXELS;
+    uint p = portion_start + PARTS * gl_WorkGroupID.x + gl_LocalInvocationIndex / PART_PIXELS;
     do {
         uint part = part_list.parts[first_part(push.pixel_class, tiles) + min(p, part_count - 1)];
         uint place_in_part = gl_LocalInvocationIndex % PART_PIXELS;
-        if (p < part_count && place_in_part < part_pixel_count(part)) {
+        if (p < portion_end && place_in_part < part_pixel_count(part)) {
             uint tile = part_tile(part);
             uint slot = part_first_slot(part) + place_in_part;
             uint place = pixel_list.pixels[tile * TILE_PIXELS + slot];
@@ -118,7 +122,7 @@ void main() {
             imageStore(radiance, ivec2(pixel), vec4(scaled, shaded.a));
         }
         p += PARTS * gl_NumWorkGroups.x;
-    } while (p < part_count);
+    } while (p < portion_end);
     barrier();
     atomicAdd(group_lookups, lookups);
     barrier();

@@ -136,7 +136,7 @@ impl DeviceScene {
                 shader_count: shaders.constants.len() as u32,
                 shader_of_mixed: shaders.of_mixed,
             },
-            shade: Shade { pipelines, materials, light, sampling },
+            shade: Shade { pipelines, materials, light, sampling, method },
             background,
             tone_map: ToneMap { pipeline: compile(&compiled::TONE_MAP, &[])? },
             way_around,
@@ -169,7 +169,7 @@ impl DeviceScene {
         self.render_watched(wanted, repeat, &())
     }
 
-    /// [`render`](Self::render), watched by `observer`, which can stop it between frames.
+    /// [`render`](Self::render), watched by `observer`, which can stop it between frames, and between portions of a long one.
     ///
     /// # Errors
     /// As there; [`Error::Cancelled`].
@@ -196,7 +196,7 @@ impl DeviceScene {
         for _ in 0..repeat.max(1) {
             observer.check()?;
             let start = std::time::Instant::now();
-            passes.push(executable.execute_timed(&self.device, &mut frames)?);
+            passes.push(executable.execute_timed(&self.device, &mut frames, observer)?);
             frame_ms.push(start.elapsed().as_secs_f64() * 1e3);
         }
         let pass_median = |index: usize| PassTime {
@@ -304,7 +304,7 @@ pub fn time_bare_lookups(device: &Arc<Device>, bare: &BareLookups) -> Result<(f6
     let Readbacks { graph, imports, .. } = readbacks;
     let executable = Executable::new(device, graph, &imports)?;
     let mut frames = Frames::new(device, "bare lookups", 1)?;
-    let passes = executable.execute_timed(device, &mut frames)?;
+    let passes = executable.execute_timed(device, &mut frames, &())?;
     let gpu_ms = passes.iter().filter(|pass| !pass.is_readback()).map(|pass| pass.gpu_ms).sum();
     Ok((gpu_ms, texels(Some(&target))))
 }

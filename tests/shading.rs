@@ -494,3 +494,29 @@ fn pictures_are_the_same_whether_or_not_geometry_is_drawn_where_no_object_is() {
     assert!(seen.iter().filter(|pixels| (1..3000).contains(*pixels)).count() > 6, "{seen:?}");
     renderer.finish();
 }
+
+#[test]
+fn what_takes_long_is_shaded_in_portions_that_make_up_the_picture() {
+    let gpu = Validated::new();
+    let mut scene = sphere(model("model = 'lambert'\nreflectance = [0.8, 0.5, 0.2]"), "sky", 10_000, (96, 72));
+    scene.shading.method = Method::Cosine;
+    scene.image.background = threadlight::low_level::scene::Background::None;
+    let prepared = ready(&scene);
+    let rendering = gpu.render(&prepared, EVERYTHING);
+    assert!(
+        rendering.plan.contains("shade, portion 2") && rendering.plan.contains("shade, portion 3"),
+        "{}",
+        rendering.plan
+    );
+    assert_eq!(rendering.passes.iter().filter(|pass| pass.name == "shade").count(), 1);
+    let Counters { interior_pixels, covered_edge_subpixels, .. } = rendering.counters;
+    assert_eq!(rendering.lookups, 10_000 * u64::from(interior_pixels + covered_edge_subpixels));
+    let memo = Memo::default();
+    let twin = shading::CpuShader::new(&prepared, &memo.round(&())).unwrap();
+    for pixel in pixels(&prepared).filter(|pixel| (pixel.x + 96 * pixel.y) % 41 == 0) {
+        let expected = twin.shade(pixel, &texels_of(&prepared, &rendering, pixel));
+        let found = Vec4::from(rendering.radiance[(pixel.y * 96 + pixel.x) as usize]);
+        assert!((found - expected).abs().max_element() <= 1e-3, "{found} at {pixel}, the twin has {expected}");
+    }
+    gpu.finish();
+}

@@ -73,8 +73,9 @@ fn plan<W>(
     };
     let mut declared: Vec<Option<Pass<W>>> = graph.passes.into_iter().map(Some).collect();
     let passes = order.iter().zip(barriers).filter_map(|(&pass, barriers)| {
-        let Pass { name, uses, work, .. } = declared[pass].take()?;
-        Some(PlannedPass { name, barriers, uses: uses.iter().filter_map(plan_use).collect(), work: work? })
+        let Pass { name, portion_of, uses, work, .. } = declared[pass].take()?;
+        let uses = uses.iter().filter_map(plan_use).collect();
+        Some(PlannedPass { name, portion_of, barriers, uses, work: work? })
     });
     Plan { passes: passes.collect(), final_barriers, resources, blocks, culled, kept }
 }

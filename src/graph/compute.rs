@@ -54,6 +54,12 @@ impl<'a> FrameGraph<'a> {
 }
 
 impl<'a> ComputePass<'_, 'a> {
+    /// The pass is a later portion of the one of this name: see [`PassBuilder::portion_of`].
+    pub fn portion_of(mut self, name: &str) -> Self {
+        self.pass.portion_of(name);
+        self
+    }
+
     /// The shader looks at `handle` as its binding `name`.
     pub fn read(mut self, name: &'a str, handle: impl Into<Handle>) -> Self {
         let handle = handle.into();

@@ -34,6 +34,8 @@ pub(super) struct Import {
 /// A declared pass.
 pub(super) struct Pass<W> {
     pub name: String,
+    /// The pass that it is a later portion of.
+    pub portion_of: Option<String>,
     pub uses: Vec<Use>,
     /// Hash of what it depends on besides resources; none if it does not say.
     pub inputs: Option<u64>,
@@ -136,6 +138,7 @@ impl<W> Graph<W> {
         let index = self.passes.len();
         self.passes.push(Pass {
             name: name.to_owned(),
+            portion_of: None,
             uses: Vec::new(),
             inputs: None,
             depends_on_unknown: false,
@@ -186,6 +189,13 @@ impl<W> PassBuilder<'_, W> {
         let handle = handle.into();
         self.pass.uses.push(Use { handle, access, mode });
         handle.next().into()
+    }
+
+    /// Says that the pass is a later portion of the one of this name. Together they would take longer than systems let a GPU be busy: a frame
+    /// that has portions is to be submitted pass by pass.
+    pub fn portion_of(&mut self, name: &str) -> &mut Self {
+        self.pass.portion_of = Some(name.to_owned());
+        self
     }
 
     /// Says what the pass depends on besides the resources that it uses: everything else that, when it changes, changes what

@@ -5,6 +5,7 @@ use super::resource::{Handle, ResourceInfo, ResourceKind};
 use super::store::{Made, Store, bind, make};
 use super::work::{DeviceResource, FrameGraph, Resources, Work};
 use crate::Result;
+use crate::progress::Observer;
 use crate::vulkan::{Commands, Device, Frames, Memory, PassTime, Semaphores};
 use ash::vk;
 use std::collections::HashMap;
@@ -97,33 +98,57 @@ impl<'a> Executable<'a> {
         })
     }
 
+    /// Whether a pass is in portions, which are not to be submitted together.
+    pub fn is_in_portions(&self) -> bool {
+        self.plan.passes.iter().any(|pass| pass.portion_of.is_some())
+    }
+
     /// Runs one frame until the GPU is done with it; gives the time of each pass, by timestamps where those of `device` tell
-    /// passes apart.
+    /// passes apart. One in portions can be stopped between them by `observer`.
     ///
     /// # Errors
-    /// Whatever Vulkan refuses.
-    pub fn execute_timed(&self, device: &Device, frames: &mut Frames) -> Result<Vec<PassTime>> {
-        if device.times_passes() {
+    /// Whatever Vulkan refuses; cancelled.
+    pub fn execute_timed(
+        &self,
+        device: &Device,
+        frames: &mut Frames,
+        observer: &dyn Observer,
+    ) -> Result<Vec<PassTime>> {
+        if device.times_passes() && !self.is_in_portions() {
             self.execute(frames)?;
             Ok(frames.pass_times()?)
         } else {
-            self.execute_pass_by_pass(frames, Semaphores::default())
+            self.execute_pass_by_pass(device, frames, Semaphores::default(), observer)
         }
     }
 
-    /// Submits one frame pass by pass between two semaphores, waiting for each, and times them from outside: for devices whose
-    /// timestamps do not tell.
+    /// Submits one frame pass by pass between two semaphores, waiting for each; portions of one are timed together, from outside where timestamps
+    /// do not tell.
     ///
     /// # Errors
-    /// Whatever Vulkan refuses.
-    pub fn execute_pass_by_pass(&self, frames: &mut Frames, semaphores: Semaphores) -> Result<Vec<PassTime>> {
-        let mut times = Vec::new();
-        for pass in &self.plan.passes {
+    /// Whatever Vulkan refuses; cancelled.
+    pub fn execute_pass_by_pass(
+        &self,
+        device: &Device,
+        frames: &mut Frames,
+        semaphores: Semaphores,
+        observer: &dyn Observer,
+    ) -> Result<Vec<PassTime>> {
+        let mut times: Vec<PassTime> = Vec::new();
+        for (index, pass) in self.plan.passes.iter().enumerate() {
+            observer.check()?;
             let start = Instant::now();
-            let semaphores = if times.is_empty() { semaphores.first() } else { Semaphores::default() };
+            let semaphores = if index == 0 { semaphores.first() } else { Semaphores::default() };
             frames.record_between(semaphores, |commands| self.record_pass(commands, pass))?;
             frames.wait()?;
-            times.push(PassTime { name: pass.name.clone(), gpu_ms: start.elapsed().as_secs_f64() * 1e3 });
+            let gpu_ms = match device.times_passes() {
+                true => frames.pass_times()?.iter().map(|time| time.gpu_ms).sum(),
+                false => start.elapsed().as_secs_f64() * 1e3,
+            };
+            match times.iter_mut().find(|time| Some(&time.name) == pass.portion_of.as_ref()) {
+                Some(whole) => whole.gpu_ms += gpu_ms,
+                None => times.push(PassTime { name: pass.name.clone(), gpu_ms }),
+            }
         }
         frames.record_between(semaphores.last(), |commands| -> Result<()> {
             self.record_barriers(commands, &self.plan.final_barriers);

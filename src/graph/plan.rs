@@ -28,6 +28,8 @@ pub struct Plan<W> {
 pub struct PlannedPass<W> {
     /// Its name.
     pub name: String,
+    /// The pass that it is a later portion of, if it is.
+    pub portion_of: Option<String>,
     /// What must be recorded before it; the order among these does not matter.
     pub barriers: Vec<Barrier>,
     /// What it uses, in order of declaration: also the order of colour attachments.

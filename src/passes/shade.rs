@@ -182,6 +182,26 @@ pub struct Shade {
     pub light: Keyed<DeviceLight>,
     /// How many threads or samples, and which random numbers.
     pub sampling: Sampling,
+    /// The method of the shader.
+    pub method: Method,
+}
+
+/// Samples of `mis` in a submission: half a second for a GPU of 1 Tflop/s, by what an H200 of 60 takes. Systems end what runs for longer than
+/// 2 s (Windows) or 10 s (Linux), and the device is lost with it.
+const MOST_SAMPLES: u64 = 1 << 25;
+
+impl Shade {
+    /// In how many portions a picture is shaded, so that no submission takes too long. Threads are a sixteenth of the work of a sample or less,
+    /// `ris` is four times that.
+    fn portion_count(&self, view: &View) -> u32 {
+        let samples = u64::from(view.width) * u64::from(view.height) * u64::from(self.sampling.count);
+        let work = match self.method {
+            Method::Ris => 4 * samples,
+            method if method.threads().is_some() => samples / 16,
+            _ => samples,
+        };
+        work.div_ceil(MOST_SAMPLES).max(1) as u32
+    }
 }
 
 #[repr(C)]
@@ -189,6 +209,7 @@ pub struct Shade {
 struct Push {
     camera: CameraRays,
     size_px: [u32; 2],
+    portion: [u32; 2],
     pixel_class: u32,
     face_size: f32,
     rotation: [f32; 2],
@@ -200,10 +221,11 @@ struct Push {
 }
 
 impl Push {
-    fn new(view: &View, sampling: &Sampling, light: &DeviceLight, pixel_class: u32) -> Self {
+    fn new(view: &View, sampling: &Sampling, light: &DeviceLight, pixel_class: u32, portion: [u32; 2]) -> Self {
         Self {
             camera: view.camera_rays(),
             size_px: [view.width, view.height],
+            portion,
             pixel_class,
             face_size: light.face_size(),
             rotation: view.rotation(),
@@ -235,25 +257,34 @@ pub fn shade<'a>(
     view: &View,
 ) -> Shaded {
     let Tiles { counters, parts, pixels, .. } = *tiles;
-    let Shade { pipelines, materials, light, sampling } = shade;
+    let Shade { pipelines, materials, light, sampling, .. } = shade;
     let format = vk::Format::R32G32B32A32_SFLOAT;
     let mut radiance = graph.kept_image("radiance", ImageDesc { format, width: view.width, height: view.height });
     let mut lookups = graph.buffer("lookups", BufferDesc { size_bytes: size_of::<u64>() as u64 });
     graph.clear_buffer("clear_lookups", &mut lookups);
-    let dispatch = |pixel_class: usize| {
-        let push = Push::new(view, sampling, light, pixel_class as u32);
-        (&*pipelines[pixel_class], Counters::arguments_of(pixel_class), push)
-    };
-    graph
-        .compute("shade", &pipelines[0])
-        .read("geometry", geometry)
-        .read("counters", counters)
-        .read("part_list", parts)
-        .read("pixel_list", pixels)
-        .write("radiance", &mut radiance)
-        .modify("all_lookups", &mut lookups)
-        .bind_all(materials.bindings())
-        .bind_all(light.bindings())
-        .indirect(counters, (0..pipelines.len()).map(dispatch));
+    let portion_count = shade.portion_count(view);
+    for portion in 0..portion_count {
+        let dispatch = |pixel_class: usize| {
+            let push = Push::new(view, sampling, light, pixel_class as u32, [portion, portion_count]);
+            (&*pipelines[pixel_class], Counters::arguments_of(pixel_class), push)
+        };
+        let pass = match portion {
+            0 => graph.compute("shade", &pipelines[0]),
+            _ => graph.compute(&format!("shade, portion {}", portion + 1), &pipelines[0]).portion_of("shade"),
+        };
+        let pass = pass
+            .read("geometry", geometry)
+            .read("counters", counters)
+            .read("part_list", parts)
+            .read("pixel_list", pixels);
+        let pass = match portion {
+            0 => pass.write("radiance", &mut radiance),
+            _ => pass.modify("radiance", &mut radiance),
+        };
+        pass.modify("all_lookups", &mut lookups)
+            .bind_all(materials.bindings())
+            .bind_all(light.bindings())
+            .indirect(counters, (0..pipelines.len()).map(dispatch));
+    }
     Shaded { radiance, lookups }
 }

@@ -15,6 +15,8 @@ use std::time::Duration;
 /// Frames in flight.
 const FRAMES: usize = 2;
 
+const NO_SIZES: [Option<[u32; 2]>; FRAMES] = [None; FRAMES];
+
 /// The pass by which a picture is known to be made anew.
 pub const SHADE: &str = "shade";
 
@@ -160,7 +162,7 @@ pub struct Presenter {
     store: Store,
     painter: UiPainter,
     frames: Frames,
-    /// Of each frame in flight, the size of its picture if what that takes tells of others.
+    /// Of each frame in flight, the oldest first, the size of its picture if what that takes tells of others.
     sizes: VecDeque<Option<[u32; 2]>>,
     swapchain: Swapchain,
     device: Arc<Device>,
@@ -177,7 +179,7 @@ impl Presenter {
             store: Store::default(),
             painter: UiPainter::new(device, swapchain.format(), FRAMES)?,
             frames: Frames::new(device, "window", FRAMES)?,
-            sizes: VecDeque::new(),
+            sizes: NO_SIZES.into(),
             swapchain,
             device: device.clone(),
         })
@@ -225,14 +227,18 @@ impl Presenter {
         let shades = ran.iter().any(|pass| pass == SHADE);
         let told = picture.filter(|picture| shades && picture.is_compiled);
         let size = told.map(|picture| [picture.view.width, picture.view.height]);
-        let (passes, size) = match self.device.times_passes() {
+        let (passes, size) = match self.device.times_passes() && !executable.is_in_portions() {
             true => {
                 let passes = self.frames.oldest_pass_times()?;
                 executable.execute_between(&mut self.frames, turn.semaphores)?;
                 self.sizes.push_back(size);
-                (passes, if self.sizes.len() > FRAMES { self.sizes.pop_front().flatten() } else { None })
+                (passes, self.sizes.pop_front().flatten())
             }
-            false => (executable.execute_pass_by_pass(&mut self.frames, turn.semaphores)?, size),
+            false => {
+                // What the frames in flight then have are single passes of this one.
+                self.sizes = NO_SIZES.into();
+                (executable.execute_pass_by_pass(&self.device, &mut self.frames, turn.semaphores, &())?, size)
+            }
         };
         let cost = size.and_then(|size| PictureCost::of(size, &passes));
         if counts.is_some() || screenshot.is_some() || extras.completion {

@@ -42,7 +42,8 @@ impl Triangles {
         }
         let most = device.limits().max_draw_indexed_index_value;
         if vertex_count as u64 > u64::from(most) + 1 {
-            let problem = format!("{vertex_count} vertices are more than this device draws, {most}; it takes smaller meshes");
+            let problem =
+                format!("{vertex_count} vertices are more than this device draws, {most}; it takes smaller meshes");
             return Err(VulkanError::unfit(name, problem));
         }
         let (vertex, index) = (vk::BufferUsageFlags::VERTEX_BUFFER, vk::BufferUsageFlags::INDEX_BUFFER);
