@@ -23,8 +23,6 @@ fn main() -> ExitCode {
     cli::start_logging(arguments.verbose);
     match arguments.run() {
         Ok(()) => ExitCode::SUCCESS,
-        // Whoever reads our output has seen enough of it, such as `head`.
-        Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
         // Errors about files name them.
         Err(error) if error.is::<std::io::Error>() => fail(1, &format!("standard output cannot be written ({error})")),
         Err(error) => fail(exit_code(&error), &format!("{error:#}")),
@@ -50,10 +48,6 @@ fn fail(code: u8, problem: &str) -> ExitCode {
 /// Whether clap means an error, rather than help or the version that was asked for.
 fn is_mistake(error: &clap::Error) -> bool {
     error.use_stderr() && error.kind() != clap::error::ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand
-}
-
-fn is_broken_pipe(error: &anyhow::Error) -> bool {
-    error.downcast_ref::<std::io::Error>().is_some_and(|cause| cause.kind() == std::io::ErrorKind::BrokenPipe)
 }
 
 fn exit_code(error: &anyhow::Error) -> u8 {

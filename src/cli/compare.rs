@@ -1,7 +1,6 @@
 //! `threadlight compare`: how much, and where, two pictures differ.
-use super::number;
+use super::{number, print};
 use anyhow::Context;
-use std::io::Write;
 use std::path::PathBuf;
 use threadlight::Result;
 use threadlight::low_level::evaluate::{Comparable, Display, Metrics, compare, difference_picture};
@@ -68,7 +67,7 @@ impl Compare {
         }
         let text =
             if self.json { serde_json::to_string_pretty(&metrics).context("--json")? + "\n" } else { table(&metrics) };
-        std::io::stdout().write_all(text.as_bytes())?;
+        print(text)?;
         if let Some(at_most) = self.at_most {
             anyhow::ensure!(metrics.nan == 0, "{} values are NaN or infinite", metrics.nan);
             anyhow::ensure!(metrics.rms <= at_most, "the RMS is {:.3e}, above {at_most:e}", metrics.rms);

@@ -1,6 +1,5 @@
 //! `threadlight completions`: scripts that teach a shell the command line.
 use clap::CommandFactory;
-use std::io::Write;
 
 /// Prints a completion script for a shell.
 #[derive(clap::Args)]
@@ -14,6 +13,6 @@ impl Completions {
         // Not straight to standard output, as clap_complete panics where it cannot write.
         let mut script = Vec::new();
         clap_complete::generate(self.shell, &mut super::Arguments::command(), "threadlight", &mut script);
-        Ok(std::io::stdout().write_all(&script)?)
+        Ok(super::print(String::from_utf8_lossy(&script))?)
     }
 }

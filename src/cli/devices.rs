@@ -1,5 +1,4 @@
 //! `threadlight devices`: the Vulkan devices of this machine, and whether they can be trusted.
-use std::io::Write;
 use std::sync::Arc;
 use threadlight::low_level::memo::{Memo, default_folder};
 use threadlight::low_level::passes::WayAround;
@@ -17,7 +16,6 @@ impl Devices {
     pub fn run(self) -> anyhow::Result<()> {
         let instance = Instance::new(false).map_err(Error::from)?;
         let memo = Memo::new(default_folder().as_deref());
-        let mut out = std::io::stdout().lock();
         for device in describe_devices(&instance).map_err(Error::from)? {
             let verdict = match way_around(&instance, &device, &memo) {
                 _ if !device.lacks.is_empty() => format!("; cannot be used, lacks {}", device.lacks.join(" and ")),
@@ -27,7 +25,7 @@ impl Devices {
             };
             let kind = format!("{:?}", device.kind).to_lowercase();
             let (index, name, driver, version) = (device.index, device.name, device.driver, device.api_version);
-            writeln!(out, "{index}  {name}  ({kind}, Vulkan {version}, {driver}{verdict})")?;
+            super::print(format_args!("{index}  {name}  ({kind}, Vulkan {version}, {driver}{verdict})\n"))?;
         }
         Ok(())
     }

@@ -15,7 +15,7 @@ mod threads;
 mod view;
 
 use clap::{Parser, Subcommand};
-use std::io::{IsTerminal, Write};
+use std::io::{self, ErrorKind, IsTerminal, Write};
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
@@ -93,7 +93,18 @@ pub fn mistake(error: &clap::Error) -> String {
 
 /// Says something on standard error. Where nobody listens any more, nothing is said, and the work goes on.
 pub fn say(line: std::fmt::Arguments) {
-    let _ = writeln!(std::io::stderr(), "{line}");
+    let _ = writeln!(io::stderr(), "{line}");
+}
+
+/// Prints `text` on standard output. Where nobody listens any more, as behind `head`, nothing is printed, and the work goes on.
+fn print(text: impl std::fmt::Display) -> io::Result<()> {
+    let mut out = io::stdout().lock();
+    unless_unheard(write!(out, "{text}").and_then(|()| out.flush()))
+}
+
+/// What was `printed` into a pipe without a reader is no error.
+fn unless_unheard(printed: io::Result<()>) -> io::Result<()> {
+    printed.or_else(|cause| if cause.kind() == ErrorKind::BrokenPipe { Ok(()) } else { Err(cause) })
 }
 
 /// Sends the library's log to standard error; RUST_LOG overrides the flag.
@@ -102,10 +113,10 @@ pub fn start_logging(verbose: u8) {
     let filter = tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| level.into());
     tracing_subscriber::fmt()
         .with_env_filter(filter)
-        .with_writer(std::io::stderr)
+        .with_writer(io::stderr)
         // It would tell of them on standard error, and end the program where that is what fails.
         .log_internal_errors(false)
-        .with_ansi(std::io::stderr().is_terminal())
+        .with_ansi(io::stderr().is_terminal())
         .without_time()
         .with_target(false)
         .init();

@@ -2,11 +2,10 @@
 use super::progress::TerminalProgress;
 use super::rendered::{ReferenceStats, Rendered, Stats};
 use super::scene_flags::{MachineFlags, SceneFlags};
-use super::{none_of, number, say};
+use super::{none_of, number, print, say};
 use anyhow::Context;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::value_parser;
-use std::io::Write;
 use std::path::PathBuf;
 use std::sync::Arc;
 use threadlight::low_level::evaluate::expected::prepare_within;
@@ -78,9 +77,6 @@ impl Render {
         let rendered = self.render(&scene, format, &device, &memo)?;
         drop(device);
 
-        if self.print_plan {
-            write!(std::io::stdout(), "{}", rendered.rendering.plan)?;
-        }
         if let Some(path) = &self.output {
             rendered.write(path, format)?;
         }
@@ -88,6 +84,9 @@ impl Render {
         if let Some(path) = &self.stats {
             let text = serde_json::to_string_pretty(&Stats::new(&rendered, messages.len())).context("--stats")? + "\n";
             output::write_whole(path, text.as_bytes())?;
+        }
+        if self.print_plan {
+            print(&rendered.rendering.plan)?;
         }
         none_of(&messages)
     }

@@ -253,17 +253,52 @@ fn shells_get_their_completions() {
 
 #[test]
 fn a_reader_that_has_seen_enough_is_no_error() {
-    use std::process::{Command, Stdio};
     let folder = workplace();
-    for arguments in [&["completions", "bash"][..], &["materials"], &["devices"]] {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_threadlight"));
-        let mut child = command.args(arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-        drop(child.stdout.take());
-        let output = child.wait_with_output().unwrap();
-        let complaints = String::from_utf8_lossy(&output.stderr);
-        assert!(output.status.success() && complaints.is_empty(), "{arguments:?} {complaints}");
+    for arguments in ["completions bash", "materials", "devices", "--help"] {
+        let (code, said) = unheard(&threadlight(&folder, arguments));
+        assert!(code == Some(0) && said.is_empty(), "{arguments}: {said}");
     }
-    assert!(!cache(&folder).exists());
+}
+
+#[test]
+fn without_a_reader_files_are_written_and_verdicts_reached_all_the_same() {
+    let folder = workplace();
+    for (name, value) in [("a.png", 51), ("b.png", 102)] {
+        let rgba = vec![value; 24 * 16 * 4];
+        threadlight::low_level::output::write_png(&folder.path().join(name), 24, 16, &rgba, false).unwrap();
+    }
+    let (code, said) = unheard(&threadlight(&folder, "compare a.png b.png --at-most 1e-4"));
+    assert!(code == Some(1) && said.contains("the RMS is"), "{code:?} {said}");
+    let device = std::env::var("THREADLIGHT_TEST_DEVICE").map_or(String::new(), |device| format!("--device {device}"));
+    let bench =
+        "bench error --materials clay --environments map.hdr --methods fitted --counts 1 --size 24x18 --repeat 1";
+    for (command, files) in [
+        (
+            render(&folder, &format!("{SMALL} --print-plan -o image.png --stats stats.json")),
+            &["image.png", "stats.json"][..],
+        ),
+        (threadlight(&folder, "materials fit clay --model lambert -o fitted.toml"), &["fitted.toml"]),
+        (threadlight(&folder, "bench fit --materials clay --counts 1 --json fit.json"), &["fit.json"]),
+        (
+            threadlight(&folder, &format!("{bench} {device} --json error.json --plot plots")),
+            &["error.json", "plots/rms_over_threads.svg"],
+        ),
+    ] {
+        let (code, said) = unheard(&command);
+        assert!(code == Some(0), "{command:?} {said}");
+        assert!(files.iter().all(|file| folder.path().join(file).exists()), "{command:?}");
+    }
+}
+
+/// Exit code and complaints of `command` where standard output is a pipe that nobody reads.
+fn unheard(command: &Command) -> (Option<i32>, String) {
+    let (reader, writer) = std::io::pipe().unwrap();
+    drop(reader);
+    let mut heard = std::process::Command::new(command.get_program());
+    heard.args(command.get_args()).current_dir(command.get_current_dir().unwrap());
+    heard.env("THREADLIGHT_CACHE", command.get_current_dir().unwrap().join("cache")).env_remove("RUST_LOG");
+    let output = heard.stdout(writer).output().unwrap();
+    (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
 }
 
 #[test]

@@ -1,10 +1,9 @@
 //! What the measurements have in common on the command line: what to measure, on which device, and where to write it.
 use crate::cli::render::processor;
 use crate::cli::scene_flags::parse_size;
-use crate::cli::{cache_folder, nameable, number, stem};
+use crate::cli::{cache_folder, nameable, number, print, stem};
 use anyhow::Context;
 use clap::value_parser;
-use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use threadlight::low_level::environment;
@@ -237,11 +236,10 @@ impl JsonArgument {
         found: &[T],
         tables: impl FnOnce(&[T]) -> Vec<tables::Section>,
     ) -> anyhow::Result<()> {
-        if !found.is_empty() {
-            write!(std::io::stdout().lock(), "{}", tables::text(&tables(found)))?;
-        }
+        let printed = if found.is_empty() { Ok(()) } else { print(tables::text(&tables(found))) };
         result?;
-        self.write(&found)
+        self.write(&found)?;
+        Ok(printed?)
     }
 
     pub fn write(&self, measurements: &impl serde::Serialize) -> anyhow::Result<()> {

@@ -1,8 +1,8 @@
 //! `threadlight bench error`: error and time of methods and thread counts over materials, environments and scenes.
 use super::arguments::{CasesArguments, Defaults, OutputArguments, TruthArguments};
+use crate::cli::print;
 use crate::cli::progress::TerminalProgress;
 use clap::value_parser;
-use std::io::Write;
 use threadlight::Error;
 use threadlight::low_level::evaluate::sweep::Measured;
 use threadlight::low_level::evaluate::{Row, Shard, Sweep, plots, reference, tables};
@@ -97,12 +97,13 @@ impl BenchError {
 
 /// Prints the tables of `rows`, and writes what `output` asks for.
 pub(super) fn write(rows: &[Row], reference_error: Option<f64>, output: &OutputArguments) -> anyhow::Result<()> {
-    let mut out = std::io::stdout().lock();
-    write!(out, "{}", tables::text(&tables::error_tables(rows)))?;
+    let mut text = tables::text(&tables::error_tables(rows));
     if let Some(error) = reference_error {
-        writeln!(out, "The reference is within {error:.1e} by its own estimate.")?;
+        text += &format!("The reference is within {error:.1e} by its own estimate.\n");
     }
-    write_files(rows, output)
+    let printed = print(text);
+    write_files(rows, output)?;
+    Ok(printed?)
 }
 
 /// Writes the JSON and the plots of `rows` that `output` asks for.

@@ -2,9 +2,9 @@
 use super::arguments::{
     CasesArguments, Defaults, OutputArguments, QUICK_TOLERANCE, TruthArguments, files_of_materials, named_materials,
 };
+use crate::cli::print;
 use crate::cli::progress::TerminalProgress;
 use clap::value_parser;
-use std::io::Write;
 use std::path::Path;
 use threadlight::low_level::brdf::Brdf;
 use threadlight::low_level::evaluate::gallery::{self, Named};
@@ -99,8 +99,7 @@ impl BenchGallery {
         sheets.extend(gallery::side_by_side_sheets(&measured));
         write_pictures(&sheets, folder)?;
         self.output.json.write(&measured.rows)?;
-        write!(std::io::stdout().lock(), "{}", tables::text(&tables::error_tables(&measured.rows)))?;
-        Ok(())
+        Ok(print(tables::text(&tables::error_tables(&measured.rows)))?)
     }
 }
 

@@ -1,9 +1,9 @@
 //! `threadlight bench report`: everything measured, on one HTML page.
 use super::arguments::{CasesArguments, Defaults, OutputArguments, QUICK_TOLERANCE, TruthArguments, check_folder};
 use super::error;
+use crate::cli::print;
 use crate::cli::progress::TerminalProgress;
 use clap::value_parser;
-use std::io::Write;
 use std::path::{Path, PathBuf};
 use threadlight::low_level::brdf::Brdf;
 use threadlight::low_level::evaluate::report::Report;
@@ -118,8 +118,8 @@ impl BenchReport {
         std::fs::create_dir_all(folder).map_err(|cause| Error::unwritable(folder, cause))?;
         let path = folder.join("report.html");
         output::write_whole(&path, html.as_bytes())?;
-        writeln!(std::io::stdout(), "{}", path.display())?;
-        error::write_files(&report.rows, &self.output)
+        error::write_files(&report.rows, &self.output)?;
+        Ok(print(format_args!("{}\n", path.display()))?)
     }
 }
 

@@ -1,8 +1,8 @@
 //! `threadlight bench speed`: time of a frame by its number of threads, beside its floor, and as other things grow.
 use super::arguments::{CasesArguments, Defaults, OutputArguments};
+use crate::cli::print;
 use crate::cli::progress::TerminalProgress;
 use clap::value_parser;
-use std::io::Write;
 use threadlight::Error;
 use threadlight::low_level::evaluate::speed::{self, Speed, Timings};
 use threadlight::low_level::evaluate::{plots, tables};
@@ -75,11 +75,12 @@ impl BenchSpeed {
         if !matches!(result, Err(Error::Input { .. })) && !timings.frames.is_empty() {
             let mut sections = tables::frame_tables(&timings);
             sections.extend(tables::growth_tables(&timings));
-            write!(std::io::stdout().lock(), "{}", tables::text(&sections))?;
+            let printed = print(tables::text(&sections));
             self.output.json.write(&timings)?;
             if let Some(folder) = &self.output.plot {
                 plots::write(&plots::speed_charts(&timings), folder)?;
             }
+            printed?;
         }
         Ok(result?)
     }

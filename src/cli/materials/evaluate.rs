@@ -1,5 +1,6 @@
 //! `threadlight materials evaluate`: values of a BRDF at directions that are read from standard input.
 use super::Named;
+use crate::cli::unless_unheard;
 use glam::{DVec3, dvec3};
 use std::io::{BufRead, Read, Write};
 use threadlight::{Error, Result};
@@ -37,9 +38,13 @@ impl Evaluate {
             }
             let (w_i, w_o) = parse(&line).map_err(|error| within_line(error, number))?;
             let f = brdf.evaluate(w_i, w_o);
-            writeln!(out, "{} {} {}", f.x, f.y, f.z)?;
+            let printed = writeln!(out, "{} {} {}", f.x, f.y, f.z);
+            // Where nobody listens any more, nothing more is read.
+            if printed.is_err() {
+                return Ok(unless_unheard(printed)?);
+            }
         }
-        Ok(out.flush()?)
+        Ok(unless_unheard(out.flush())?)
     }
 }
 

@@ -1,7 +1,6 @@
 //! `threadlight materials fit`: the model nearest to a BRDF.
 use super::Named;
-use crate::cli::stem;
-use std::io::Write;
+use crate::cli::{print, stem};
 use std::path::{Path, PathBuf};
 use threadlight::Error;
 use threadlight::low_level::brdf::Brdf;
@@ -33,15 +32,18 @@ impl Fit {
         output::check_writable(&self.output)?;
         self.named.check_is_not(&self.output)?;
         let fits = fit(&*self.named.load()?, &self.model)?;
-        let mut out = std::io::stdout().lock();
-        for fit in &fits {
-            let relative = 100.0 * fit.error / fit.error_of_black;
-            let words = fit.parameters.values().filter_map(|value| value.as_str()).collect::<Vec<_>>().join(", ");
-            writeln!(out, "{:<24} error {:.5}, {relative:.2} % of that of black  {words}", fit.model, fit.error)?;
-        }
         let name = stem(Path::new(&self.named.material));
         // There is at least one.
         let text = fits.first().map(|nearest| nearest.to_toml(&name)).unwrap_or_default();
-        Ok(output::write_whole(&self.output, text.as_bytes())?)
+        output::write_whole(&self.output, text.as_bytes())?;
+        for fit in &fits {
+            let relative = 100.0 * fit.error / fit.error_of_black;
+            let words = fit.parameters.values().filter_map(|value| value.as_str()).collect::<Vec<_>>().join(", ");
+            print(format_args!(
+                "{:<24} error {:.5}, {relative:.2} % of that of black  {words}\n",
+                fit.model, fit.error
+            ))?;
+        }
+        Ok(())
     }
 }

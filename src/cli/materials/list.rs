@@ -1,5 +1,5 @@
 //! `threadlight materials list`: what --material, --environment and --mesh can name without a file.
-use std::io::Write;
+use std::fmt::Write;
 use threadlight::low_level::brdf::Brdf;
 use threadlight::low_level::environment::{self, Environment};
 use threadlight::low_level::method::Method;
@@ -7,7 +7,7 @@ use threadlight::low_level::scene::{Mesh, mesh};
 
 /// Writes the list to standard output.
 pub fn run() -> anyhow::Result<()> {
-    let mut out = std::io::stdout().lock();
+    let mut out = String::new();
     writeln!(out, "Materials (--material; or {}):", Brdf::FILES.names())?;
     for (family, names) in Brdf::builtin_families() {
         writeln!(out, "  {family}")?;
@@ -29,5 +29,5 @@ pub fn run() -> anyhow::Result<()> {
     for method in Method::ALL {
         writeln!(out, "  {:<24} {}", method.name(), method.summary())?;
     }
-    Ok(())
+    Ok(crate::cli::print(out)?)
 }
