@@ -31,7 +31,7 @@ pub enum VulkanError {
         extension: String,
     },
     /// `--device` names none of the devices.
-    #[error("--device {asked}: no such Vulkan device; name one of: {available}")]
+    #[error("--device {asked:?}: no such Vulkan device; name one of: {available}")]
     NoSuchDevice {
         /// The name or index that was asked for.
         asked: String,

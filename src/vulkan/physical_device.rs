@@ -52,23 +52,30 @@ pub struct DeviceDescription {
 }
 
 impl DeviceDescription {
-    /// Whether `asked` is part of its name or of its driver's, in any case.
+    /// Whether `asked` is part of its name or of its driver's, in any case. A number is only where it is a word of several digits, as in
+    /// `NVIDIA GeForce RTX 4090`: some digit is in most names.
     fn is_called(&self, asked: &str) -> bool {
         let asked = asked.to_lowercase();
-        // What is empty is a part of every name.
-        !asked.is_empty()
-            && (self.name.to_lowercase().contains(&asked)
-                || self.driver.to_lowercase().contains(&asked)
-                // Mesa's software driver calls itself llvmpipe; everybody else calls it lavapipe.
-                || (asked == "lavapipe" && self.driver.to_lowercase().starts_with("llvmpipe")))
+        let [name, driver] = [&self.name, &self.driver].map(|name| name.to_lowercase());
+        if asked.parse::<i64>().is_ok() {
+            return asked.len() > 1
+                && [name, driver].iter().any(|name| name.split_whitespace().any(|word| word == asked));
+        }
+        name.contains(&asked)
+            || driver.contains(&asked)
+            // Mesa's software driver calls itself llvmpipe; everybody else calls it lavapipe.
+            || (asked == "lavapipe" && driver.starts_with("llvmpipe"))
     }
 }
 
 /// Which of the devices `--device asked` means: the one of that index, or else those of which it is part of the name, as `4090` may be.
 pub(super) fn named<'a>(devices: impl Iterator<Item = &'a DeviceDescription> + Clone, asked: &str) -> Vec<usize> {
+    let asked = asked.trim();
     let of_index = asked.parse().ok().filter(|&index: &usize| devices.clone().any(|device| device.index == index));
     match of_index {
         Some(index) => vec![index],
+        // What is empty is a part of every name.
+        None if asked.is_empty() => Vec::new(),
         None => devices.filter(|device| device.is_called(asked)).map(|device| device.index).collect(),
     }
 }
@@ -230,7 +237,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_are_indices_where_there_is_one_and_else_parts_of_names() {
+    fn numbers_are_indices_where_there_is_one_and_else_whole_words_of_names() {
         let device = |index, name: &str, driver: &str| DeviceDescription {
             index,
             name: name.into(),
@@ -250,9 +257,16 @@ mod tests {
             ("rtx", &[0]),
             ("15.0", &[1]),
             ("lavapipe", &[1]),
-            ("580", &[0]),
+            (" 1 ", &[1]),
+            ("409", &[]),
+            ("580", &[]),
+            ("580.1", &[0]),
             ("7", &[]),
+            ("2", &[]),
+            ("-1", &[]),
             ("", &[]),
+            (" ", &[]),
+            ("\t", &[]),
         ] {
             assert_eq!(named(devices.iter(), asked), meant, "{asked:?}");
         }

@@ -64,7 +64,7 @@ fn unknown_names_are_told_with_the_known_ones() {
     refuses(&folder, &render("--reference-on gpu"), &["--reference-on", "fitted"]);
     refuses(&folder, &render("--method reference --reference-on tpu"), &["--reference-on", "tpu", "cpu, gpu"]);
     refuses(&folder, &render("--method reference --print-plan"), &["--print-plan", "reference"]);
-    refuses(&folder, &render("--device abacus"), &["--device abacus", "name one of"]);
+    refuses(&folder, &render("--device abacus"), &["--device \"abacus\"", "name one of"]);
     refuses(&folder, &render("--background black"), &["--background", "black", "environment, none"]);
     refuses(&folder, "threads unobtainium -o out/a.threads", &["unobtainium", "gold"]);
     refuses(&folder, "completions abacus", &["abacus", "bash"]);
