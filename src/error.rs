@@ -1,5 +1,5 @@
 //! The library's one error type: what went wrong, in which file or object, and what to do about it.
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Result of everything in the library that can fail.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
@@ -19,6 +19,14 @@ pub enum Error {
         problem: String,
         /// What the user can do about it, in half a sentence.
         remedy: String,
+    },
+    /// A file cannot be written though its place is one for files: the disk is full, or fails.
+    #[error("{file}: cannot be written ({cause}); make room, or write to another disk")]
+    Disk {
+        /// Its name.
+        file: String,
+        /// What the system said.
+        cause: std::io::Error,
     },
     /// The frame that was declared contradicts itself: a `GraphError`.
     #[error("frame graph: {0}")]
@@ -54,14 +62,18 @@ impl Error {
         Self::in_file(path, format!("cannot be read ({cause})"), "check the name and its permissions")
     }
 
-    /// An [`Error::Input`] for a file that cannot be written.
-    pub fn unwritable(path: impl Into<PathBuf>, cause: impl std::fmt::Display) -> Self {
-        let path = path.into();
-        Self::in_file(
-            &path,
-            format!("cannot be written ({cause})"),
-            "choose a folder that exists and may be written to",
-        )
+    /// A file that cannot be written: an [`Error::Input`] where another name would do, else an [`Error::Disk`].
+    pub fn unwritable(path: impl AsRef<Path>, cause: impl Into<Cause>) -> Self {
+        let path = path.as_ref();
+        let cause: Cause = match cause.into().downcast::<std::io::Error>() {
+            Ok(cause) if !is_of_name(&cause) => {
+                return Self::Disk { file: one_line(path.display().to_string()), cause: *cause };
+            }
+            Ok(cause) => cause,
+            Err(other) => other,
+        };
+        let remedy = "choose a folder that exists and may be written to";
+        Self::in_file(path, format!("cannot be written ({cause})"), remedy)
     }
 
     /// The same error with `context` (a file, a section of it) in front of its subject.
@@ -73,6 +85,16 @@ impl Error {
             other => other,
         }
     }
+}
+
+/// Whether a file could be written by another name.
+fn is_of_name(cause: &std::io::Error) -> bool {
+    use std::io::ErrorKind::*;
+    let is_missing = matches!(cause.kind(), NotFound | NotADirectory);
+    let is_taken = matches!(cause.kind(), AlreadyExists | IsADirectory | DirectoryNotEmpty);
+    is_missing
+        || is_taken
+        || matches!(cause.kind(), PermissionDenied | ReadOnlyFilesystem | InvalidFilename | InvalidInput)
 }
 
 /// Longest part of an error, in characters.

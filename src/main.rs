@@ -1,6 +1,6 @@
 //! Threadlight's command line: parse, call, exit code.
 //!
-//! Exit codes: 0 done; 1 the machine could not (Vulkan, memory, validation messages), or pictures differ by more than they may
+//! Exit codes: 0 done; 1 the machine could not (Vulkan, memory, a full disk, validation messages), or pictures differ by more than they may
 //! (`compare --at-most`); 2 the input was wrong;
 //! 130 cancelled by Ctrl-C. Whatever went wrong is one line on standard error.
 

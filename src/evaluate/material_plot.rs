@@ -28,7 +28,7 @@ pub fn svg(brdf: &Brdf, name: &str, path: &Path) -> Result<String> {
     {
         let sides = Side::of(brdf);
         let area = SVGBackend::with_string(&mut svg, (3 * SIDE_PX, sides.len() as u32 * SIDE_PX)).into_drawing_area();
-        draw(&area, &sides, name).map_err(|cause| Error::unwritable(path, cause))?;
+        draw(&area, &sides, name).map_err(|cause| Error::unwritable(path, cause.to_string()))?;
     }
     Ok(svg)
 }

@@ -112,7 +112,7 @@ pub fn write_exr(
     image.attributes.chromaticities =
         Some(Chromaticities { red: at(red), green: at(green), blue: at(blue), white: at(white) });
     let mut bytes = Cursor::new(Vec::new());
-    image.write().to_buffered(&mut bytes).map_err(|cause| Error::unwritable(path, cause))?;
+    image.write().to_buffered(&mut bytes).map_err(|cause| Error::unwritable(path, cause.to_string()))?;
     let mut bytes = bytes.into_inner();
     sort_attributes(&mut bytes);
     write_whole(path, &bytes)

@@ -1,6 +1,6 @@
 //! Files that are written whole or not at all, and what is swept up after writers that were killed.
-use std::fs::OpenOptions;
-use std::io::Write;
+use std::fs::{File, OpenOptions};
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -64,15 +64,26 @@ fn names_a_folder(path: &Path) -> bool {
 /// Writes `bytes` to `path`: into a temporary file in the same folder first, then renamed, so that whoever looks sees
 /// the old file or the whole new one, and a failure leaves nothing behind. Devices and pipes are written to as they are.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
-    let failed = |cause: std::io::Error| Error::unwritable(path, cause);
+    let failed = |cause: io::Error| Error::unwritable(path, cause);
     match target(path) {
         Target::Stream => OpenOptions::new().write(true).open(path).and_then(|mut stream| stream.write_all(bytes)),
         Target::File(file) => {
             let mut temporary = temporary_beside(path, &file)?;
-            temporary.write_all(bytes).and_then(|()| temporary.persist(&file).map(drop).map_err(|failed| failed.error))
+            // Errors of the file itself do not repeat the temporary file's name.
+            let written =
+                keep_permissions(temporary.as_file(), &file).and_then(|()| temporary.as_file_mut().write_all(bytes));
+            written.and_then(|()| temporary.persist(&file).map(drop).map_err(|failed| failed.error))
         }
     }
     .map_err(failed)
+}
+
+/// Gives the `new` file the permissions of the `old` one, whose place it takes, if there is one.
+fn keep_permissions(new: &File, old: &Path) -> io::Result<()> {
+    match old.metadata().map(|old| old.permissions()) {
+        Ok(permissions) if permissions != new.metadata()?.permissions() => new.set_permissions(permissions),
+        _ => Ok(()),
+    }
 }
 
 /// Removes what is no file from where a file of a cache is to be: an empty folder, a pipe, a link.
@@ -98,12 +109,19 @@ fn target(path: &Path) -> Target {
         Ok(metadata) if !metadata.is_file() && !metadata.is_dir() => Target::Stream,
         Ok(_) => Target::File(path.canonicalize().unwrap_or_else(|_| path.to_owned())),
         Err(_) => {
+            let path = linked(path);
             // Two names of one file that is not there yet differ in their folders.
-            let folder = folder_of(path).canonicalize().ok();
+            let folder = folder_of(&path).canonicalize().ok();
             let file = folder.zip(path.file_name()).map(|(folder, name)| folder.join(name));
-            Target::File(file.unwrap_or_else(|| path.to_owned()))
+            Target::File(file.unwrap_or(path))
         }
     }
+}
+
+/// Where `path` points to if it is a link to a file that is not there yet, over as many links as Linux follows; else itself.
+fn linked(path: &Path) -> PathBuf {
+    let next = |path: &PathBuf| path.read_link().ok().map(|link| folder_of(path).join(link));
+    std::iter::successors(Some(path.to_owned()), next).take(40).last().unwrap_or_default()
 }
 
 fn folder_of(file: &Path) -> &Path {
@@ -119,8 +137,10 @@ fn temporary_beside(path: &Path, file: &Path) -> Result<NamedTempFile> {
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
     let temporary = builder.tempfile_in(folder).map_err(|cause| {
-        // The temporary file's name, which the cause repeats, is of no use to the user.
-        Error::unwritable(path, cause.kind())
+        // The temporary file's name, with which the cause ends, is of no use to the user.
+        let text = cause.to_string();
+        let reason = text.split(" at path ").next().unwrap_or_default();
+        Error::unwritable(path, io::Error::new(cause.kind(), reason))
     })?;
     sweep(folder, &temporary);
     Ok(temporary)
@@ -146,7 +166,6 @@ fn sweep(folder: &Path, new: &NamedTempFile) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::fs::File;
 
     fn names(folder: &Path) -> Vec<String> {
         let entries = std::fs::read_dir(folder).unwrap();
@@ -195,6 +214,38 @@ mod tests {
         write_whole(&link, b"new").unwrap();
         assert!(link.is_symlink() && std::fs::read(&file).unwrap() == b"new");
         assert_eq!(names(&folder.path().join("below")), ["file"]);
+        // Also where nothing is there yet, over several links.
+        std::os::unix::fs::symlink("below/file", folder.path().join("second")).unwrap();
+        std::fs::remove_file(&file).unwrap();
+        std::fs::remove_file(&link).unwrap();
+        std::os::unix::fs::symlink("second", &link).unwrap();
+        write_whole(&link, b"newer").unwrap();
+        assert!(link.is_symlink() && std::fs::read(&file).unwrap() == b"newer");
+        assert!(check_all_writable(&[link, file]).is_err());
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_file_that_is_overwritten_keeps_its_permissions() {
+        use std::os::unix::fs::PermissionsExt;
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("file");
+        for mode in [0o600, 0o664, 0o444] {
+            std::fs::write(&path, "old").unwrap();
+            std::fs::set_permissions(&path, std::fs::Permissions::from_mode(mode)).unwrap();
+            write_whole(&path, b"new").unwrap();
+            assert_eq!(path.metadata().unwrap().permissions().mode() & 0o777, mode);
+            std::fs::remove_file(&path).unwrap();
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_written_is_told_in_the_words_of_the_system() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("absent/file");
+        let system = File::create(&path).unwrap_err();
+        let error = write_whole(&path, b"new").unwrap_err();
+        assert!(matches!(error, Error::Input { .. }) && error.to_string().contains(&format!("({system})")), "{error}");
     }
 
     #[cfg(target_os = "linux")]
@@ -207,8 +258,10 @@ mod tests {
             match path.ends_with("null") {
                 true => written.unwrap(),
                 false => {
-                    let error = written.unwrap_err().to_string();
-                    assert!(error.contains("/dev/full") && error.contains("No space left"), "{error}");
+                    let error = written.unwrap_err();
+                    let text = error.to_string();
+                    assert!(text.contains("/dev/full") && text.contains("No space left"), "{text}");
+                    assert!(matches!(error, Error::Disk { .. }) && text.contains("make room"), "{text}");
                 }
             }
         }
