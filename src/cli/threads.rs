@@ -2,7 +2,7 @@
 use super::progress::TerminalProgress;
 use super::scene_flags::subpixels;
 use super::{cache_folder, nameable, say, stem};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use threadlight::Error;
 use threadlight::low_level::memo::{Asked, Memo, Origin, Step};
 use threadlight::low_level::method::Method;
@@ -39,7 +39,7 @@ pub struct Threads {
     #[arg(long)]
     no_cache: bool,
     /// Thread file to write.
-    #[arg(short, long, value_name = "FILE")]
+    #[arg(short, long, value_name = "FILE.threads")]
     output: Option<PathBuf>,
     /// Picture of the threads to draw, as the paper's figures 7 and 8.
     #[arg(long, value_name = "FILE.png")]
@@ -56,7 +56,7 @@ impl Threads {
 
     pub fn run(self) -> anyhow::Result<()> {
         if self.output.is_none() && self.plot.is_none() {
-            let remedy = "name a thread file with -o FILE, or a picture with --plot FILE.png";
+            let remedy = "name a thread file with -o FILE.threads, or a picture with --plot FILE.png";
             return Err(Error::input("threads", "has nothing to write", remedy).into());
         }
         let kind = Method::from_name(&self.method)?.threads().ok_or_else(|| {
@@ -67,6 +67,7 @@ impl Threads {
             let remedy = format!("method \"{}\" has 1 to {}", kind.name(), kind.max_count());
             return Err(Error::input("--count", format!("{count} is out of range"), remedy).into());
         }
+        self.output.as_deref().map_or(Ok(()), check_threads)?;
         self.plot.as_deref().map_or(Ok(()), output::check_png)?;
         output::check_all_writable(self.output.iter().chain(&self.plot))?;
         let source = MaterialSource::named(&self.material);
@@ -105,4 +106,15 @@ impl Threads {
         }
         Ok(())
     }
+}
+
+/// An error unless the name at `path` is that of a thread file.
+fn check_threads(path: &Path) -> threadlight::Result<()> {
+    let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
+    let remedy = match extension.to_str() {
+        Some("threads") => return Ok(()),
+        Some("png" | "jpg" | "jpeg" | "svg" | "exr") => "draw a picture with --plot FILE.png",
+        _ => "end its name in .threads",
+    };
+    Err(Error::in_file(path, "is no thread file", remedy))
 }
