@@ -185,7 +185,13 @@ impl Variant {
         let fixed = name.strip_suffix(FIXED).map(Method::from_name).and_then(Result::ok);
         match fixed.filter(|method| method.has_pattern()) {
             Some(method) => Ok(Self { method, pattern: Pattern::Fixed }),
-            None => Method::from_name(name).map(Self::from),
+            None => Method::from_name(name).map(Self::from).map_err(|_| {
+                let fixed = Method::ALL.iter().filter(|method| method.has_pattern());
+                let fixed = fixed.map(|method| Self::new(*method, Pattern::Fixed));
+                let all = Method::ALL.iter().filter(|method| method.runs_on_gpu()).map(|method| Self::from(*method));
+                let known: Vec<_> = all.chain(fixed).map(Self::name).collect();
+                Error::input(format!("method \"{name}\""), "is not known", format!("use one of: {}", known.join(", ")))
+            }),
         }
     }
 }

@@ -67,6 +67,7 @@ impl CasesArguments {
             [] => defaults.methods.iter().copied().map(Variant::from).collect(),
             names => names.iter().map(|name| Variant::from_name(name)).collect::<Result<Vec<_>>>()?,
         };
+        once("--methods", methods.iter().map(|method| method.name()).collect())?;
         if methods.contains(&Method::Reference.into()) {
             let remedy = "name others; where errors are measured, it is what they are measured against";
             return Err(Error::input("--methods reference", "is the truth, not a method to measure", remedy));
@@ -77,7 +78,7 @@ impl CasesArguments {
         let scenes = named("--scene", &self.scene)?;
         let size = self.size.or(defaults.size);
         let cases = Cases {
-            methods: once("--methods", methods)?,
+            methods,
             counts: once("--counts", counts)?,
             materials: named_materials("--materials", materials)?,
             environments: named_environments("--environments", &self.environments)?,
