@@ -82,7 +82,7 @@ pub fn read(path: &Path) -> Result<Threads> {
 /// # Errors
 /// Not a thread file, of another version, damaged.
 pub fn parse(path: &Path, bytes: &[u8]) -> Result<Threads> {
-    decode(bytes).map_err(|problem| Error::in_file(path, problem, "generate it again"))
+    decode(bytes).map_err(|problem| Error::in_file(path, problem, "it is made again"))
 }
 
 fn encode(threads: &Threads) -> Vec<u8> {
