@@ -74,9 +74,16 @@ pub fn names() -> Vec<&'static str> {
 /// Fits each model that `name`, one of [`names`], stands for, with each of its choices, to `brdf`; the nearest is first.
 ///
 /// # Errors
-/// Another name.
+/// Another name; a BRDF that is anisotropic, or black.
 pub fn fit(brdf: &Brdf, name: &str) -> Result<Vec<Fit>> {
+    let refused = |problem, remedy| Err(Error::input("the BRDF", problem, remedy));
+    if !brdf.is_isotropic() {
+        return refused("is anisotropic, and would be fitted at one azimuth alone", "fit an isotropic material");
+    }
     let samples = samples(brdf);
+    if distance(&samples, |_| DVec3::ZERO) == 0.0 {
+        return refused("is black, and errors are told beside that of black", "fit a material that reflects light");
+    }
     let mut fits =
         candidates(name)?.into_iter().map(|candidate| candidate.fit(&samples)).collect::<Result<Vec<_>>>()?;
     fits.sort_by(|a, b| a.error.total_cmp(&b.error));
@@ -337,5 +344,13 @@ mod tests {
             }
         }
         assert!(fit(&Brdf::builtin("clay").unwrap(), "velvet").unwrap_err().to_string().contains("velvet"));
+    }
+
+    #[test]
+    fn what_no_fit_could_tell_of_is_refused() {
+        let black = Brdf::from_parameters("lambert", "reflectance = 0".parse().unwrap()).unwrap();
+        for (brdf, reason) in [(Brdf::builtin("silk").unwrap(), "anisotropic"), (black, "black")] {
+            assert!(fit(&brdf, "lambert").unwrap_err().to_string().contains(reason), "{reason}");
+        }
     }
 }

@@ -87,6 +87,16 @@ fn hostile_goniometric_files_are_refused() {
 }
 
 #[test]
+fn materials_that_have_no_table_and_no_nearest_model_are_refused() {
+    let folder = workplace();
+    fs::write(folder.path().join("black.toml"), "model = 'lambert'\nreflectance = 0").unwrap();
+    refuses(&folder, "materials export black.toml -o out/black.binary", &["black.toml", "nothing but zero"]);
+    refuses(&folder, "materials fit black.toml --model lambert -o out/fit.toml", &["black.toml", "is black"]);
+    refuses(&folder, "materials export silk -o out/silk.binary", &["silk", "anisotropic"]);
+    refuses(&folder, "materials fit silk --model ggx -o out/fit.toml", &["silk", "anisotropic"]);
+}
+
+#[test]
 fn hostile_material_descriptions_are_refused() {
     let folder = workplace();
     for (name, text, key) in [

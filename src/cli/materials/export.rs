@@ -4,10 +4,10 @@ use crate::cli::threads::Threads;
 use std::ffi::OsStr;
 use std::path::PathBuf;
 use threadlight::Error;
-use threadlight::low_level::brdf::merl_bytes;
+use threadlight::low_level::brdf::{MerlTable, merl_bytes};
 use threadlight::low_level::output;
 
-/// Writes the BRDF as a table of the MERL database's form, a `.binary` file of 35 MB, or its sample threads, a `.threads` file.
+/// Writes the BRDF, if it is isotropic, as a table of the MERL database's form, a `.binary` file of 35 MB, or its sample threads, a `.threads` file.
 ///
 /// Cells of the table are about a degree wide, finer towards the mirror direction: a GGX lobe of roughness 0.03 comes back with an error below
 /// 1 %, one of 0.01 with 2 %. Threads are as `threadlight threads` makes them, which has flags for their number and kind.
@@ -42,6 +42,15 @@ impl Export {
             )
             .into());
         }
-        Ok(output::write_whole(&self.output, &merl_bytes(&brdf))?)
+        let table = merl_bytes(&brdf);
+        // What is written can be read again: black could not.
+        MerlTable::from_bytes(&table).map_err(|problem| {
+            Error::input(
+                self.named.material,
+                format!("as such a table {problem}"),
+                "export a material that reflects light",
+            )
+        })?;
+        Ok(output::write_whole(&self.output, &table)?)
     }
 }

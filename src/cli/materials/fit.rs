@@ -7,7 +7,7 @@ use threadlight::low_level::brdf::Brdf;
 use threadlight::low_level::evaluate::material_fit::{fit, names};
 use threadlight::low_level::output;
 
-/// Writes the parameters of a model that are nearest to the BRDF, as a material file, and how near they are.
+/// Writes the parameters of a model that are nearest to the BRDF, which is isotropic, as a material file, and how near they are.
 ///
 /// The error is the RMS of the difference of ln(1 + f cos theta_i) at view angles up to 75 degrees (Löw et al. 2012), beside the same of a black
 /// surface. `ggx` and `beckmann` stand for `conductor` and `plastic` of that distribution, whichever is nearer; `layered` is a diffuse base
@@ -31,7 +31,7 @@ impl Fit {
         }
         output::check_writable(&self.output)?;
         self.named.check_is_not(&self.output)?;
-        let fits = fit(&*self.named.load()?, &self.model)?;
+        let fits = fit(&*self.named.load()?, &self.model).map_err(|error| error.within(&self.named.material))?;
         let name = stem(Path::new(&self.named.material));
         // There is at least one.
         let text = fits.first().map(|nearest| nearest.to_toml(&name)).unwrap_or_default();
