@@ -134,13 +134,11 @@ impl Render {
     ) -> anyhow::Result<Rendered> {
         let progress = TerminalProgress::new("threads")?;
         let round = memo.round(&progress);
-        let (prepared, expected_rms) = match self.error {
-            Some(most) => {
-                let (prepared, rms) = prepare_within(scene, most, device, &round)?;
-                (prepared, Some(rms))
-            }
-            None => (prepare(scene, &round)?, None),
+        let prepared = match self.error {
+            Some(most) => prepare_within(scene, most, device, &round).map(|(prepared, rms)| (prepared, Some(rms))),
+            None => prepare(scene, &round).map(|prepared| (prepared, None)),
         };
+        let (prepared, expected_rms) = prepared.map_err(|error| self.scene.in_file(error))?;
         if let Some(rms) = expected_rms {
             say(format_args!("{} threads or samples: expected RMS {rms:.1e}", prepared.sampling.count));
         }

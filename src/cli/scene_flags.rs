@@ -4,6 +4,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, RangedI64ValueParser, T
 use clap::value_parser;
 use std::path::PathBuf;
 use std::sync::Arc;
+use threadlight::Error;
 use threadlight::low_level::environment;
 use threadlight::low_level::method::Method;
 use threadlight::low_level::scene::{
@@ -114,6 +115,18 @@ impl SceneFlags {
         lay(&self.background, &mut scene.image.background);
         lay(&self.rotation, &mut scene.environment.rotation_deg);
         Ok(scene)
+    }
+
+    /// `error` of the scene, with the name of its file in front unless a flag is at fault.
+    pub fn in_file(&self, error: Error) -> Error {
+        let Error::Input { subject, .. } = &error else { return error };
+        let named = [&self.material, &self.mesh, &self.environment];
+        let is_of_flag = named.into_iter().flatten().any(|name| subject.contains(name.as_str()))
+            || (subject == "threads" && self.threads.is_some());
+        match &self.scene {
+            Some(path) if !is_of_flag => error.within(path.display()),
+            _ => error,
+        }
     }
 
     /// All files that are read for `scene`, which is what these flags name.

@@ -36,7 +36,7 @@ const TANGENT_OF_MESH: f32 = 3.0;
 pub struct DeviceMesh {
     triangles: Triangles,
     /// Bounding sphere in object space: centre and radius.
-    sphere: (Vec3, f32),
+    sphere: (DVec3, f64),
     /// The smallest and largest coordinates there.
     bounds: (Vec3, Vec3),
 }
@@ -79,10 +79,10 @@ pub struct PlacedMesh {
 
 impl PlacedMesh {
     /// Centre and radius of a sphere in world space that holds what the sphere around `center` in object space does.
-    pub fn placed_sphere(&self, (center, radius): (Vec3, f32)) -> (DVec3, f64) {
+    pub fn placed_sphere(&self, (center, radius): (DVec3, f64)) -> (DVec3, f64) {
         let m = self.to_world.matrix3;
         let scale = m.x_axis.length().max(m.y_axis.length()).max(m.z_axis.length());
-        (self.to_world.transform_point3(center.as_dvec3()), scale * f64::from(radius))
+        (self.to_world.transform_point3(center), scale * radius)
     }
 }
 

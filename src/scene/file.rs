@@ -64,6 +64,7 @@ struct ObjectKeys {
     rotate_deg: [f32; 3],
     #[serde(default = "one_f32", deserialize_with = "scale")]
     scale: f32,
+    #[serde(default, deserialize_with = "tangent")]
     tangent: Option<TangentRule>,
 }
 
@@ -287,11 +288,11 @@ fn one_f32() -> f32 {
 fn checked<'de, D, T>(deserializer: D, range: impl RangeBounds<T>, what: &str) -> Result<T, D::Error>
 where
     D: Deserializer<'de>,
-    T: Deserialize<'de> + PartialOrd + std::fmt::Display,
+    T: Deserialize<'de> + PartialOrd + std::fmt::Debug,
 {
     let value = T::deserialize(deserializer)?;
     // No range holds NaN.
-    if range.contains(&value) { Ok(value) } else { Err(D::Error::custom(format!("{value} must be {what}"))) }
+    if range.contains(&value) { Ok(value) } else { Err(D::Error::custom(format!("{value:?} must be {what}"))) }
 }
 
 /// An integer in `range`: read as wide as TOML has them, so that -1 and 10^12 get the same message as 0.
@@ -317,17 +318,17 @@ pub(super) fn threads<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Opti
 
 /// Factor of radiance before display.
 pub(super) fn exposure<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
-    checked(deserializer, EXPOSURE, "finite and not negative")
+    checked(deserializer, EXPOSURE, "a finite number from 0 to 3.4e38")
 }
 
 /// Exponent of the display.
 pub(super) fn gamma<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
-    checked(deserializer, GAMMA, "finite and above 0")
+    checked(deserializer, GAMMA, "a finite number above 0: 1.2e-38 to 3.4e38")
 }
 
 /// Factor of the environment's radiance.
 fn intensity<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
-    checked(deserializer, INTENSITY, "finite and not negative")
+    checked(deserializer, INTENSITY, "a finite number from 0 to 3.4e38")
 }
 
 fn finite<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
@@ -337,6 +338,15 @@ fn finite<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
 fn scale<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f32, D::Error> {
     let scale = checked(deserializer, f32::MIN..=f32::MAX, "finite")?;
     if scale == 0.0 { Err(D::Error::custom("0 must not be the scale")) } else { Ok(scale) }
+}
+
+/// A rule of tangents: of its table there is one key.
+fn tangent<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<TangentRule>, D::Error> {
+    let rule = toml::Value::deserialize(deserializer)?;
+    if rule.as_table().is_some_and(|table| table.len() != 1) {
+        return Err(D::Error::custom("give `around` or `along`"));
+    }
+    TangentRule::deserialize(rule).map(Some).map_err(|error| D::Error::custom(error.message()))
 }
 
 fn finite_vector<'de, D: Deserializer<'de>>(deserializer: D) -> Result<[f32; 3], D::Error> {

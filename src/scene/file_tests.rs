@@ -208,6 +208,13 @@ fn bad_values_are_errors_that_name_the_key_and_its_line() {
         ("[environment]\nfile = 'x'\nbuiltin = 'y'", "builtin", "line 1"),
         ("[shading]\nthreads = 0", "threads", "line 2"),
         ("[[object]]\nbuiltin = 'sphere'\ntangent = 'up'", "`uv`", "line 3"),
+        (
+            "[[object]]\nbuiltin = 'sphere'\ntangent = { around = [0, 1, 0], along = [0, 1, 0] }",
+            "give `around` or `along`",
+            "line 3",
+        ),
+        ("[[object]]\nbuiltin = 'sphere'\ntangent = {}", "give `around` or `along`", "line 3"),
+        ("[image]\nexposure = 1e39", "1e39 must be a finite number from 0 to 3.4e38", "line 2"),
         ("[[object]]\nbuiltin = 'sphere'\ntangent = { along = [0, 0, 0] }", "tangent", "line 3"),
         ("[shading]\nthreads = 10001", "threads", "line 2"),
         ("[shading]\nseed = -1", "seed", "line 2"),

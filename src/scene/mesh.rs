@@ -129,10 +129,10 @@ impl Mesh {
     }
 
     /// Centre and radius of a sphere that holds the mesh: around the middle of its bounds, so not always the smallest.
-    pub fn bounding_sphere(&self) -> (Vec3, f32) {
+    pub fn bounding_sphere(&self) -> (DVec3, f64) {
         let (low, high) = self.bounds();
-        let centre = low.midpoint(high);
-        (centre, self.positions.iter().map(|position| position.distance(centre)).fold(0.0, f32::max))
+        let centre = low.as_dvec3().midpoint(high.as_dvec3());
+        (centre, self.positions.iter().map(|position| position.as_dvec3().distance(centre)).fold(0.0, f64::max))
     }
 }
 
@@ -218,7 +218,7 @@ mod tests {
         assert_eq!((cube.indices.len(), cube.positions.len()), (36, 8));
         assert!((area(&cube) - 24.0).abs() < 1e-5);
         assert_eq!(cube.bounds(), (Vec3::NEG_ONE, Vec3::ONE));
-        assert_eq!(cube.bounding_sphere(), (Vec3::ZERO, 3f32.sqrt()));
+        assert_eq!(cube.bounding_sphere(), (DVec3::ZERO, 3f64.sqrt()));
         let octagon: String = (0..8)
             .map(|i| (f32::from(i as u8) * std::f32::consts::FRAC_PI_4).sin_cos())
             .map(|(y, x)| format!("v {x} {y} 0\n"))
@@ -299,17 +299,17 @@ mod tests {
     fn hostile_files_are_errors_that_name_the_file() {
         let triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\n";
         for (text, what) in [
-            (format!("{triangle}f 1 2 4"), "vertex index out of bounds"),
-            (format!("{triangle}f 1 2 0"), "vertex index out of bounds"),
-            (format!("{triangle}f 1 2 -4"), "vertex index out of bounds"),
-            (format!("{triangle}f 1 2 -9223372036854775808"), "vertex index out of bounds"),
-            (format!("{triangle}f 1 2 9223372036854775807"), "vertex index out of bounds"),
-            (format!("{triangle}f 1 2 4294967299"), "vertex index out of bounds"),
-            (format!("{triangle}f 1 2 //1"), "vertex index out of bounds"),
-            (format!("{triangle}f 9"), "vertex index out of bounds"),
-            (format!("{triangle}f 1 9"), "vertex index out of bounds"),
-            (format!("{triangle}f 1 2 99999999999999999999"), "face parse error"),
-            (format!("{triangle}f 1 2 x"), "face parse error"),
+            (format!("{triangle}f 1 2 4"), "line 5: there is no vertex 4"),
+            (format!("{triangle}f 1 2 0"), "line 5: there is no vertex 0"),
+            (format!("{triangle}f 1 2 -4"), "line 5: there is no vertex -4"),
+            (format!("{triangle}f 1 2 -9223372036854775808"), "line 5: there is no vertex -9223372036854775808"),
+            (format!("{triangle}f 1 2 9223372036854775807"), "line 5: there is no vertex 9223372036854775807"),
+            (format!("{triangle}f 1 2 4294967299"), "line 5: there is no vertex 4294967299"),
+            (format!("{triangle}f 1 2 //1"), "line 5: there is no vertex in //1"),
+            (format!("{triangle}f 9"), "line 5: there is no vertex 9"),
+            (format!("{triangle}f 1 9"), "line 5: there is no vertex 9"),
+            (format!("{triangle}f 1 2 99999999999999999999"), "no vertex 99999999999999999999"),
+            (format!("{triangle}f 1 2 x"), "no vertex x"),
             (format!("{triangle}f 1//1 2//2 3"), "line 5: there is no normal 2"),
             (format!("{triangle}f 1//0 2 3"), "line 5: there is no normal 0"),
             (format!("{triangle}f 1//-2 2 3\nvn 0 0 1"), "line 5: there is no normal -2"),
@@ -317,9 +317,9 @@ mod tests {
             (format!("{triangle}f 1//99999999999999999999 2 3"), "no normal 99999999999999999999"),
             (format!("{triangle}f 1/1/x 2 3"), "no normal x"),
             (format!("{triangle}f"), "face without corners"),
-            (format!("{triangle}v 1 2"), "position parse error"),
-            (format!("{triangle}v 1 2 x"), "position parse error"),
-            (format!("{triangle}vn 1 2"), "normal parse error"),
+            (format!("{triangle}v 1 2"), "line 5: position parse error"),
+            (format!("{triangle}v 1 2 x"), "line 5: position parse error"),
+            (format!("{triangle}vn 1 2"), "line 5: normal parse error"),
             (format!("{triangle}v 1 2 nan\nf 1 2 4"), "not finite"),
             (format!("{triangle}v 1 2 1e99\nf 1 2 4"), "not finite"),
             (format!("{triangle}f 1 1 1"), "no triangle"),

@@ -116,7 +116,10 @@ fn read_obj(text: &str, is_textured: bool) -> Result<Obj, String> {
     let options = tobj::LoadOptions::default();
     let no_materials = |_: &Path| Ok(Default::default());
     let (models, _) = tobj::load_obj_buf(&mut lines.as_bytes(), &options, no_materials)
-        .map_err(|cause| format!("is not a sound OBJ: {cause}"))?;
+        .map_err(|cause| {
+            let line = text.lines().position(lacks_numbers).map_or(String::new(), |index| format!("line {}: ", index + 1));
+            format!("is not a sound OBJ: {line}{cause}")
+        })?;
     // Without o, g and usemtl there is one model.
     let mesh = models.into_iter().next().map(|model| model.mesh).unwrap_or_default();
     if mesh.face_arities.contains(&0) {
@@ -128,6 +131,12 @@ fn read_obj(text: &str, is_textured: bool) -> Result<Obj, String> {
     }
 }
 
+/// Whether this is a position or normal without three numbers.
+fn lacks_numbers(line: &str) -> bool {
+    let mut words = line.split_ascii_whitespace();
+    matches!(words.next(), Some("v" | "vn")) && words.take(3).filter(|word| word.parse::<f32>().is_ok()).count() < 3
+}
+
 /// The lines of an OBJ that are the mesh, such that tobj reads them right: of `v` the coordinates, `vn`, and `f` with its
 /// corners as `position//normal`; if `is_textured` also `vt` with two coordinates, and corners as `position/vt/normal`.
 /// What `s` says comes beside them, for each face.
@@ -135,17 +144,24 @@ fn read_obj(text: &str, is_textured: bool) -> Result<Obj, String> {
 /// The rest goes since tobj takes polylines (`l`) for faces, wants colours for all vertices or none, and begins a new mesh at
 /// every group and material, whose vertices then are no longer shared. Corners without a normal get one of length 0,
 /// the last in the file, as from tobj they would get that of the corner before; those without texture coordinates get NaN in the same way.
-/// Indices of both are checked here: unlike those of positions, tobj takes 0 for none, and multiplies absurd ones until they overflow.
+/// Indices are checked here: errors then name the line, and of normals and texture coordinates tobj takes 0 for none, and multiplies absurd
+/// ones until they overflow.
 fn geometry_lines(text: &str, is_textured: bool) -> Result<(String, Vec<SmoothingGroup>), String> {
     let count_of = |keyword: &str| {
         let is_one = |line: &&str| line.split_ascii_whitespace().next() == Some(keyword);
         text.lines().filter(is_one).count() as i64
     };
-    let (normals, uvs) = (count_of("vn"), count_of("vt"));
-    // Adds the corner `word`, with so many normals and texture coordinates before it, to `lines`; the error is what there is not.
-    let corner = |lines: &mut String, word: &str, [normals_before, uvs_before]: [i64; 2]| -> Result<(), String> {
+    let [positions, normals, uvs] = ["v", "vn", "vt"].map(count_of);
+    // Adds the corner `word`, with so many positions, normals and texture coordinates before it, to `lines`; the error is what there is not.
+    let corner = |lines: &mut String, word: &str, before: [i64; 3]| -> Result<(), String> {
+        let [positions_before, normals_before, uvs_before] = before;
         let mut numbers = word.split('/');
         let [position, uv, normal] = [(); 3].map(|()| numbers.next().unwrap_or_default());
+        if position.is_empty() {
+            return Err(format!("vertex in {word}"));
+        }
+        let position =
+            index_among(position, positions, positions_before).map_err(|number| format!("vertex {number}"))?;
         let normal = index_among(normal, normals, normals_before).map_err(|number| format!("normal {number}"))?;
         // Writing to a string cannot fail.
         let _ = if is_textured {
@@ -156,7 +172,7 @@ fn geometry_lines(text: &str, is_textured: bool) -> Result<(String, Vec<Smoothin
         };
         Ok(())
     };
-    let (mut lines, mut normals_before, mut uvs_before) = (String::with_capacity(text.len()), 0, 0);
+    let (mut lines, mut before) = (String::with_capacity(text.len()), [0; 3]);
     let (mut groups, mut group) = (Vec::new(), SmoothingGroup::Unsaid);
     for (index, line) in text.lines().enumerate() {
         let mut words = line.split_ascii_whitespace();
@@ -171,13 +187,14 @@ fn geometry_lines(text: &str, is_textured: bool) -> Result<(String, Vec<Smoothin
             continue;
         }
         lines += keyword;
-        normals_before += i64::from(keyword == "vn");
-        uvs_before += i64::from(keyword == "vt");
+        for (count, counted) in before.iter_mut().zip(["v", "vn", "vt"]) {
+            *count += i64::from(keyword == counted);
+        }
         if keyword == "f" {
             let is_flat = group == SmoothingGroup::Numbered(0);
             groups.push(if is_flat { SmoothingGroup::Flat(groups.len() as u32) } else { group });
             for word in words {
-                corner(&mut lines, word, [normals_before, uvs_before])
+                corner(&mut lines, word, before)
                     .map_err(|what| format!("line {}: there is no {what}", index + 1))?;
             }
         } else if keyword == "vt" {

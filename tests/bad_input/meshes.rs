@@ -23,10 +23,18 @@ fn hostile_meshes_are_refused() {
         ("short.obj", format!("{triangle}v 1 2\nf 1 2 3\n")),
         ("words.obj", format!("{triangle}v one two three\nf 1 2 3\n")),
         ("huge.obj", "v 1e38 1e38 0\nv -1e38 0 3e38\nv 0 1e38 1e38\nf 1 2 3\n".into()),
+        ("distant.obj", "v 1e20 0 0\nv 0 0 0\nv 0 1e20 0\nf 1 2 3\n".into()),
         ("mesh.ply", "ply\n".into()),
     ] {
         fs::write(folder.path().join(name), text).unwrap();
         refuses(&folder, &render(&format!("--mesh {name}")), &[name]);
+    }
+    for (name, reason) in [
+        ("beyond.obj", "line 5: there is no vertex 4"),
+        ("words.obj", "line 5: position parse error"),
+        ("distant.obj", "is 1.41e20 in size and reaches 1.41e20"),
+    ] {
+        refuses(&folder, &render(&format!("--mesh {name}")), &[name, reason]);
     }
     for (name, mark) in [("little_endian.obj", [0xff, 0xfe]), ("big_endian.obj", [0xfe, 0xff])] {
         fs::write(folder.path().join(name), [&mark[..], b"v\0"].concat()).unwrap();

@@ -56,7 +56,11 @@ fn hostile_scene_files_are_refused() {
         ("[[object]]\nbuiltin = 'spher'", &["bad.toml", "line 1", "sphere"]),
         ("[[material]]\nname = 'm'\nbuiltin = 'golld'", &["bad.toml", "line 1", "gold"]),
         ("[shading]\nmethod = 'fited'", &["bad.toml", "fitted"]),
-        ("[[material]]\nname = 'm'\nmodel = 'lambert'\nreflectence = 1", &["rename `reflectence`"]),
+        (
+            "[[material]]\nname = 'm'\nmodel = 'lambert'\nreflectence = 1",
+            &["bad.toml: material \"m\": ", "rename `reflectence`"],
+        ),
+        ("[shading]\nthreads = 1025", &["bad.toml: threads: are 1025"]),
     ] {
         fs::write(folder.path().join("bad.toml"), text).unwrap();
         refuses(&folder, "render bad.toml -o out/image.png", words);
