@@ -81,12 +81,12 @@ fn none_of(messages: &[String]) -> anyhow::Result<()> {
     }
 }
 
-/// What is wrong with the command line, on one line: clap's error and its tips, without the usage.
+/// What is wrong with the command line, on one line: clap's error and its tips, without the usage and what helps with no value here.
 pub fn mistake(error: &clap::Error) -> String {
     let text = error.to_string();
     let paragraphs = text.trim_start_matches("error: ").split("\n\n");
-    let of_use =
-        paragraphs.filter(|paragraph| !["Usage:", "For more"].iter().any(|start| paragraph.starts_with(start)));
+    let of_use = paragraphs
+        .filter(|paragraph| !["Usage:", "For more", "  tip: to pass"].iter().any(|start| paragraph.starts_with(start)));
     let lines = of_use.map(|paragraph| paragraph.split_whitespace().collect::<Vec<_>>().join(" "));
     lines.collect::<Vec<_>>().join("; ") + "; see --help"
 }

@@ -35,7 +35,7 @@ pub struct SceneFlags {
     #[arg(long, value_name = "S", value_parser = subpixels())]
     pub subpixels: Option<u32>,
     /// Size of the picture in pixels, each side 1 to 16384.
-    #[arg(long, value_name = "WxH", value_parser = parse_size)]
+    #[arg(long, value_name = "WxH", value_parser = parse_size, allow_hyphen_values = true)]
     pub size: Option<(u32, u32)>,
     /// Factor on radiance before display.
     #[arg(long, value_name = "X", value_parser = number(EXPOSURE, "a finite number from 0 to 3.4e38"))]

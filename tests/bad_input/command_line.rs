@@ -14,6 +14,7 @@ fn numbers_out_of_range_name_the_flag_and_the_range() {
         ("--size", "640", "640x480"),
         ("--size", "640x", "640x480"),
         ("--size", "16385x1", "1 to 16384"),
+        ("--size", "-1x5", "640x480"),
         ("--subpixels", "0", "1..=4"),
         ("--subpixels", "5", "1..=4"),
         ("--exposure", "NaN", "finite"),
@@ -70,6 +71,7 @@ fn unknown_names_are_told_with_the_known_ones() {
     refuses(&folder, "completions abacus", &["abacus", "bash"]);
     refuses(&folder, "rendre", &["rendre", "render"]);
     refuses(&folder, &render("--treads 4"), &["--treads", "--threads"]);
+    refuses(&folder, "threads gold -1", &["unexpected argument '-1' found; see --help"]);
 }
 
 #[test]

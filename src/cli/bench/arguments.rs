@@ -36,7 +36,7 @@ pub struct CasesArguments {
     #[arg(long, help = nameable::scenes("Scenes, each a mesh"), value_name = "LIST", value_delimiter = ',', default_value = "sphere")]
     scene: Vec<String>,
     /// Size of the pictures in pixels, each side 11 to 16384.
-    #[arg(long, value_name = "WxH", value_parser = parse_size)]
+    #[arg(long, value_name = "WxH", value_parser = parse_size, allow_hyphen_values = true)]
     size: Option<(u32, u32)>,
     /// Sub-pixels per axis, 1 to 4; without it, the scene's.
     #[arg(long, value_name = "S", value_parser = value_parser!(u32).range(1..=i64::from(MAX_SUBPIXELS)))]

@@ -40,7 +40,7 @@ pub struct BenchTogether {
     #[arg(long, value_name = "N", default_value_t = 16, value_parser = value_parser!(u32).range(1..=MAX_COUNT as i64))]
     threads: u32,
     /// Size of the picture in pixels, each side 1 to 16384.
-    #[arg(long, value_name = "WxH", value_parser = parse_size, default_value = "640x480")]
+    #[arg(long, value_name = "WxH", value_parser = parse_size, allow_hyphen_values = true, default_value = "640x480")]
     size: (u32, u32),
     /// Render each picture this often; times are medians.
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = value_parser!(u32).range(1..))]
