@@ -226,6 +226,19 @@ fn a_dragged_parameter_is_seen_by_drafts_and_ends_as_if_it_had_never_been_dragge
 }
 
 #[test]
+fn a_picture_that_is_saved_while_it_is_a_draft_is_that_of_the_scene_that_is_saved_with_it() {
+    let Some(viewer) = Viewer::new() else { return };
+    let replay = r#""wait"
+        {"set": {"parameter": {"material": "gold", "key": "alpha", "value": 0.31}}}
+        {"save_picture": "saved.png"}
+        {"save_scene": "scene.toml"}
+        "quit""#;
+    viewer.play(&[&SMALL[..], &["--threads", "4", "--no-cache"]].concat(), replay).expect_success();
+    viewer.render("scene.toml", "again.png");
+    assert!(std::fs::read(viewer.path("again.png")).unwrap() == std::fs::read(viewer.path("saved.png")).unwrap());
+}
+
+#[test]
 fn a_broken_file_is_told_and_changes_nothing() {
     let Some(viewer) = Viewer::new() else { return };
     viewer.write("broken.binary", b"not a table");

@@ -163,12 +163,16 @@ fn of_two_materials_that_are_edited_in_turn_each_keeps_its_threads() {
     let folder = tempfile::tempdir().unwrap();
     let [early, late] = ["early.png", "late.png"].map(|name| folder.path().join(name));
     viewer.handle(&Input::SavePicture(early.clone()));
+    assert!(!early.exists() && viewer.notice.as_ref().is_some_and(|notice| notice.text.contains("when its threads")));
+    // It is as it was wanted then.
+    viewer.handle(&Input::Set(Change::Exposure(3.0)));
     viewer.frame_was_drawn();
     wait(&mut viewer);
     let expected = common::ready(&scene(0.25, 0.31));
     let loaded = viewer.loaded().unwrap();
     assert!(!loaded.is_draft());
     assert!(threads_of(&loaded.prepared) == threads_of(&expected));
+    viewer.handle(&Input::Set(Change::Exposure(1.0)));
     viewer.handle(&Input::SavePicture(late.clone()));
     assert!(std::fs::read(early).unwrap() == std::fs::read(late).unwrap());
     drop(viewer);
@@ -195,6 +199,30 @@ fn a_draft_is_finished_though_something_else_cannot_be_loaded_meanwhile() {
     wait(&mut viewer);
     assert!(viewer.notice.as_ref().is_some_and(|notice| notice.is_error));
     assert!(!viewer.loaded().unwrap().is_draft() && (red(&viewer) - 0.75).abs() < 1e-9);
+    drop(viewer);
+    gpu.finish();
+}
+
+#[test]
+fn a_picture_that_is_to_be_saved_and_changed_before_it_is_finished_is_told() {
+    let gpu = Validated::new();
+    let folder = tempfile::tempdir().unwrap();
+    let [scene, first, second] = ["s.toml", "first.png", "second.png"].map(|name| folder.path().join(name));
+    let mut viewer = Viewer::new(quick(), &gpu.device, Memo::default(), || ());
+    viewer.handle(&Input::SavePicture(first.clone()));
+    viewer.handle(&Input::Set(Change::Threads(Some(3))));
+    // Picture and scene are of the same.
+    viewer.handle(&Input::SavePicture(second.clone()));
+    viewer.handle(&Input::SaveScene(scene.clone()));
+    wait(&mut viewer);
+    assert!(viewer.failures.len() == 1 && viewer.failures[0].contains("first.png"), "{:?}", viewer.failures);
+    assert!(!first.exists() && second.exists());
+    assert_eq!(Scene::load(&scene).unwrap().shading.threads, Some(3));
+    // Nor is there a picture of what cannot be loaded.
+    viewer.handle(&Input::Set(Change::Mesh(Source::File("absent.obj".into()))));
+    viewer.handle(&Input::SavePicture(first.clone()));
+    wait(&mut viewer);
+    assert!(viewer.failures.len() == 3 && viewer.failures[1].contains("first.png") && !first.exists());
     drop(viewer);
     gpu.finish();
 }

@@ -2,7 +2,7 @@
 use super::change::Change;
 use super::comparison::{Other, compare_with};
 use super::input::Input;
-use super::interaction::Viewer;
+use super::interaction::{UnsavedPicture, Viewer};
 use super::latency::{Answer, Latency, Record, Stats};
 use super::loaded::Loaded;
 use super::presenter::{Drawn, Extras, Presenter, SHADE, ShownPicture};
@@ -10,7 +10,7 @@ use crate::output::{self, Format};
 use crate::passes::{Area, View};
 use crate::pipeline::{Wanted, check_size};
 use crate::prepare::view_of;
-use crate::scene::Background;
+use crate::scene::{Background, Scene};
 use crate::vulkan::UiFrame;
 use crate::{Error, Result};
 use egui::TexturesDelta;
@@ -196,21 +196,52 @@ impl Viewer {
         Ok(view)
     }
 
-    /// Saves what is shown, as `threadlight render` would make it.
+    /// Saves the picture of what is wanted, as `threadlight render` would make it: now, or when its threads are finished.
     pub(super) fn save_picture(&mut self, path: &Path) -> Result<()> {
-        let format = Format::of(path)?;
+        Format::of(path)?;
         output::check_writable(path)?;
-        let Some(loaded) = self.loaded.clone() else {
-            return Err(Error::input("the picture", "has not been loaded yet", "wait until it is shown"));
-        };
-        let loaded = if loaded.is_draft() { self.finished(&loaded)? } else { loaded };
+        let (path, scene) = (path.to_owned(), self.session.wanted().clone());
+        self.to_save.push(UnsavedPicture { path, scene, key: self.wanted });
+        self.save_finished(self.is_loading() || self.request_after_frame);
+        if let Some(UnsavedPicture { path, .. }) = self.to_save.last() {
+            self.tell(format!("{} is saved when its threads are finished", path.display()));
+        }
+        Ok(())
+    }
+
+    /// Saves the pictures that are finished. Those that never will be are told: only what is wanted, and only if that `is_coming`.
+    pub(super) fn save_finished(&mut self, is_coming: bool) {
+        let loaded = self.loaded.clone().filter(|loaded| !loaded.is_draft());
+        for unsaved in std::mem::take(&mut self.to_save) {
+            let UnsavedPicture { path, scene, key } = &unsaved;
+            let result = match &loaded {
+                Some(loaded) if key.is_some() && loaded.key == *key => self.save_as(path, scene, loaded),
+                _ if is_coming && *key == self.wanted => {
+                    self.to_save.push(unsaved);
+                    continue;
+                }
+                _ => {
+                    let problem =
+                        "is not saved: the scene was changed, or could not be made, before its threads were finished";
+                    Err(Error::input(path.display(), problem, "save it again"))
+                }
+            };
+            if let Err(error) = result {
+                self.tell_error(&error);
+            }
+        }
+    }
+
+    /// Saves what was `loaded`, looked at as `scene` says.
+    fn save_as(&mut self, path: &Path, scene: &Scene, loaded: &Loaded) -> Result<()> {
+        let format = Format::of(path)?;
         let mut renderer = (*loaded.renderer).clone();
-        renderer.view = self.view(&loaded)?;
+        renderer.view = view_of(scene, loaded.prepared.bounding_sphere())?;
         check_size(&self.device, &renderer.view)?;
         let wanted = Wanted { radiance: format == Format::Exr, display: format == Format::Png, geometry: false };
         let rendering = renderer.render(wanted, 1)?;
         let (width, height) = (renderer.view.width, renderer.view.height);
-        let alpha = self.session.shown().image.background == Background::None;
+        let alpha = scene.image.background == Background::None;
         match format {
             Format::Png => output::write_png(path, width, height, &rendering.display, alpha)?,
             Format::Exr => {

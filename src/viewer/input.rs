@@ -20,7 +20,7 @@
 //! | `{"heat_map": true}` | shows where the two differ in the place of the other picture, or no longer |
 //! | `"undo"`, `"redo"` | takes back what was last set or dropped, and does it again; the camera stays where it is |
 //! | `"wait"` | waits until all background work is done and its frame drawn; an error after `--replay-limit` seconds |
-//! | `{"save_picture": "x.png"}`, `{"save_scene": "x.toml"}` | saves |
+//! | `{"save_picture": "x.png"}`, `{"save_scene": "x.toml"}` | saves; a picture is waited for until its threads are finished, as `"wait"` does |
 //! | `"quit"` | closes the window |
 //!
 //! Paths are relative to the folder of the replay file. A setting is named as in `{"set": {"material": {"builtin": "silver"}}}`,
@@ -73,7 +73,7 @@ pub enum Input {
     Redo,
     /// Go on when all background work is done and has been drawn.
     Wait,
-    /// Save the picture that is shown.
+    /// Save the picture, once its threads are finished.
     SavePicture(PathBuf),
     /// Save the scene.
     SaveScene(PathBuf),

@@ -21,7 +21,7 @@ use crate::scene::{Background, Scene};
 use crate::vulkan::Device;
 use crate::{Error, Result};
 use glam::DVec2;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -32,6 +32,15 @@ pub struct Notice {
     pub text: String,
     /// Whether it is that something could not be done.
     pub is_error: bool,
+}
+
+/// A picture that is to be saved.
+pub(super) struct UnsavedPicture {
+    pub(super) path: PathBuf,
+    /// What was wanted when that was asked for.
+    pub(super) scene: Scene,
+    /// What it is made of: [`Viewer::wanted`].
+    pub(super) key: Option<Key>,
 }
 
 /// The viewer.
@@ -70,6 +79,8 @@ pub struct Viewer {
     pub(super) drafting_since: Option<Instant>,
     /// Whether more may be wanted than the draft that the next frame shows. It is asked for then: making it now would hold that frame up.
     pub(super) request_after_frame: bool,
+    /// Pictures that are to be saved when their threads are finished.
+    pub(super) to_save: Vec<UnsavedPicture>,
     /// How long inputs wait to be seen.
     pub latency: Latency,
     /// Number of the latest change.
@@ -117,6 +128,7 @@ impl Viewer {
             requested: None,
             drafting_since: None,
             request_after_frame: false,
+            to_save: Vec::new(),
             latency: Latency::keeping(100),
             changes: 0,
             record: Record::default(),
@@ -303,7 +315,7 @@ impl Viewer {
         self.tell(format!("saved {}", path.display()));
     }
 
-    fn tell(&mut self, text: String) {
+    pub(super) fn tell(&mut self, text: String) {
         tracing::info!("{text}");
         self.notice = Some(Notice { text, is_error: false });
     }

@@ -11,7 +11,6 @@ use crate::prepare::{Prepared, can_draft, key_of, may_be_drafted, prepare, prepa
 use crate::progress::Observer;
 use crate::steps::{LoadEnvironment, LoadMaterial, LoadMesh};
 use crate::{Error, Result};
-use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// Frames wait for a draft so long at most.
@@ -165,6 +164,7 @@ impl Viewer {
                     self.request_after_frame |= was_drafting;
                     if !loaded.is_draft() {
                         self.get_ready_for_drafts(&loaded);
+                        self.save_finished(true);
                     }
                 }
                 Err(Error::Cancelled) => {}
@@ -176,11 +176,12 @@ impl Viewer {
                     }
                     self.history.forget(&taken_back);
                     self.latency.failed();
-                    self.tell_error(&error);
                     // Else what failed is what is wanted still, and would fail again.
                     if !taken_back.is_empty() {
                         self.go_back();
                     }
+                    self.save_finished(!taken_back.is_empty());
+                    self.tell_error(&error);
                 }
             }
         }
@@ -200,14 +201,6 @@ impl Viewer {
         self.requested = finished.and_then(|loaded| loaded.key);
         self.request();
     }
-
-    /// What is shown as a `draft`, with finished threads, which are waited for.
-    pub(super) fn finished(&self, draft: &Loaded) -> Result<Loaded> {
-        let round = self.memo.round(&());
-        let prepared = prepare(&draft.prepared.scene, &round)?;
-        let renderer = Arc::new(DeviceScene::new(&self.device, &prepared, &round)?);
-        Ok(Loaded { prepared: Arc::new(prepared), renderer, ..draft.clone() })
-    }
 }
 
 impl Drop for Viewer {
@@ -225,6 +218,7 @@ mod tests {
     use super::*;
     use crate::scene::{MaterialSource, Scene, Source};
     use crate::vulkan::{Device, Instance};
+    use std::sync::Arc;
 
     /// Waits until nothing is being loaded.
     fn wait(viewer: &mut Viewer) {

@@ -330,9 +330,15 @@ impl Open {
             return Ok(false);
         }
         let Some(input) = self.script.replay.front().cloned() else { return Ok(false) };
-        match &input {
+        let waits = match &input {
             // A turntable always has a next frame.
-            Input::Wait if self.viewer.is_busy() || (self.due.is_some() && !self.viewer.turntable) => {
+            Input::Wait => self.viewer.is_busy() || (self.due.is_some() && !self.viewer.turntable),
+            // What comes next is not to change it.
+            Input::SavePicture(_) => self.viewer.is_loading(),
+            _ => false,
+        };
+        match &input {
+            _ if waits => {
                 let until = *self.script.waiting.get_or_insert_with(|| Instant::now() + limit);
                 if Instant::now() < until {
                     return Ok(false);
@@ -497,6 +503,7 @@ impl ApplicationHandler<Wake> for App {
     fn exiting(&mut self, _: &ActiveEventLoop) {
         // All that Vulkan made goes while the window is still there.
         let Some(mut open) = self.open.take() else { return };
+        open.viewer.save_finished(false);
         self.failures = std::mem::take(&mut open.viewer.failures);
         self.missing_screenshot = open.script.screenshot.take();
         let wanted = open.viewer.session.wanted();
