@@ -78,16 +78,16 @@ impl Viewer {
         if self.turntable {
             return Some(Instant::now());
         }
-        self.last_motion.map(|last| last + SETTLING)
+        let moved = self.last_motion.max(self.drafted);
+        moved.map(|last| last + SETTLING)
     }
 
     /// Whether the picture moves, and may be coarse. What `is_held` is being dragged.
     pub(super) fn is_moving(&mut self, is_held: bool) -> bool {
-        let settled = self.last_motion.is_none_or(|last| last.elapsed() >= SETTLING) && !is_held;
-        if settled {
-            self.last_motion = None;
+        for last in [&mut self.last_motion, &mut self.drafted] {
+            last.take_if(|last| last.elapsed() >= SETTLING);
         }
-        !settled || self.turntable
+        is_held || self.last_motion.is_some() || self.drafted.is_some() || self.turntable
     }
 
     /// Turns the turntable to where it is now.
@@ -119,7 +119,7 @@ impl Viewer {
         self.turn();
         let loaded = self.loaded.clone();
         let is_draft = loaded.as_ref().is_some_and(Loaded::is_draft);
-        let is_moving = (self.is_moving(is_held) || is_draft) && !screenshot;
+        let is_moving = self.is_moving(is_held) && !screenshot;
         let view = match &loaded {
             Some(loaded) => {
                 // The window scales it.
@@ -132,7 +132,7 @@ impl Viewer {
             None => None,
         };
         if let Some(loaded) = &loaded {
-            self.comparer.update(self.session.shown(), loaded, &self.device, &self.memo, is_moving)?;
+            self.comparer.update(self.session.shown(), loaded, &self.device, &self.memo, is_moving || is_draft)?;
         }
         let picture = loaded.as_ref().zip(view.as_ref()).map(|(loaded, view)| ShownPicture {
             renderer: &loaded.renderer,

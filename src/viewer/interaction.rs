@@ -94,6 +94,8 @@ pub struct Viewer {
     /// Whether a frame has run the shader that shades what is loaded.
     pub(super) is_compiled: bool,
     pub(super) last_motion: Option<Instant>,
+    /// When the draft that is shown came; none once that stands still.
+    pub(super) drafted: Option<Instant>,
     pub(super) last_turn: Option<Instant>,
     #[cfg(feature = "hot-reload")]
     pub(super) shaders: super::shader_watch::ShaderWatch,
@@ -137,6 +139,7 @@ impl Viewer {
             longest_side: device.limits().max_image_dimension2_d,
             is_compiled: false,
             last_motion: None,
+            drafted: None,
             last_turn: None,
             #[cfg(feature = "hot-reload")]
             shaders: super::shader_watch::ShaderWatch::new(move || wake_for_shaders()),

@@ -162,6 +162,7 @@ impl Viewer {
                     let before = self.loaded.replace(loaded.clone());
                     self.is_compiled &= before.is_some_and(|before| before.renderer.shades_as(&loaded.renderer));
                     self.request_after_frame |= was_drafting;
+                    self.drafted = loaded.is_draft().then(Instant::now);
                     if !loaded.is_draft() {
                         self.get_ready_for_drafts(&loaded);
                         self.save_finished(true);
@@ -228,6 +229,28 @@ mod tests {
             assert!(start.elapsed() < Duration::from_secs(60), "it is loaded over and over: {:?}", viewer.failures);
             std::thread::sleep(Duration::from_millis(1));
         }
+    }
+
+    #[test]
+    fn a_draft_that_stands_still_is_sharp_before_it_is_finished() {
+        let mut scene = Scene::default();
+        scene.environment.source = Source::Builtin("white".to_owned());
+        scene.shading.threads = Some(1);
+        (scene.image.width, scene.image.height) = (32, 24);
+        let instance = Instance::new(false).expect("an instance");
+        let asked = std::env::var("THREADLIGHT_TEST_DEVICE").ok();
+        let device = Device::new(&instance, asked.as_deref()).expect("a device");
+        let mut viewer = Viewer::new(scene, &device, Memo::default(), || ());
+        wait(&mut viewer);
+        viewer.change(&Change::Parameter { material: "gold".into(), key: "alpha".into(), value: 0.3.into() }).unwrap();
+        let start = Instant::now();
+        while !viewer.loaded().is_some_and(Loaded::is_draft) {
+            assert!(start.elapsed() < Duration::from_secs(60), "no draft");
+            viewer.take_loaded().expect("a draft");
+        }
+        assert!(viewer.is_moving(false) && viewer.next_frame().is_some());
+        std::thread::sleep(Duration::from_millis(200));
+        assert!(!viewer.is_moving(false) && viewer.next_frame().is_none());
     }
 
     #[test]
