@@ -7,7 +7,8 @@ use super::session::Edit;
 use crate::scene::Scene;
 use std::time::{Duration, Instant};
 
-/// Changes of one setting that follow each other within this time are one: a slider that is dragged, a key that is held down.
+/// Changes of one setting that follow each other within this time are one, such as those of a key that is held down. While the pointer is
+/// held down they are one whatever the time.
 const ONE_MOTION: Duration = Duration::from_millis(500);
 /// So many scenes are kept. Each is some hundred bytes, the tables that it names are elsewhere.
 const KEPT: usize = 1000;
@@ -19,6 +20,8 @@ pub struct History {
     undone: Vec<Moment>,
     /// When the last change was made; none if that goes on no more.
     last: Option<Instant>,
+    /// Whether the pointer is held down.
+    is_held: bool,
 }
 
 /// A scene as it was.
@@ -38,7 +41,8 @@ impl History {
             return;
         }
         self.undone.clear();
-        let last = self.last.replace(now).filter(|last| now.saturating_duration_since(*last) < ONE_MOTION);
+        let last = self.last.replace(now);
+        let last = last.filter(|last| self.is_held || now.saturating_duration_since(*last) < ONE_MOTION);
         if let (Some(_), Some(moment), Edit::Change(change)) = (last, self.before.last_mut(), &edit)
             && matches!(&moment.edit, Edit::Change(last) if last.is_undone_by(change))
         {
@@ -49,6 +53,13 @@ impl History {
             self.before.remove(0);
         }
         self.before.push(Moment { scene: before.clone(), edit, number });
+    }
+
+    /// The pointer is pressed, or released: either way what follows is another motion.
+    pub fn hold(&mut self, is_held: bool) {
+        if self.is_held != is_held {
+            (self.is_held, self.last) = (is_held, None);
+        }
     }
 
     /// The edits of these numbers could not be: as if they had never been made.
@@ -179,6 +190,23 @@ mod tests {
         user.undoes();
         assert_eq!((user.scene.image.exposure, user.scene.image.gamma), (20.0, 2.2));
         assert!(user.undoes() && user.scene == Scene::default());
+    }
+
+    #[test]
+    fn what_is_dragged_is_one_thing_until_it_is_released_however_slowly() {
+        let mut user = User::new();
+        user.does(&Change::Exposure(1.5));
+        user.history.hold(true);
+        for exposure in [2.0, 3.0, 4.0] {
+            user.does(&Change::Exposure(exposure));
+            user.history.hold(true);
+        }
+        user.history.hold(false);
+        user.does_after(&Change::Exposure(5.0), Duration::from_millis(100));
+        for expected in [4.0, 1.5, 1.0] {
+            assert!(user.undoes() && user.scene.image.exposure == expected, "{}", user.scene.image.exposure);
+        }
+        assert!(!user.undoes());
     }
 
     #[test]

@@ -263,6 +263,10 @@ impl Open {
         self.egui.handle_platform_output(&self.window, output.platform_output);
         self.textures.append(output.textures_delta);
         inputs.iter().for_each(|input| self.viewer.handle(input));
+        // What was dragged up to its release is handled by now.
+        if !self.context.input(|input| input.pointer.any_down()) {
+            self.viewer.history.hold(false);
+        }
         let frame = UiFrame {
             primitives: self.context.tessellate(output.shapes, output.pixels_per_point),
             pixels_per_point: output.pixels_per_point,
@@ -391,6 +395,9 @@ impl Open {
         let response = self.egui.on_window_event(&self.window, event);
         if response.repaint {
             self.redraw();
+        }
+        if matches!(event, WindowEvent::MouseInput { state: ElementState::Pressed, .. }) {
+            self.viewer.history.hold(true);
         }
         match event {
             WindowEvent::CloseRequested => return true,
