@@ -165,7 +165,10 @@ fn choose(ui: &mut Ui, other: Option<&Other>, scene: &Scene, inputs: &mut Vec<In
         if most == 1 {
             return;
         }
-        let drag = DragValue::new(&mut count).range(1..=most).suffix(format!(" {}", what_is_counted(method)));
+        let drag = DragValue::new(&mut count)
+            .update_while_editing(false)
+            .range(1..=most)
+            .suffix(format!(" {}", what_is_counted(method)));
         if ui.add(drag).on_hover_text("Threads or samples a pixel of the other picture.").changed() {
             inputs.push(Input::Compare(Some(Other::Shading(ShadingSettings {
                 threads: Some(count),

@@ -27,6 +27,7 @@ impl State {
             }
             let mut turn = settings.rotation_deg;
             let slider = egui::Slider::new(&mut turn, 0.0..=360.0)
+                .update_while_editing(false)
                 .clamping(SliderClamping::Never)
                 .suffix("°")
                 .max_decimals(1)
@@ -36,6 +37,7 @@ impl State {
             on_change(&ui.add(slider).on_hover_text(tooltip), inputs, || Change::Rotation(turn));
             let mut intensity = settings.intensity;
             let slider = egui::Slider::new(&mut intensity, 0.01..=100.0)
+                .update_while_editing(false)
                 .clamping(SliderClamping::Never)
                 .logarithmic(true)
                 .text("intensity");

@@ -113,6 +113,7 @@ fn row(ui: &mut Ui, material: &str, parameter: &Parameter, value: &toml::Value, 
             // A scale of factors has no 0: it starts a hundred thousandth of the way.
             let smallest = if *range.start() > 0.0 { *range.start() } else { 1e-5 * range.end() };
             let slider = egui::Slider::new(&mut number, range.clone())
+                .update_while_editing(false)
                 .logarithmic(is_logarithmic)
                 .smallest_positive(smallest)
                 .clamping(SliderClamping::Edits)
@@ -126,8 +127,11 @@ fn row(ui: &mut Ui, material: &str, parameter: &Parameter, value: &toml::Value, 
                 // That of buttons is wider.
                 ui.spacing_mut().interact_size.x = 32.0;
                 for channel in 0..3 {
-                    let drag =
-                        egui::DragValue::new(&mut rgb[channel]).range(range.clone()).speed(0.005).max_decimals(3);
+                    let drag = egui::DragValue::new(&mut rgb[channel])
+                        .update_while_editing(false)
+                        .range(range.clone())
+                        .speed(0.005)
+                        .max_decimals(3);
                     let response = ui.add_sized([34.0, 18.0], drag).on_hover_text(*help);
                     on_change(&response, inputs, || set(array(rgb)));
                 }

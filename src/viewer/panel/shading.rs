@@ -56,12 +56,16 @@ pub fn show(ui: &mut Ui, viewer: &Viewer, inputs: &mut Vec<Input>) {
         let mut count = scene.shading.threads.unwrap_or(method.default_count());
         // The split sum has no choice.
         if most > 1 {
-            let slider = egui::Slider::new(&mut count, 1..=most).logarithmic(true).text(what_is_counted(method));
+            let slider = egui::Slider::new(&mut count, 1..=most)
+                .update_while_editing(false)
+                .logarithmic(true)
+                .text(what_is_counted(method));
             let tooltip = format!("{tooltip} [ and ] halve and double.");
             on_change(&ui.add(slider).on_hover_text(tooltip), inputs, || Change::Threads(Some(count)));
         }
         let mut subpixels = scene.image.subpixels;
-        let slider = egui::Slider::new(&mut subpixels, 1..=MAX_SUBPIXELS).text("sub-pixels");
+        let slider =
+            egui::Slider::new(&mut subpixels, 1..=MAX_SUBPIXELS).update_while_editing(false).text("sub-pixels");
         let tooltip =
             "Sub-pixels along each axis of a pixel: resolution of the geometry cache, and how smooth edges are.";
         on_change(&ui.add(slider).on_hover_text(tooltip), inputs, || Change::Subpixels(subpixels));
