@@ -124,8 +124,9 @@ fn row(ui: &mut Ui, material: &str, parameter: &Parameter, value: &toml::Value, 
             let mut rgb = channels(value).unwrap_or_default();
             let array = |rgb: [f64; 3]| toml::Value::Array(rgb.map(Into::into).to_vec());
             ui.horizontal(|ui| {
-                // That of buttons is wider.
-                ui.spacing_mut().interact_size.x = 32.0;
+                // Else it is wider than the panel.
+                ui.spacing_mut().item_spacing.x = 4.0;
+                ui.spacing_mut().interact_size.x = 28.0;
                 for channel in 0..3 {
                     let drag = egui::DragValue::new(&mut rgb[channel])
                         .update_while_editing(false)
