@@ -82,17 +82,18 @@ impl State {
         let name = if viewer.comparer.shows_heat_map { "difference" } else { &compared.name };
         label(name, Align2::LEFT_TOP, 8.0);
         if viewer.comparer.shows_heat_map {
-            draw_scale(&painter, place);
+            draw_scale(&painter, picture, x);
         }
         inputs.extend(dragged_line(context, picture, x).map(Input::Wipe));
     }
 }
 
-/// What the colours of the heat map at `place` stand for, at its lower left.
-fn draw_scale(painter: &Painter, place: Rect) {
+/// What the colours of the heat map right of `x` stand for, at its lower left, but within the `picture`.
+fn draw_scale(painter: &Painter, picture: Rect, x: f32) {
     const BAR: Vec2 = vec2(192.0, 10.0);
     const STEPS: usize = 96;
-    let bar = Rect::from_min_size(place.left_bottom() + vec2(36.0, -16.0 - BAR.y), BAR);
+    let left = x.min(picture.right() - BAR.x - 72.0).max(picture.left()) + 36.0;
+    let bar = Rect::from_min_size(pos2(left, picture.bottom() - 16.0 - BAR.y), BAR);
     let colour = difference::scale();
     let decades = -difference::SMALLEST.log10();
     let at = |part: f32| bar.left() + part * BAR.x;
