@@ -89,12 +89,15 @@ fn a_file_that_is_shown_and_then_broken_is_told_once_each_time_it_is_opened_and_
     failures(&mut viewer, 1);
     std::fs::remove_file(&path).unwrap();
     failures(&mut viewer, 2);
+    assert!(viewer.notice.as_ref().is_some_and(|notice| notice.is_error));
     // All else can be changed.
     viewer.handle(&Input::Set(Change::Threads(Some(3))));
     wait(&mut viewer);
     assert_eq!((viewer.failures.len(), viewer.session.shown().shading.threads), (2, Some(3)));
+    assert_eq!(viewer.notice, None);
     std::fs::write(&path, "model = \"lambert\"\nreflectance = 0.75\n").unwrap();
     viewer.handle(&open);
+    assert_eq!(viewer.notice, None);
     wait(&mut viewer);
     assert!((red(&viewer) - 0.75).abs() < 1e-9);
     drop(viewer);

@@ -32,6 +32,8 @@ pub struct Notice {
     pub text: String,
     /// Whether it is that something could not be done.
     pub is_error: bool,
+    /// Number of the latest change when it was told.
+    pub(super) change: u64,
 }
 
 /// A picture that is to be saved.
@@ -285,6 +287,7 @@ impl Viewer {
     pub(super) fn change(&mut self, change: &Change) -> Result<()> {
         if let Some(path) = change.file() {
             self.memo.look_again(path);
+            self.forget_errors(self.changes + 1);
         }
         let before = self.session.wanted().clone();
         self.session.change(change, self.changes + 1)?;
@@ -297,6 +300,7 @@ impl Viewer {
     /// Asks for another scene.
     fn replace(&mut self, scene: Scene) {
         self.changes += 1;
+        self.forget_errors(self.changes);
         self.session.replace(scene, self.changes);
         self.request();
     }
@@ -320,13 +324,18 @@ impl Viewer {
 
     pub(super) fn tell(&mut self, text: String) {
         tracing::info!("{text}");
-        self.notice = Some(Notice { text, is_error: false });
+        self.notice = Some(Notice { text, is_error: false, change: self.changes });
+    }
+
+    /// What could not be done before the change of this number is told no more: another file was opened, or what is shown would contradict it.
+    pub(super) fn forget_errors(&mut self, change: u64) {
+        self.notice.take_if(|notice| notice.is_error && notice.change < change);
     }
 
     pub(super) fn tell_error(&mut self, error: &Error) {
         tracing::warn!("{error}");
         let text = error.to_string();
         self.failures.push(text.clone());
-        self.notice = Some(Notice { text, is_error: true });
+        self.notice = Some(Notice { text, is_error: true, change: self.changes });
     }
 }

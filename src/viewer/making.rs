@@ -159,6 +159,7 @@ impl Viewer {
             match result {
                 Ok(loaded) => {
                     self.session.loaded(loaded.prepared.scene.clone(), loaded.change);
+                    self.forget_errors(loaded.change);
                     let before = self.loaded.replace(loaded.clone());
                     self.is_compiled &= before.is_some_and(|before| before.renderer.shades_as(&loaded.renderer));
                     self.request_after_frame |= was_drafting;
