@@ -100,8 +100,8 @@ pub struct Ended {
 /// Opens a window and runs until it is closed.
 ///
 /// # Errors
-/// No window system, no device that presents to it, a scene that cannot be loaded; a device that fails: then the scene is kept if it was
-/// edited, and the log says where.
+/// No window system, no device that presents to it, a scene that cannot be loaded; a device or a window system that fails: then the scene is
+/// kept if it was edited, and the log says where.
 pub fn run(settings: ViewerSettings) -> Result<Ended> {
     let folder = settings.cache.clone().unwrap_or_else(std::env::temp_dir);
     let mut event_loop = EventLoop::<window::Wake>::with_user_event();
@@ -110,12 +110,14 @@ pub fn run(settings: ViewerSettings) -> Result<Ended> {
     winit::platform::x11::EventLoopBuilderExtX11::with_any_thread(&mut event_loop, true);
     let event_loop = event_loop.build()?;
     let mut app = window::App::new(settings, event_loop.create_proxy());
-    event_loop.run_app(&mut app)?;
+    let ended = event_loop.run_app(&mut app);
     let window::App { result, messages, stats, edited, failures, missing_screenshot, .. } = app;
-    if let (Err(Error::Vulkan(_)), Some(scene)) = (&result, edited) {
+    let fails = ended.is_err() || matches!(result, Err(Error::Vulkan(_)));
+    if let Some(scene) = edited.filter(|_| fails) {
         keep(&scene, &folder.join("edited.toml"));
     }
     result?;
+    ended?;
     let messages = messages.map(|messages| messages.all()).unwrap_or_default();
     Ok(Ended { messages, stats, failures, missing_screenshot })
 }
