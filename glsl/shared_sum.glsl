@@ -9,6 +9,13 @@ vec3 estimate(Surface surface, Material material, uint first, uint stride);
 // Whether one sum does not do for a pixel within one smooth surface, whose mean is this.
 bool needs_subpixels(Surface surface, Material material);
 
+// Variance along each axis, in rad^2, of the views of a pixel's sub-pixels. Twin: src/passes/view.rs.
+float view_variance() {
+    vec2 pixel = 2.0 * vec2(length(push.camera.right.xyz), length(push.camera.up.xyz)) / vec2(push.size_px);
+    // That of SUBPIXELS equal steps of a pixel's side, in the mean of both sides.
+    return dot(pixel, pixel) * (1.0 - 1.0 / float(SUBPIXELS * SUBPIXELS)) / 24.0;
+}
+
 // The mean of the surfaces that a pixel's sub-pixels see, all of them covered.
 Surface mean_surface(uvec2 pixel) {
     NormalMoments normals = normal_moments(geometry_normal(texelFetch(geometry, ivec2(pixel * SUBPIXELS), 0).xy));
@@ -23,7 +30,8 @@ Surface mean_surface(uvec2 pixel) {
         }
     }
     Surface mean = surface_at((vec2(pixel) + 0.5) / vec2(push.size_px), normalize(mean_normal(normals, SUBPIXELS * SUBPIXELS)), tangents);
-    mean.normal_variance = normal_variance(normals, SUBPIXELS * SUBPIXELS);
+    // A mirrored direction turns once as far as the view does, twice as far as the normal.
+    mean.normal_variance = normal_variance(normals, SUBPIXELS * SUBPIXELS) + 0.25 * view_variance();
     return mean;
 }
 

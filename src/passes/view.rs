@@ -72,6 +72,12 @@ impl View {
         half_size(&self.camera, self.aspect())
     }
 
+    /// Variance along each axis, in rad^2, of the views of a pixel's sub-pixels. Twin of `view_variance` in glsl/shared_sum.glsl.
+    pub fn view_variance(&self) -> f32 {
+        let pixel = 2.0 * self.half_size().as_vec2() / Vec2::new(self.width as f32, self.height as f32);
+        pixel.length_squared() * (1.0 - 1.0 / (self.subpixels * self.subpixels) as f32) / 24.0
+    }
+
     /// Rays through the image.
     pub fn camera_rays(&self) -> CameraRays {
         CameraRays::new(&self.camera, self.aspect())

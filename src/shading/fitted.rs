@@ -66,6 +66,7 @@ const END: f32 = 8.0;
 const WIDEST_WHOLE_RAD: f32 = 0.1;
 const LOW_COSINE: f32 = 0.3;
 const LOW_DEVIATIONS: f32 = 20.0;
+const MOST_VIEW: f32 = 0.3;
 
 /// A lobe, seen from w_o in the shading frame. Twin of `Lobe`.
 struct Lobe<'a> {
@@ -157,6 +158,7 @@ pub(super) fn needs_subpixels(point: &Point) -> bool {
     let (sources, record, lobe) = (&point.twin.sources, point.record(), Lobe::of(point));
     let deviation = point.surface.normal_variance.sqrt();
     deviation > lobe.width.min(NEARLY_FLAT_RAD as f32).max(record.shared_deviation * lobe.w_o.z)
+        || 0.5 * point.twin.prepared.view.view_variance().sqrt() > MOST_VIEW * lobe.width
         || share_of_brdf(lobe.least_clearance(sources, 3.0 * 2.0 * deviation), &lobe) < 1.0
 }
 

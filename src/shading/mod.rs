@@ -49,7 +49,7 @@ pub struct Surface {
     pub w_o: Vec3,
     /// Angle between the normal and w_o in radians; above 90 degrees where an interpolated normal faces away.
     pub theta_o: f32,
-    /// Variance of the normal within the pixel along each axis, in rad^2, where sub-pixels share one sum; else 0.
+    /// Variance of the normal within the pixel along each axis, in rad^2, and a quarter of that of the view, where sub-pixels share one sum; else 0.
     pub normal_variance: f32,
     /// Cosine and sine of the azimuth of w_o from the tangent; (1, 0) where the material is isotropic.
     pub phi_o: Vec2,
@@ -247,7 +247,7 @@ impl<'a> CpuShader<'a> {
             let position = (pixel.as_vec2() + 0.5) / UVec2::new(width, height).as_vec2();
             let (mean, normal_variance) = normal_moments(texels);
             point.surface = self.surface_at(position, mean.normalize(), tangent_sum(texels));
-            point.surface.normal_variance = normal_variance;
+            point.surface.normal_variance = normal_variance + 0.25 * self.prepared.view.view_variance();
             if !fitted::needs_subpixels(&point) {
                 point.is_pixel = true;
                 return point.estimate().extend(1.0);

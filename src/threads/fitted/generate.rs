@@ -9,6 +9,7 @@ use super::kernel::{Kernel, all_between, scale_rad, sharpest_level};
 use super::lights::{Quadrature, TestLights};
 use super::sets::{pixels_have_own, share_of_sets};
 use super::solve::{Effort, Fit};
+use super::stray;
 use super::table::FittedTable;
 use crate::brdf::{Brdf, LobeShape, SeenBrdf, luminance};
 use crate::error::Result;
@@ -163,8 +164,15 @@ fn fit_all(
             [a, b, ..] => all_between(a, b, 0.5),
         };
         let mut free = start.clone();
+        let (tied, effort) = match neighbours[..] {
+            [] => (fit, FIRST),
+            _ => (fit.tied(&start, TIED), NEXT),
+        };
         if !neighbours.is_empty() {
-            fit.tied(&start, TIED).solve(&mut free, NEXT, observer)?;
+            tied.solve(&mut free, effort, observer)?;
+        }
+        if settings.kind == ThreadKind::Fitted {
+            stray::call_back(&tied, lights.unit, &f_cos_of(brdf, to), &mut free, effort, observer)?;
         }
         let is_steady = |kernels: &[Kernel]| match (&before[..], targets.azimuths) {
             ([before], 1) => {
@@ -194,6 +202,12 @@ fn fit_all(
         fitted.iter_mut().for_each(|(kernels, ..)| *kernels = scaled(kernels, 0.0));
     }
     Ok(FittedTable::pack(&fitted, targets.azimuths, settings.sets))
+}
+
+/// f (n . w) of `brdf` for a view.
+pub(super) fn f_cos_of(brdf: &Brdf, View { theta_o, phi_o }: View) -> impl Fn(DVec3) -> DVec3 {
+    let (seen, w_o) = (SeenBrdf::from_azimuth(brdf, phi_o), dvec3(theta_o.sin(), 0.0, theta_o.cos()));
+    move |w_i| seen.evaluate(w_i, w_o) * w_i.z.max(0.0)
 }
 
 /// The solution of the least cost from any of these `starts`.

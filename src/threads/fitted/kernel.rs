@@ -84,7 +84,7 @@ pub fn sharp_part(level: f32, finest: f32) -> f32 {
 /// ones would answer the lights of the fit, not those between them: a comb, if there are many. Lights tell kernels that are wider than
 /// [`TOLD_RAD`], so these have no such bound. Chrome beside 300 small lamps, close to the limb, errs by 0.0032 with 128 threads, not by 0.0074.
 const NARROWEST_IN_LOBE: f64 = 1.25;
-const TOLD_RAD: f64 = 0.02;
+pub(super) const TOLD_RAD: f64 = 0.02;
 
 /// No kernel of a cusp is sharper than this: shading would look up a map of 1024 columns as it is, which costs several lookups.
 /// [`sharp_part`] is 0 there from 0.5 on, and half floats round levels by less than a thousandth.

@@ -13,7 +13,7 @@ use crate::vector_math::exp;
 /// Widths of the lights: so many, evenly spaced in their logarithm from a third of a degree, a pixel of a map of 1024 columns, to
 /// where a light is as wide as the hemisphere.
 pub const SCALES: usize = 8;
-const NARROWEST_RAD: f64 = 0.006;
+pub(super) const NARROWEST_RAD: f64 = 0.006;
 const WIDEST_RAD: f64 = 1.0;
 
 /// Lights of a width are weighted by this power of it. Light in the world has an amplitude spectrum of about 1 / frequency; a mixture of
@@ -22,7 +22,7 @@ const WIDTH_EXPONENT: f64 = 0.8;
 
 /// Residuals count relative to the response, down to this part of the mean radiance: displays show dim things well, and in the tails of
 /// lobes a bright lamp is all that there is.
-const DIM_RESPONSE: f64 = 0.1;
+pub(super) const DIM_RESPONSE: f64 = 0.1;
 
 /// Lights of a scale are a multiple of this, so that loops over them are made of whole vectors.
 pub const LANES: usize = 16;
@@ -37,6 +37,12 @@ pub fn light_kappa(scale: usize) -> f64 {
 
 fn light_width(scale: usize) -> f64 {
     NARROWEST_RAD * (WIDEST_RAD / NARROWEST_RAD).powf(scale as f64 / (SCALES - 1) as f64)
+}
+
+/// Points of equal mass of the narrowest light in `direction`; some may be below the horizon.
+pub fn points_of_narrowest(direction: DVec3) -> Vec<DVec3> {
+    const COUNT: usize = 200;
+    fibonacci_lattice(COUNT).map(|uv| vmf_direction(direction, light_kappa(0), uv.x, TAU * uv.y)).collect()
 }
 
 /// Lights, how strongly each counts, and what a slice makes of them. A light has radiance vMF(w; direction, kappa), so unit power.

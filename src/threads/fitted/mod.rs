@@ -26,6 +26,7 @@ pub mod kernel;
 pub mod lights;
 mod sets;
 pub mod solve;
+mod stray;
 mod table;
 #[cfg(test)]
 mod tests;

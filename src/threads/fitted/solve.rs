@@ -55,12 +55,22 @@ pub struct Fit<'a> {
     prior: Option<(&'a [Kernel], f64)>,
     /// No step leaves a kernel sharper than this level.
     sharpest_level: f64,
+    /// Nor one sharper than its own of these, if there are any.
+    sharpest_levels: &'a [f64],
 }
 
 impl<'a> Fit<'a> {
     /// Of the slice with this albedo, which answers `lights` as they say; the albedo and all weights in units of `lights`.
     pub fn new(lights: &'a TestLights, albedo: DVec3) -> Self {
-        Self { lights, albedo, sets: 1, share_of_sets: 0.0, prior: None, sharpest_level: lights.sharpest_level() }
+        Self {
+            lights,
+            albedo,
+            sets: 1,
+            share_of_sets: 0.0,
+            prior: None,
+            sharpest_level: lights.sharpest_level(),
+            sharpest_levels: &[],
+        }
     }
 
     /// The same in so many sets of kernels, each of which answers the lights by itself too, with as many times the weights: kernel k is of
@@ -80,9 +90,18 @@ impl<'a> Fit<'a> {
         Self { sharpest_level: self.sharpest_level.max(level), ..self }
     }
 
+    /// The same, in which no step leaves one of the kernels sharper than its level of these.
+    pub fn each_no_sharper_than(self, levels: &'a [f64]) -> Self {
+        Self { sharpest_levels: levels, ..self }
+    }
+
     /// Makes `kernels` that are sharper than any step leaves them as wide as that.
     pub fn bound(&self, kernels: &mut [Kernel]) {
-        kernels.iter_mut().for_each(|kernel| kernel.level = kernel.level.max(self.sharpest_level));
+        kernels.iter_mut().enumerate().for_each(|(k, kernel)| kernel.level = kernel.level.max(self.sharpest_level(k)));
+    }
+
+    fn sharpest_level(&self, k: usize) -> f64 {
+        self.sharpest_levels.get(k).copied().unwrap_or(f64::NEG_INFINITY).max(self.sharpest_level)
     }
 
     /// How many sets of kernels there are.
@@ -172,13 +191,13 @@ impl<'a> Fit<'a> {
             let whole = kernels[k].level.floor();
             if whole < kernels[k].level || whole < WIDEST_LEVEL && slope(k, 1) < 0.0 {
                 [whole, whole + 1.0]
-            } else if whole > self.sharpest_level && slope(k, 0) > 0.0 {
+            } else if whole > self.sharpest_level(k) && slope(k, 0) > 0.0 {
                 [whole - 1.0, whole]
             } else {
                 [whole, whole]
             }
         };
-        (0..kernels.len()).map(|k| bounds(k).map(|level| level.max(self.sharpest_level))).collect()
+        (0..kernels.len()).map(|k| bounds(k).map(|level| level.max(self.sharpest_level(k)))).collect()
     }
 
     /// What the answers of each kernel differ by from those of the cosine kernel, whose weight is what kernels leave of the albedo.
