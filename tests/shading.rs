@@ -407,6 +407,34 @@ fn a_narrow_lobe_shows_a_lamp_with_dim_edges_as_the_reference_does() {
 }
 
 #[test]
+fn a_flat_near_mirror_shows_all_that_a_pixel_sees_of_it() {
+    let gpu = Validated::new();
+    let folder = tempfile::tempdir().unwrap();
+    let [map, wall] = ["checks.exr", "wall.obj"].map(|name| folder.path().join(name));
+    let texel = |(x, y): (u32, u32)| if (x / 16 + y / 16) % 2 == 0 { [1.0; 4] } else { [0.2, 0.1, 0.05, 1.0] };
+    let texels: Vec<_> = (0..256).flat_map(|y| (0..512).map(move |x| texel((x, y)))).collect();
+    threadlight::low_level::output::write_exr(&map, 512, 256, &texels, false, &Default::default()).unwrap();
+    std::fs::write(&wall, "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nf 1 2 3 4\n").unwrap();
+    let metal = model("model = 'conductor'\ndistribution = 'beckmann'\nalpha = 0.003\nmetal = 'Al'");
+    let mut scene = sphere(metal, "white", 16, (80, 60));
+    scene.objects[0].mesh = Source::File(wall);
+    scene.environment.source = Source::File(map);
+    scene.image.background = Background::None;
+    scene.camera = Some(Camera { eye: DVec3::new(0.3, 0.2, 2.2), target: DVec3::ZERO, up: DVec3::Y, fov_y_deg: 50.0 });
+    let prepared = ready(&scene);
+    let rendering = gpu.render(&prepared, EVERYTHING);
+    let settings = ReferenceSettings { tolerance: 1e-3, ..Default::default() };
+    let truth = reference(&prepared, &gpu.device, &settings, &gpu.round()).unwrap();
+    let [found, expected] = [&rendering.radiance, &truth.radiance]
+        .map(|radiance| Comparable::from_radiance(80, 60, radiance, true, Display::default()));
+    // 0.013 where a pixel is one direction.
+    let rms = compare(&found, &expected, true).unwrap().rms;
+    println!("RMS {rms:.4}");
+    assert!(rms < 0.005, "{rms}");
+    gpu.finish();
+}
+
+#[test]
 fn a_sun_of_a_million_stays_finite() {
     let gpu = Validated::new();
     let folder = tempfile::tempdir().unwrap();

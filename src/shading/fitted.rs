@@ -157,8 +157,10 @@ pub(super) fn needs_subpixels(point: &Point) -> bool {
     }
     let (sources, record, lobe) = (&point.twin.sources, point.record(), Lobe::of(point));
     let deviation = point.surface.normal_variance.sqrt();
-    deviation > lobe.width.min(NEARLY_FLAT_RAD as f32).max(record.shared_deviation * lobe.w_o.z)
-        || 0.5 * point.twin.prepared.view.view_variance().sqrt() > MOST_VIEW * lobe.width
+    let most = lobe.width.min(NEARLY_FLAT_RAD as f32).max(record.shared_deviation * lobe.w_o.z);
+    let view_variance = point.twin.prepared.view.view_variance();
+    point.surface.normal_variance > most * most + 0.25 * view_variance
+        || 0.5 * view_variance.sqrt() > MOST_VIEW * lobe.width
         || share_of_brdf(lobe.least_clearance(sources, 3.0 * 2.0 * deviation), &lobe) < 1.0
 }
 
