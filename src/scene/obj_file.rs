@@ -115,11 +115,10 @@ fn read_obj(text: &str, is_textured: bool) -> Result<Obj, String> {
     let (lines, smoothing_groups) = geometry_lines(text, is_textured)?;
     let options = tobj::LoadOptions::default();
     let no_materials = |_: &Path| Ok(Default::default());
-    let (models, _) = tobj::load_obj_buf(&mut lines.as_bytes(), &options, no_materials)
-        .map_err(|cause| {
-            let line = text.lines().position(lacks_numbers).map_or(String::new(), |index| format!("line {}: ", index + 1));
-            format!("is not a sound OBJ: {line}{cause}")
-        })?;
+    let (models, _) = tobj::load_obj_buf(&mut lines.as_bytes(), &options, no_materials).map_err(|cause| {
+        let line = text.lines().position(lacks_numbers).map_or(String::new(), |index| format!("line {}: ", index + 1));
+        format!("is not a sound OBJ: {line}{cause}")
+    })?;
     // Without o, g and usemtl there is one model.
     let mesh = models.into_iter().next().map(|model| model.mesh).unwrap_or_default();
     if mesh.face_arities.contains(&0) {
@@ -194,8 +193,7 @@ fn geometry_lines(text: &str, is_textured: bool) -> Result<(String, Vec<Smoothin
             let is_flat = group == SmoothingGroup::Numbered(0);
             groups.push(if is_flat { SmoothingGroup::Flat(groups.len() as u32) } else { group });
             for word in words {
-                corner(&mut lines, word, before)
-                    .map_err(|what| format!("line {}: there is no {what}", index + 1))?;
+                corner(&mut lines, word, before).map_err(|what| format!("line {}: there is no {what}", index + 1))?;
             }
         } else if keyword == "vt" {
             // The second one may be left out, a third has no meaning here.
