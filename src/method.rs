@@ -189,8 +189,7 @@ impl Variant {
                 let fixed = Method::ALL.iter().filter(|method| method.has_pattern());
                 let fixed = fixed.map(|method| Self::new(*method, Pattern::Fixed));
                 let all = Method::ALL.iter().filter(|method| method.runs_on_gpu()).map(|method| Self::from(*method));
-                let known: Vec<_> = all.chain(fixed).map(Self::name).collect();
-                Error::input(format!("method \"{name}\""), "is not known", format!("use one of: {}", known.join(", ")))
+                Method::unknown(name, all.chain(fixed).map(Self::name).collect())
             }),
         }
     }

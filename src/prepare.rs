@@ -249,7 +249,7 @@ fn prepare_by(scene: &Scene, round: &Round, ask_threads: &AskThreads) -> Result<
 /// The key of all that a renderer of `scene` is made of: of all but what a frame is given anew each time, such as the camera.
 ///
 /// # Errors
-/// A file that cannot be read, a model or method that there is not.
+/// A file that cannot be read, a model that there is not.
 pub fn key_of(scene: &Scene, memo: &Memo) -> Result<Key> {
     let method = scene.shading.method;
     let count = scene.shading.threads.unwrap_or(method.default_count());

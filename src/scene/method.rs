@@ -46,10 +46,13 @@ impl Method {
     /// There is none.
     pub fn from_name(name: &str) -> Result<Self> {
         let is_called = |method: &Self| method.name() == name || method.older_name() == Some(name);
-        Self::ALL.iter().copied().find(is_called).ok_or_else(|| {
-            let known: Vec<_> = Self::ALL.iter().map(|method| method.name()).collect();
-            Error::input(format!("method \"{name}\""), "is not known", format!("use one of: {}", known.join(", ")))
-        })
+        let known = || Self::ALL.iter().map(|method| method.name().to_owned()).collect();
+        Self::ALL.iter().copied().find(is_called).ok_or_else(|| Self::unknown(name, known()))
+    }
+
+    /// An error for the `name` of none of those that are `known`.
+    pub(crate) fn unknown(name: &str, known: Vec<String>) -> Error {
+        Error::input(format!("method \"{name}\""), "is not known", format!("use one of: {}", known.join(", ")))
     }
 }
 
