@@ -373,6 +373,17 @@ fn a_wide_lobe_has_one_sum_where_a_surface_is_too_curved_for_that_of_a_narrow_on
     gpu.finish();
 }
 
+/// RMS of what `scene`, 80 x 60 without a background, shows beside the reference.
+fn rms_beside_reference(gpu: &Validated, scene: &Scene) -> f64 {
+    let prepared = ready(scene);
+    let rendering = gpu.render(&prepared, EVERYTHING);
+    let settings = ReferenceSettings { tolerance: 1e-3, ..Default::default() };
+    let truth = reference(&prepared, &gpu.device, &settings, &gpu.round()).unwrap();
+    let [found, expected] = [&rendering.radiance, &truth.radiance]
+        .map(|radiance| Comparable::from_radiance(80, 60, radiance, true, Display::default()));
+    compare(&found, &expected, true).unwrap().rms
+}
+
 #[test]
 fn a_narrow_lobe_shows_a_lamp_with_dim_edges_as_the_reference_does() {
     let gpu = Validated::new();
@@ -393,13 +404,7 @@ fn a_narrow_lobe_shows_a_lamp_with_dim_edges_as_the_reference_does() {
         let mut scene = sphere(model(parameters), "white", 16, (80, 60));
         scene.environment.source = Source::File(map.clone());
         scene.image.background = Background::None;
-        let prepared = ready(&scene);
-        let rendering = gpu.render(&prepared, EVERYTHING);
-        let settings = ReferenceSettings { tolerance: 1e-3, ..Default::default() };
-        let truth = reference(&prepared, &gpu.device, &settings, &gpu.round()).unwrap();
-        let [found, expected] = [&rendering.radiance, &truth.radiance]
-            .map(|radiance| Comparable::from_radiance(80, 60, radiance, true, Display::default()));
-        let rms = compare(&found, &expected, true).unwrap().rms;
+        let rms = rms_beside_reference(&gpu, &scene);
         println!("{name}: RMS {rms:.4}");
         assert!(rms < most, "{name}: {rms}");
     }
@@ -421,14 +426,8 @@ fn a_flat_near_mirror_shows_all_that_a_pixel_sees_of_it() {
     scene.environment.source = Source::File(map);
     scene.image.background = Background::None;
     scene.camera = Some(Camera { eye: DVec3::new(0.3, 0.2, 2.2), target: DVec3::ZERO, up: DVec3::Y, fov_y_deg: 50.0 });
-    let prepared = ready(&scene);
-    let rendering = gpu.render(&prepared, EVERYTHING);
-    let settings = ReferenceSettings { tolerance: 1e-3, ..Default::default() };
-    let truth = reference(&prepared, &gpu.device, &settings, &gpu.round()).unwrap();
-    let [found, expected] = [&rendering.radiance, &truth.radiance]
-        .map(|radiance| Comparable::from_radiance(80, 60, radiance, true, Display::default()));
     // 0.013 where a pixel is one direction.
-    let rms = compare(&found, &expected, true).unwrap().rms;
+    let rms = rms_beside_reference(&gpu, &scene);
     println!("RMS {rms:.4}");
     assert!(rms < 0.005, "{rms}");
     gpu.finish();

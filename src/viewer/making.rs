@@ -232,9 +232,10 @@ mod tests {
         }
     }
 
-    #[test]
-    fn a_draft_that_stands_still_is_sharp_before_it_is_finished() {
+    /// A viewer that shows a small sphere of this material.
+    fn viewer(material: MaterialSource) -> Viewer {
         let mut scene = Scene::default();
+        scene.materials[0].source = material;
         scene.environment.source = Source::Builtin("white".to_owned());
         scene.shading.threads = Some(1);
         (scene.image.width, scene.image.height) = (32, 24);
@@ -243,6 +244,12 @@ mod tests {
         let device = Device::new(&instance, asked.as_deref()).expect("a device");
         let mut viewer = Viewer::new(scene, &device, Memo::default(), || ());
         wait(&mut viewer);
+        viewer
+    }
+
+    #[test]
+    fn a_draft_that_stands_still_is_sharp_before_it_is_finished() {
+        let mut viewer = viewer(MaterialSource::Builtin("gold".to_owned()));
         viewer.change(&Change::Parameter { material: "gold".into(), key: "alpha".into(), value: 0.3.into() }).unwrap();
         let start = Instant::now();
         while !viewer.loaded().is_some_and(Loaded::is_draft) {
@@ -259,16 +266,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("m.toml");
         std::fs::write(&path, "model = 'lambert'\nreflectance = 0.5").unwrap();
-        let mut scene = Scene::default();
-        scene.materials[0].source = MaterialSource::File(path.clone());
-        scene.environment.source = Source::Builtin("white".to_owned());
-        scene.shading.threads = Some(1);
-        (scene.image.width, scene.image.height) = (32, 24);
-        let instance = Instance::new(false).expect("an instance");
-        let asked = std::env::var("THREADLIGHT_TEST_DEVICE").ok();
-        let device = Device::new(&instance, asked.as_deref()).expect("a device");
-        let mut viewer = Viewer::new(scene, &device, Memo::default(), || ());
-        wait(&mut viewer);
+        let mut viewer = viewer(MaterialSource::File(path.clone()));
         // As if what is shown were a draft of what cannot be made.
         let loaded = viewer.loaded.take().expect("a picture");
         let prepared = Arc::new(Prepared { is_draft: true, ..(*loaded.prepared).clone() });

@@ -260,13 +260,19 @@ fn a_reader_that_has_seen_enough_is_no_error() {
     }
 }
 
-#[test]
-fn without_a_reader_files_are_written_and_verdicts_reached_all_the_same() {
+/// A workplace with two grey pictures, `a.png` and `b.png`.
+fn workplace_with_two_greys() -> TempDir {
     let folder = workplace();
     for (name, value) in [("a.png", 51), ("b.png", 102)] {
         let rgba = vec![value; 24 * 16 * 4];
         threadlight::low_level::output::write_png(&folder.path().join(name), 24, 16, &rgba, false).unwrap();
     }
+    folder
+}
+
+#[test]
+fn without_a_reader_files_are_written_and_verdicts_reached_all_the_same() {
+    let folder = workplace_with_two_greys();
     let (code, said) = unheard(&threadlight(&folder, "compare a.png b.png --at-most 1e-4"));
     assert!(code == Some(1) && said.contains("the RMS is"), "{code:?} {said}");
     let device = std::env::var("THREADLIGHT_TEST_DEVICE").map_or(String::new(), |device| format!("--device {device}"));
@@ -315,11 +321,7 @@ fn pictures_replace_older_ones_whole_and_leave_nothing_beside_them() {
 
 #[test]
 fn pictures_are_compared_as_a_table_as_json_and_as_a_heat_map() {
-    let folder = workplace();
-    for (name, value) in [("a.png", 51), ("b.png", 102)] {
-        let rgba = vec![value; 24 * 16 * 4];
-        threadlight::low_level::output::write_png(&folder.path().join(name), 24, 16, &rgba, false).unwrap();
-    }
+    let folder = workplace_with_two_greys();
     let table = printed(&mut threadlight(&folder, "compare a.png b.png --difference where.png"));
     let lines: Vec<Vec<_>> = table.lines().map(|line| line.split_whitespace().take(2).collect()).collect();
     let names: Vec<_> = lines.iter().map(|line| line[0]).collect();
