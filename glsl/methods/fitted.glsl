@@ -183,7 +183,7 @@ Points points_on_square(int side, bool sets) {
     return Points(last, side == 2 && !sets ? 2.0 : sqrt(12.0) / float(side), vec2(1.0 / float(side), 0.0), false);
 }
 
-// Four of equal weight: equal steps up, by turns to both sides as far as its standard deviation.
+// Four of equal weight: equal steps up, the outer two to one side and the inner two to the other, as far as its standard deviation.
 Points points_on_stairs() {
     return Points(vec2(1.5, 0.0), sqrt(12.0) / 4.0, vec2(0.5, 0.0), true);
 }

@@ -13,7 +13,8 @@
 //!
 //! Row r is for the view angle theta_o = r 90 deg / rows, in the frame whose z is the normal and in which w_o = (sin theta_o, 0,
 //! cos theta_o). Colours are linear Rec. 709. Thread k of row r is the (r count + k)-th. Of an anisotropic BRDF there are as many rows for
-//! each of 19, 37 or 73 azimuths of w_o from the tangent, every 5 degrees; then those of the second azimuth follow those of the first.
+//! each of 19, 37 or 73 azimuths of w_o from the tangent, every 5 degrees; then those of the second azimuth follow those of the first. They
+//! are of the BRDF without its `rotation_deg`.
 //!
 //! Fitted threads and Gaussians may be in several sets, of which thread k is of set k % sets. A sub-pixel with a sum of its own takes one set,
 //! with `sets` times the weights; a pixel whose sub-pixels share one sum takes all threads. If there are two tables, one after the other, the
