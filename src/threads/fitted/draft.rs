@@ -130,7 +130,11 @@ impl Drafting<'_> {
 
     fn target(&self, index: usize) -> Target {
         let View { theta_o, phi_o } = self.view(index);
-        let slices = Slice::with_lobes(&SeenBrdf::from_azimuth(self.brdf, phi_o), theta_o, Resolution::DRAFT);
+        let slices = Slice::with_lobes(
+            &SeenBrdf::from_azimuth(self.brdf, phi_o),
+            theta_o,
+            Resolution::DRAFT.along(&self.lobe, phi_o),
+        );
         let count = FEWEST_LIGHTS + LIGHTS_A_THREAD * self.before.count;
         let lights = TestLights::new(&slices, count, 0, Quadrature::DRAFT);
         let albedo = slices[0].albedo();

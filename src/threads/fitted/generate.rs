@@ -83,11 +83,12 @@ impl Targets {
     /// Cancelled by `observer` (noticed within a row).
     fn new(brdf: &Brdf, settings: &ThreadSettings, observer: &dyn Observer) -> Result<Self> {
         let (rows, count) = (settings.rows, light_count(settings.count));
-        let azimuths = azimuth_count(brdf);
+        let (azimuths, lobe) = (azimuth_count(brdf), LobeShape::of(brdf));
         let target = |index: usize| -> Result<(TestLights, DVec3)> {
             observer.check()?;
             let View { theta_o, phi_o } = View::of_row(index, rows);
-            let slices = Slice::with_lobes(&SeenBrdf::from_azimuth(brdf, phi_o), theta_o, Resolution::FULL);
+            let resolution = Resolution::FULL.along(&lobe, phi_o);
+            let slices = Slice::with_lobes(&SeenBrdf::from_azimuth(brdf, phi_o), theta_o, resolution);
             let lights = match settings.kind {
                 ThreadKind::Gaussian => TestLights::directions(&slices, DIRECTIONS_A_LIGHT * count),
                 _ => TestLights::new(&slices, count, LIGHTS_SEED, Quadrature::FIT),
@@ -95,7 +96,7 @@ impl Targets {
             Ok((lights, slices[0].albedo()))
         };
         let rows = (0..azimuths * rows).into_par_iter().map(target).collect::<Result<_>>()?;
-        Ok(Self { azimuths, rows, lobe: LobeShape::of(brdf) })
+        Ok(Self { azimuths, rows, lobe })
     }
 
     /// Whether the cosine kernel alone does in all rows.
@@ -156,7 +157,7 @@ fn fit_all(
         let start = match &neighbours[..] {
             [] => {
                 let seen = SeenBrdf::from_azimuth(brdf, to.phi_o);
-                let [_, lobes] = Slice::with_lobes(&seen, to.theta_o, Resolution::FULL);
+                let [_, lobes] = Slice::with_lobes(&seen, to.theta_o, Resolution::FULL.along(&targets.lobe, to.phi_o));
                 let starts = in_sets(&lobes, settings.count, settings.sets);
                 best_of(&fit, starts.into_iter().map(|cells| in_units(&cells)).collect(), observer)?
             }

@@ -5,7 +5,7 @@ use super::kernel::Kernel;
 use super::lights::{Quadrature, TestLights};
 use super::solve::Fit;
 use super::table::FittedTable;
-use crate::brdf::{Brdf, SeenBrdf};
+use crate::brdf::{Brdf, LobeShape, SeenBrdf};
 use crate::threads::slice::{Resolution, Slice};
 
 /// View angles, in degrees: of rows and between them, denser where pictures of spheres have more pixels or lobes are cut.
@@ -21,10 +21,12 @@ const SEED: usize = 5;
 /// The error of `table` relative to the radiance that `brdf` has under lights of all sizes, others than those of the fit and integrated
 /// with more points: RMS over view angles, each with the weight sin(2 theta_o) that it has on a sphere.
 pub fn validation_error(table: &FittedTable, brdf: &Brdf) -> f64 {
+    let lobe = LobeShape::of(brdf);
     let error = |index: usize| {
         let theta_o = ANGLES_DEG[index % ANGLES_DEG.len()].to_radians();
         let phi_o = AZIMUTHS_DEG[index / ANGLES_DEG.len()].to_radians();
-        let slices = Slice::with_lobes(&SeenBrdf::from_azimuth(brdf, phi_o), theta_o, Resolution::FULL);
+        let resolution = Resolution::FULL.along(&lobe, phi_o);
+        let slices = Slice::with_lobes(&SeenBrdf::from_azimuth(brdf, phi_o), theta_o, resolution);
         let lights = TestLights::new(&slices, LIGHTS, SEED, Quadrature::FINE);
         let in_units = |kernel: Kernel| Kernel { weight: kernel.weight / lights.unit, ..kernel };
         let kernels: Vec<_> = table.seen_from(theta_o, phi_o).into_iter().map(in_units).collect();
