@@ -205,6 +205,7 @@ pub fn prepare_draft(scene: &Scene, before: &Prepared, round: &Round) -> Result<
 type AskThreads<'a> = dyn Fn(Method, &PreparedMaterial, Sampling) -> Result<Option<Keyed<Threads>>> + 'a;
 
 fn prepare_by(scene: &Scene, round: &Round, ask_threads: &AskThreads) -> Result<Prepared> {
+    scene.check()?;
     let method = scene.shading.method;
     let count = scene.shading.threads.unwrap_or(method.default_count());
     check_count(method, count, scene.image.subpixels)?;
@@ -220,7 +221,7 @@ fn prepare_by(scene: &Scene, round: &Round, ask_threads: &AskThreads) -> Result<
     check_materials(scene)?;
     let mut materials = Vec::new();
     for name in scene.used_materials() {
-        // The scene has checked that every material an object names is there.
+        // `check` has found every material that an object names.
         let Some(settings) = scene.materials.iter().find(|material| material.name == name) else { continue };
         let brdf = round.ask(&LoadMaterial(&settings.source)).map_err(|error| match settings.source {
             MaterialSource::Model { .. } => error.within(format!("material \"{name}\"")),

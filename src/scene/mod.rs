@@ -1,4 +1,5 @@
 //! What is rendered: image settings, camera, environment, materials and objects, as a scene file or flags name them.
+use std::collections::HashSet;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
@@ -7,6 +8,7 @@ use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::brdf::{Brdf, Custom, base_files, base_files_of};
+use crate::error::{Error, Result};
 use crate::file_format::file_formats;
 
 pub mod camera;
@@ -298,6 +300,48 @@ impl Scene {
     }
 }
 
+impl Scene {
+    /// An error where a program has set what no scene file can say.
+    ///
+    /// # Errors
+    /// The first setting that cannot be used.
+    pub fn check(&self) -> Result<()> {
+        let Self { image, environment, shading, .. } = self;
+        let any = f64::MIN..=f64::MAX;
+        for (key, value, range) in [
+            ("width", image.width.into(), 1.0..=f64::from(MAX_SIZE_PX)),
+            ("height", image.height.into(), 1.0..=f64::from(MAX_SIZE_PX)),
+            ("subpixels", image.subpixels.into(), 1.0..=f64::from(MAX_SUBPIXELS)),
+            ("exposure", image.exposure, EXPOSURE),
+            ("gamma", image.gamma, GAMMA),
+            ("rotation_deg", environment.rotation_deg, any),
+            ("intensity", environment.intensity, INTENSITY),
+            // How many it may have at most is for its method to say.
+            ("threads", shading.threads.unwrap_or(1).into(), 1.0..=f64::from(u32::MAX)),
+        ] {
+            // No range holds NaN.
+            if !range.contains(&value) {
+                let remedy = format!("use a number from {:?} to {:?}", range.start(), range.end());
+                return Err(Error::input(format!("scene: `{key}`"), format!("is {value:?}"), remedy));
+            }
+        }
+        if let Some(problem) = self.camera.and_then(|camera| camera.validate().err()) {
+            return Err(Error::input("scene: camera", problem, "choose another, or none"));
+        }
+        if self.objects.is_empty() {
+            return Err(Error::input("scene", "has no objects", "give it one at least"));
+        }
+        let names: HashSet<_> = self.materials.iter().map(|material| material.name.as_str()).collect();
+        match self.objects.iter().find(|object| !names.contains(object.material.as_str())) {
+            None => Ok(()),
+            Some(object) => {
+                let problem = format!("is of the material \"{}\", which the scene has not", object.material);
+                Err(Error::input(format!("scene: object {}", object.mesh), problem, "add it to `materials`"))
+            }
+        }
+    }
+}
+
 impl Default for ImageSettings {
     fn default() -> Self {
         Self { width: 640, height: 480, subpixels: 2, exposure: 1.0, gamma: 2.2, background: Background::Environment }
@@ -347,6 +391,7 @@ impl ObjectSettings {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use glam::DVec3;
 
     #[test]
     fn a_file_called_like_a_built_in_is_never_taken_for_it() {
@@ -362,6 +407,32 @@ mod tests {
         assert_eq!(Source::named(&file.to_string(), mesh::builtin_names()), Source::File("./sphere".into()));
         assert_eq!(MaterialSource::named("gold"), MaterialSource::Builtin("gold".into()));
         assert_eq!(MaterialSource::named("./gold"), MaterialSource::File("./gold".into()));
+    }
+
+    #[test]
+    fn what_no_scene_file_can_say_no_program_can_set() {
+        assert!(Scene::default().check().is_ok());
+        type Set = fn(&mut Scene);
+        let wrong: [(&str, Set); 12] = [
+            ("`width`", |scene| scene.image.width = 0),
+            ("`height`", |scene| scene.image.height = MAX_SIZE_PX + 1),
+            ("`subpixels`", |scene| scene.image.subpixels = 0),
+            ("`exposure`", |scene| scene.image.exposure = f64::NAN),
+            ("`gamma`", |scene| scene.image.gamma = 0.0),
+            ("`rotation_deg`", |scene| scene.environment.rotation_deg = f64::INFINITY),
+            ("`intensity`", |scene| scene.environment.intensity = -1.0),
+            ("`threads`", |scene| scene.shading.threads = Some(0)),
+            ("`up`", |scene| scene.camera = Some(Camera { up: DVec3::ZERO, ..Camera::framing(DVec3::ZERO, 1.0, 1.0) })),
+            ("no objects", |scene| scene.objects.clear()),
+            ("\"gold\"", |scene| scene.materials.clear()),
+            ("\"x\"", |scene| scene.objects[0].material = "x".into()),
+        ];
+        for (name, set) in wrong {
+            let mut scene = Scene::default();
+            set(&mut scene);
+            let error = scene.check().unwrap_err().to_string();
+            assert!(error.contains(name), "{error}");
+        }
     }
 
     #[test]
