@@ -33,9 +33,10 @@ impl LightMap {
     pub fn new(environment: &Environment) -> Self {
         let (width, height) = (environment.width, environment.height);
         let black = environment.max_radiance() == 0.0;
+        let areas: Vec<_> = (0..height).map(|row| environment.weight_solid_angle(row)).collect();
         let mass = |i: usize| {
             let luminance = if black { 1.0 } else { luminance(super::to_dvec3(&environment.texels[i])) };
-            luminance * environment.weight_solid_angle(i / width)
+            luminance * areas[i / width]
         };
         let masses: Vec<f64> = (0..width * height).into_par_iter().map(mass).collect();
         // A mean of 1 is a density over the unit square.

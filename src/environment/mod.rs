@@ -107,7 +107,12 @@ impl Environment {
     /// The radiance that arrives from `direction` (any length but 0): bilinear between pixel centres, wrapped in u,
     /// clamped at the poles. This function is the environment; everything else approximates it.
     pub fn radiance(&self, direction: DVec3) -> DVec3 {
-        let (x, y) = self.pixel(direction);
+        let (column, row) = self.pixel(direction);
+        self.radiance_at(column, row)
+    }
+
+    /// The same from [`Self::direction`] of this column and row, which needs no angles.
+    fn radiance_at(&self, x: f64, y: f64) -> DVec3 {
         let (left, top) = (x.floor(), y.floor());
         let row = |row: f64| {
             self.texel(left as isize, row as isize).lerp(self.texel(left as isize + 1, row as isize), x - left)

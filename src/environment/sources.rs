@@ -149,11 +149,16 @@ fn add_tree(index: usize, found: &[Part], halves: &[Range<usize>], nodes: &mut V
 /// not hide them.
 fn threshold(environment: &Environment) -> f64 {
     let mean_below = |threshold: f64| {
-        let pixel = |(i, texel): (usize, &[f32; 3])| {
-            let radiance = luminance(super::to_dvec3(texel));
-            if radiance > threshold { 0.0 } else { environment.weight_solid_angle(i / environment.width) * radiance }
-        };
-        environment.texels.iter().enumerate().map(pixel).sum::<f64>() / (4.0 * std::f64::consts::PI)
+        let rows = environment.texels.chunks_exact(environment.width).enumerate();
+        let pixels = rows.flat_map(|(row, texels)| {
+            // Once a row: it takes as long as many pixels.
+            let solid_angle = environment.weight_solid_angle(row);
+            texels.iter().map(move |texel| {
+                let radiance = luminance(super::to_dvec3(texel));
+                if radiance > threshold { 0.0 } else { solid_angle * radiance }
+            })
+        });
+        pixels.sum::<f64>() / (4.0 * std::f64::consts::PI)
     };
     // Each threshold is below the last one.
     const ROUNDS: usize = 8;
