@@ -157,7 +157,7 @@ pub fn parse_exr(path: &Path, bytes: &[u8]) -> Result<PictureFile> {
         Error::in_file(
             path,
             format!("is not an EXR that can be read ({cause})"),
-            "save it again, with channels R, G, B",
+            "save it again, with channels R, G, B and compression ZIP",
         )
     };
     let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(broken)?;
