@@ -307,26 +307,16 @@ impl Scene {
     /// The first setting that cannot be used.
     pub fn check(&self) -> Result<()> {
         let Self { image, environment, shading, .. } = self;
-        let any = f64::MIN..=f64::MAX;
-        for (key, value, range) in [
-            ("width", image.width.into(), 1.0..=f64::from(MAX_SIZE_PX)),
-            ("height", image.height.into(), 1.0..=f64::from(MAX_SIZE_PX)),
-            ("subpixels", image.subpixels.into(), 1.0..=f64::from(MAX_SUBPIXELS)),
-            ("exposure", image.exposure, EXPOSURE),
-            ("gamma", image.gamma, GAMMA),
-            ("rotation_deg", environment.rotation_deg, any),
-            ("intensity", environment.intensity, INTENSITY),
-            // How many it may have at most is for its method to say.
-            ("threads", shading.threads.unwrap_or(1).into(), 1.0..=f64::from(u32::MAX)),
-        ] {
-            // No range holds NaN.
-            if !range.contains(&value) {
-                let remedy = format!("use a number from {:?} to {:?}", range.start(), range.end());
-                return Err(Error::input(format!("scene: `{key}`"), format!("is {value:?}"), remedy));
-            }
-        }
+        within("width", image.width, &(1..=MAX_SIZE_PX))?;
+        within("height", image.height, &(1..=MAX_SIZE_PX))?;
+        within("subpixels", image.subpixels, &(1..=MAX_SUBPIXELS))?;
+        within("exposure", image.exposure, &EXPOSURE)?;
+        within("gamma", image.gamma, &GAMMA)?;
+        within("rotation_deg", environment.rotation_deg, &(f64::MIN..=f64::MAX))?;
+        within("intensity", environment.intensity, &INTENSITY)?;
+        within("threads", shading.threads.unwrap_or(1), &(1..=MAX_SAMPLES))?;
         if let Some(problem) = self.camera.and_then(|camera| camera.validate().err()) {
-            return Err(Error::input("scene: camera", problem, "choose another, or none"));
+            return Err(Error::input("camera", problem, "choose another, or none"));
         }
         if self.objects.is_empty() {
             return Err(Error::input("scene", "has no objects", "give it one at least"));
@@ -336,10 +326,24 @@ impl Scene {
             None => Ok(()),
             Some(object) => {
                 let problem = format!("is of the material \"{}\", which the scene has not", object.material);
-                Err(Error::input(format!("scene: object {}", object.mesh), problem, "add it to `materials`"))
+                Err(Error::input(format!("object {}", object.mesh), problem, "add it to `materials`"))
             }
         }
     }
+}
+
+/// `value` if it is in `range`: no range holds NaN.
+pub(crate) fn within<T: PartialOrd + std::fmt::Debug + Copy>(
+    name: &str,
+    value: T,
+    range: &RangeInclusive<T>,
+) -> Result<T> {
+    if range.contains(&value) {
+        return Ok(value);
+    }
+    // Debug's form of large and small numbers has an exponent.
+    let remedy = format!("use a value from {:?} to {:?}", range.start(), range.end());
+    Err(Error::input(name, format!("{value:?} is out of range"), remedy))
 }
 
 impl Default for ImageSettings {
@@ -414,14 +418,14 @@ mod tests {
         assert!(Scene::default().check().is_ok());
         type Set = fn(&mut Scene);
         let wrong: [(&str, Set); 12] = [
-            ("`width`", |scene| scene.image.width = 0),
-            ("`height`", |scene| scene.image.height = MAX_SIZE_PX + 1),
-            ("`subpixels`", |scene| scene.image.subpixels = 0),
-            ("`exposure`", |scene| scene.image.exposure = f64::NAN),
-            ("`gamma`", |scene| scene.image.gamma = 0.0),
-            ("`rotation_deg`", |scene| scene.environment.rotation_deg = f64::INFINITY),
-            ("`intensity`", |scene| scene.environment.intensity = -1.0),
-            ("`threads`", |scene| scene.shading.threads = Some(0)),
+            ("width", |scene| scene.image.width = 0),
+            ("height", |scene| scene.image.height = MAX_SIZE_PX + 1),
+            ("subpixels", |scene| scene.image.subpixels = 0),
+            ("exposure", |scene| scene.image.exposure = f64::NAN),
+            ("gamma", |scene| scene.image.gamma = 0.0),
+            ("rotation_deg", |scene| scene.environment.rotation_deg = f64::INFINITY),
+            ("intensity", |scene| scene.environment.intensity = -1.0),
+            ("threads", |scene| scene.shading.threads = Some(0)),
             ("`up`", |scene| scene.camera = Some(Camera { up: DVec3::ZERO, ..Camera::framing(DVec3::ZERO, 1.0, 1.0) })),
             ("no objects", |scene| scene.objects.clear()),
             ("\"gold\"", |scene| scene.materials.clear()),

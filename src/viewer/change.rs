@@ -6,10 +6,8 @@ use crate::method::Method;
 use crate::prepare::check_count;
 use crate::scene::{
     Background, Camera, EXPOSURE, GAMMA, INTENSITY, MAX_SAMPLES, MAX_SIZE_PX, MAX_SUBPIXELS, MaterialSource, Pattern,
-    Scene, ShadingSettings, Source,
+    Scene, ShadingSettings, Source, within,
 };
-use std::fmt::Debug;
-use std::ops::RangeInclusive;
 use std::path::Path;
 
 /// A change of the scene, as the panel, a key or a dropped file makes it.
@@ -163,16 +161,6 @@ pub fn most_count(method: Method, scene: &Scene) -> u32 {
 /// An error for columns and rows that no picture has.
 pub(super) fn check_size(size: [u32; 2]) -> Result<()> {
     size.into_iter().try_for_each(|side| within("size", side, &(1..=MAX_SIZE_PX)).map(drop))
-}
-
-/// `value` if it is in `range`: no range holds NaN.
-pub(super) fn within<T: PartialOrd + Debug + Copy>(name: &str, value: T, range: &RangeInclusive<T>) -> Result<T> {
-    if range.contains(&value) {
-        return Ok(value);
-    }
-    // Debug's form of large and small numbers has an exponent.
-    let remedy = format!("use a value from {:?} to {:?}", range.start(), range.end());
-    Err(Error::input(name, format!("{value:?} is out of range"), remedy))
 }
 
 #[cfg(test)]

@@ -1,5 +1,5 @@
 //! The viewer: what inputs do to the session. What follows is in `making.rs` and `drawing.rs`. Knows nothing of the window system.
-use super::change::{Change, most_count, within};
+use super::change::{Change, most_count};
 use super::comparer::Comparer;
 use super::comparison::Wipe;
 use super::dynamic_resolution::DynamicResolution;
@@ -17,7 +17,7 @@ use crate::memo::{Key, Memo};
 use crate::passes::Area;
 use crate::pipeline::DeviceScene;
 use crate::prepare::{Prepared, view_of};
-use crate::scene::{Background, Scene};
+use crate::scene::{Background, Scene, within};
 use crate::vulkan::Device;
 use crate::{Error, Result};
 use glam::DVec2;
