@@ -298,9 +298,7 @@ impl Scene {
         }
         names
     }
-}
 
-impl Scene {
     /// An error where a program has set what no scene file can say.
     ///
     /// # Errors
