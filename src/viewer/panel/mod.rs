@@ -13,6 +13,7 @@ mod threads;
 use super::change::Change;
 use super::input::Input;
 use super::interaction::Viewer;
+use super::loaded::Loaded;
 use egui::{Align2, Color32, Context, Frame, RichText, ScrollArea, SidePanel, Ui};
 
 /// Width of the panel in points.
@@ -81,9 +82,11 @@ fn progress(ui: &mut Ui, viewer: &Viewer) {
         Some(progress) => (0.0, progress.what),
         None => (0.0, if viewer.is_loading() { "loading" } else { "ready" }.to_owned()),
     };
+    let is_draft = viewer.loaded().is_some_and(Loaded::is_draft);
+    let what = if is_draft { format!("draft; {what}") } else { what };
     let bar = egui::ProgressBar::new(share).text(what).corner_radius(2.0).desired_height(16.0);
     ui.add(bar).on_hover_text(
-        "What is made in the background: threads (one row for each view angle), uploads. The old picture stays until it is done.",
+        "What is made in the background: threads (one row for each view angle), uploads. The old picture, or a draft of the new one, stays until it is done.",
     );
 }
 
