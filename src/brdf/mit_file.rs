@@ -134,6 +134,15 @@ mod tests {
     }
 
     #[test]
+    fn the_same_numbers_over_other_angles_are_another_material() {
+        let half = made(true, |plane, _| plane as f32);
+        let mut around = half.clone();
+        around[4 * 9..][..4].copy_from_slice(&0_i32.to_le_bytes());
+        let [half, around] = [half, around].map(|bytes| parse(Path::new("x.dat"), &bytes).unwrap().fingerprint());
+        assert_ne!(half, around);
+    }
+
+    #[test]
     fn files_that_are_none_are_refused_with_a_reason() {
         let good = made(true, |_, _| 0.3);
         let with = |index: usize, number: i32| {

@@ -54,8 +54,8 @@ pub fn anisotropic() -> impl Iterator<Item = (String, Brdf)> {
     of(ANISOTROPIC).chain(builtin)
 }
 
-/// The five sets of each model as BRDFs, with their names.
-pub fn all() -> impl Iterator<Item = (String, Brdf)> {
+/// The five sets of each model: their names, the models, and their parameters.
+pub fn tables() -> impl Iterator<Item = (String, String, toml::Table)> {
     let mut scene: toml::Table = MODELS.parse().expect("TOML");
     let materials = scene.remove("material").expect("materials");
     let materials: Vec<toml::Table> = materials.try_into().expect("tables");
@@ -64,6 +64,13 @@ pub fn all() -> impl Iterator<Item = (String, Brdf)> {
             Some(toml::Value::String(text)) => text,
             other => panic!("{key} = {other:?}"),
         });
+        (name, model, parameters)
+    })
+}
+
+/// [`tables`] as BRDFs, with their names.
+pub fn all() -> impl Iterator<Item = (String, Brdf)> {
+    tables().map(|(name, model, parameters)| {
         let brdf = Brdf::from_parameters(&model, parameters).unwrap_or_else(|error| panic!("{name}: {error}"));
         (name, brdf)
     })

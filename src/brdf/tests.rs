@@ -398,6 +398,34 @@ fn fingerprints_tell_brdfs_apart() {
 }
 
 #[test]
+fn a_brdf_with_another_value_of_any_parameter_has_another_fingerprint() {
+    let models = samples::tables().map(|(_, model, table)| (model, table));
+    let models = models.chain(Brdf::builtin_names().filter_map(Brdf::builtin_model));
+    let mut changed = std::collections::BTreeSet::new();
+    for (model, table) in models {
+        let before = Brdf::from_parameters(&model, table.clone()).unwrap();
+        for Parameter { key, domain, .. } in Brdf::parameters(&model, &table).unwrap() {
+            let others: Vec<toml::Value> = match &domain {
+                Domain::Number(range, _) | Domain::Colour(range) => {
+                    vec![(range.start() + 0.37 * (range.end() - range.start())).into()]
+                }
+                Domain::Choice(words) => words.iter().map(|word| word.as_str().into()).collect(),
+            };
+            for value in others {
+                let mut other = table.clone();
+                set_parameter(&mut other, &key, value);
+                let Ok(after) = Brdf::from_parameters(&model, other) else { continue };
+                // Some say nothing beside others, such as a metal's name.
+                let differs = format!("{before:?}") != format!("{after:?}");
+                assert!(!differs || before.fingerprint() != after.fingerprint(), "{model}: {key}");
+                changed.extend(differs.then(|| format!("{model}: {key}")));
+            }
+        }
+    }
+    assert!(changed.contains("layered: coat.ior") && changed.len() > 70, "{changed:?}");
+}
+
+#[test]
 fn a_model_tells_what_it_reads() {
     for name in Brdf::builtin_names() {
         let (model, table) = Brdf::builtin_model(name).unwrap();
