@@ -257,7 +257,7 @@ mod tests {
     }
 
     #[test]
-    fn pixels_that_look_like_the_marker_of_runs_are_pixels_where_a_scanline_is_too_short_for_runs() {
+    fn pixels_that_look_like_the_marker_of_runs_are_pixels_where_a_scanline_is_too_short_or_long_for_runs() {
         assert_eq!(reds("-Y 1 +X 2", &[2, 2, 0, 136, 3, 0, 0, 136]), [[2.0, 3.0]]);
         // The same bytes are the marker of a scanline of eight: a run of each channel.
         let runs = [2, 2, 0, 8, 136, 5, 136, 0, 136, 0, 136, 136];
@@ -265,6 +265,9 @@ mod tests {
         // One that is of another length is damaged.
         let damaged = [b"#?RADIANCE\n\n-Y 1 +X 9\n", &runs[..]].concat();
         assert!(parse(Path::new("test.hdr"), &damaged).unwrap_err().to_string().contains("scanline 1 of 1"));
+        // From 32768 pixels on a marker has no room for the length.
+        let long = [2, 2, 0, 136].repeat(32768);
+        assert_eq!(reds("-Y 1 +X 32768", &long), [vec![2.0; 32768]]);
     }
 
     #[test]

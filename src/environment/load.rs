@@ -200,6 +200,12 @@ mod tests {
             assert!((sum(&repaired) - before).abs() < 1e-4, "{index}: {before} became {}", sum(&repaired));
             assert!(repaired.texels.iter().all(|texel| texel[0] >= 0.0 && texel[1..] == [2.0, 3.0]));
         }
+        // All around give alike.
+        let mut even = vec![[1.0; 3]; 25];
+        even[12][0] = -1.0;
+        repair(5, 5, &mut even);
+        let reds: Vec<f32> = [6, 7, 8, 11, 13, 16, 17, 18].map(|neighbour| even[neighbour][0]).to_vec();
+        assert!(reds[0] < 1.0 && reds.iter().all(|red| *red == reds[0]), "{reds:?}");
         // Where nothing is to be had the pixel is merely black.
         let mut alone = vec![[-1.0, 0.0, 0.0]];
         assert_eq!(repair(1, 1, &mut alone).negative, 1);

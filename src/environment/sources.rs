@@ -299,6 +299,36 @@ mod tests {
     }
 
     #[test]
+    fn a_lamp_across_the_first_column_is_one() {
+        let map = environment(128, 64, |x, y| [if [0, 127].contains(&x) && y == 30 { 1e5 } else { 1.0 }; 3]);
+        let nodes = SmallSources::of(&map).nodes;
+        let LightSource { direction, power, .. } = nodes[0].source;
+        assert_eq!(nodes[0].size, nodes.len());
+        assert!(direction.distance(map.direction(-0.5, 30.0)) < 1e-3, "{direction}");
+        assert!((power.x / (2e5 * map.weight_solid_angle(30)) - 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_brightest_lamps_are_sources_as_far_as_there_is_room_and_sparks_are_none() {
+        let lamp = |x: usize, y: usize| x.is_multiple_of(8) && y.is_multiple_of(8);
+        let number = |x: usize, y: usize| x / 8 + y / 8 * 16;
+        // At the same height they are the brighter the farther to the right.
+        let map = environment(128, 64, |x, y| [if lamp(x, y) { 1e4 + number(x, y) as f32 } else { 1.0 }; 3]);
+        let sources = SmallSources::of(&map);
+        assert_eq!((sources.leaves().count(), sources.nodes.len()), (MAX_REGIONS, MAX_REGIONS));
+        let taken = |x: usize| sources.pixels[32 * 128 + x];
+        assert!(
+            (0..128).all(|x| taken(x) == (lamp(x, 32) && x >= 8 * (16 - MAX_REGIONS))),
+            "the equator's are largest"
+        );
+        assert_eq!(sources.device_words(1.0).len(), 4 + 16 * 2 * MAX_SOURCES);
+        // Thirty times brighter than all around, but a thousandth of a sun.
+        let spark = |x: usize, y: usize| if lamp(x, y) { 100.0 } else { 1.0 };
+        let sparks = environment(128, 64, |x, y| [if (x, y) == (12, 36) { 1e6 } else { spark(x, y) }; 3]);
+        assert_eq!(SmallSources::of(&sparks).nodes.len(), 1);
+    }
+
+    #[test]
     fn a_lamp_is_divided_where_the_halves_have_the_least_spread() {
         // Along the horizon, brightest at its left end: the middle of its light is not the best cut.
         let radiance = |x: usize| if x < 63 { 3e4 } else { 3e3 / (x - 60) as f32 };
