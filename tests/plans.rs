@@ -271,6 +271,35 @@ fn what_another_result_of_a_pass_needs_is_made_anew_from_its_start() {
 }
 
 #[test]
+fn what_is_made_of_several_things_is_made_anew_when_any_of_them_is_another() {
+    let frame = |contents: [u32; 3]| {
+        let mut graph = Graph::new();
+        let sources = ["first", "second", "third"].map(|name| graph.kept_image(name, COLOR));
+        let mut made = graph.kept_image("sum", COLOR);
+        let mut handles = Vec::new();
+        for (source, (name, content)) in sources.into_iter().zip(["a", "b", "c"].into_iter().zip(contents)) {
+            let mut pass = graph.pass(name);
+            handles.push(pass.write(source, Access::StorageWriteCompute));
+            pass.depends_on(&content).record(());
+        }
+        let mut pass = graph.pass("add");
+        for handle in handles {
+            pass.read(handle, Access::StorageReadCompute);
+        }
+        made = pass.write(made, Access::StorageWriteCompute);
+        pass.depends_on(&()).record(());
+        read(&mut graph, "look", &[(made.into(), Access::SampledCompute)]);
+        graph
+    };
+    let first = after(&Kept::default(), frame([0; 3]));
+    assert_eq!(names(&first), ["a", "b", "c", "add", "look"]);
+    assert_eq!(names(&after(&first.kept, frame([0; 3]))), ["look"]);
+    for (changed, name) in [([1, 0, 0], "a"), ([0, 1, 0], "b"), ([0, 0, 1], "c")] {
+        assert_eq!(names(&after(&first.kept, frame(changed))), [name, "add", "look"]);
+    }
+}
+
+#[test]
 fn a_kept_image_that_is_to_be_used_in_another_way_is_made_anew_once() {
     let frame = |save: bool| {
         let mut graph = Graph::new();

@@ -13,8 +13,9 @@ use threadlight::low_level::graph::*;
 
 fn memory(info: &ResourceInfo) -> MemoryRequirement {
     let (size_bytes, alignment) = match info.kind {
-        ResourceKind::Buffer(desc) => (desc.size_bytes, 64),
-        ResourceKind::Image(desc) => (u64::from(desc.width * desc.height * 4), 1024),
+        // As on devices where what is larger need not be aligned to more.
+        ResourceKind::Buffer(desc) => (desc.size_bytes, 64 << (desc.size_bytes % 3)),
+        ResourceKind::Image(desc) => (u64::from(desc.width * desc.height * 4), 1024 << (desc.width % 3)),
     };
     // Depth images live in other memory than colour images, as on some devices.
     let is_depth = matches!(info.kind, ResourceKind::Image(desc) if is_depth(desc.format));
