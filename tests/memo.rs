@@ -11,7 +11,7 @@ use threadlight::low_level::pipeline::{DeviceScene, Wanted};
 use threadlight::low_level::prepare::{Prepared, key_of, prepare, prepare_draft};
 use threadlight::low_level::progress::Observer;
 use threadlight::low_level::scene::{
-    Background, Camera, MaterialSettings, MaterialSource, ObjectSettings, Scene, Source,
+    Background, Camera, MaterialSettings, MaterialSource, ObjectSettings, Scene, Source, TangentRule,
 };
 
 fn small() -> Scene {
@@ -91,6 +91,61 @@ fn each_change_makes_what_it_needs_and_nothing_else() {
     assert_eq!(ask(&gpu, &unused).1, Vec::<&str>::new());
     assert_eq!(key_of(&unused, &gpu.memo).unwrap(), key_of(&before, &gpu.memo).unwrap());
     drop(renderer);
+    gpu.finish();
+}
+
+#[test]
+fn what_a_renderer_is_made_of_is_in_the_key_of_a_scene_and_what_frames_are_given_is_not() {
+    let memo = Memo::default();
+    let key = |change: &dyn Fn(&mut Scene)| {
+        let mut scene = small();
+        scene.shading.method = Method::Paper;
+        let other = MaterialSettings { name: "other".into(), source: MaterialSource::Builtin("gold".into()) };
+        scene.materials.push(other);
+        scene.objects.push(ObjectSettings::new(Source::Builtin("sphere".into()), "other"));
+        change(&mut scene);
+        key_of(&scene, &memo).unwrap()
+    };
+    let before = key(&|_| ());
+    let material = small().materials[0].name.clone();
+    type Change<'c> = (&'static str, &'c dyn Fn(&mut Scene));
+    let changes: [Change; 5] = [
+        ("seed", &|scene| scene.shading.seed = 7),
+        ("scale", &|scene| scene.objects[0].scale = 2.0),
+        ("tangent", &|scene| scene.objects[0].tangent = Some(TangentRule::Along(glam::Vec3::X))),
+        ("material of an object", &|scene| scene.objects[1].material = material.clone()),
+        ("objects", &|scene| scene.objects.truncate(1)),
+    ];
+    for (name, change) in changes {
+        assert_ne!(key(change), before, "{name}");
+    }
+    let framed = key(&|scene| {
+        scene.camera = Some(Camera::framing(glam::DVec3::ZERO, 2.0, 1.0));
+        (scene.image.width, scene.image.exposure, scene.image.gamma) = (48, 2.0, 1.8);
+        (scene.environment.rotation_deg, scene.environment.intensity) = (10.0, 2.0);
+    });
+    assert_eq!(framed, before);
+}
+
+#[test]
+fn light_that_brings_lamps_brings_the_brdfs_that_they_are_shaded_by() {
+    let gpu = Validated::new();
+    let folder = tempfile::tempdir().unwrap();
+    let map = |name: &str, lamp: f32| {
+        let path = folder.path().join(name);
+        let texels: Vec<_> = (0..32 * 16).map(|i| [if i == 200 { lamp } else { 1.0 }; 4]).collect();
+        threadlight::low_level::output::write_exr(&path, 32, 16, &texels, false, &Default::default()).unwrap();
+        Source::File(path)
+    };
+    let mut scene = small();
+    // Shaders look this one up in a table.
+    scene.materials[0].source = common::model("model = 'oren_nayar'\nreflectance = 0.5\nsigma_deg = 30.0");
+    scene.environment.source = map("soft.exr", 1.0);
+    let (soft, _) = ask(&gpu, &scene);
+    scene.environment.source = map("lamp.exr", 500.0);
+    let (_, made) = ask(&gpu, &scene);
+    assert!(made.contains(&"upload of materials"), "{made:?}");
+    drop(soft);
     gpu.finish();
 }
 

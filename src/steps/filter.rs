@@ -190,3 +190,23 @@ pub fn blurred_light(
     };
     Ok(BlurredLight { rest, sources, irradiance, needs })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::environment::tests::environment;
+
+    #[test]
+    fn pyramids_of_one_environment_and_two_sizes_are_two() {
+        let sky = environment(8, 4, |x, y| [x as f32, y as f32, 1.0]);
+        let environment = Keyed::new(Key::of_digest(sky.fingerprint()), sky);
+        let memo = Memo::default();
+        let round = memo.round(&());
+        let [small, large] = [4, 16].map(|size| {
+            let pyramid = round.ask(&BoxFilter { environment: &environment, face_size: Some(size) }).unwrap();
+            (pyramid.key, pyramid.face_size)
+        });
+        assert_eq!((small.1, large.1), (4, 16));
+        assert_ne!(small.0, large.0);
+    }
+}
