@@ -2,13 +2,15 @@
 //! the project.
 mod common;
 
-use common::{Validated, model, ready, sphere};
-use glam::{DVec3, Vec3};
+use common::{EVERYTHING, Validated, model, ready, sphere};
+use glam::{DVec3, Vec3, Vec4};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 use threadlight::Method;
 use threadlight::low_level::evaluate::Display;
-use threadlight::low_level::evaluate::reference::{Integrator, Processor, ReferenceSettings, TOLERANCE, reference};
+use threadlight::low_level::evaluate::reference::{
+    Integrator, Processor, ReferenceSettings, TOLERANCE, reference, tone_map,
+};
 use threadlight::low_level::output::{read_image, write_exr};
 use threadlight::low_level::pipeline::{Wanted, render_geometry};
 use threadlight::low_level::prepare::Prepared;
@@ -125,6 +127,37 @@ fn threads_come_near_to_mitsuba() {
             println!("{name}: RMS {rms:.5} at {threads} threads of method {method}");
             assert!(rms < limit, "{name}, {method}: RMS {rms}");
         }
+    }
+    gpu.finish();
+}
+
+#[test]
+fn the_reference_has_the_background_and_the_display_values_of_other_pictures() {
+    let gpu = Validated::new();
+    let mut scene = sphere(diffuse(), "sky", 1, (32, 24));
+    (scene.environment.rotation_deg, scene.environment.intensity) = (73.0, 1.7);
+    (scene.image.exposure, scene.image.gamma) = (0.1, 1.8);
+    scene.shading.method = Method::Reference;
+    let truth = |prepared: &Prepared| {
+        let settings = ReferenceSettings { tolerance: 0.05, processor: Processor::Cpu };
+        reference(prepared, &gpu.device, &settings, &gpu.round()).expect("a reference").rendering(prepared)
+    };
+    let expected = truth(&ready(&scene));
+    scene.shading.method = Method::Cosine;
+    let found = gpu.render(&ready(&scene), EVERYTHING);
+    // Corners, where no sphere is.
+    for pixel in [0, 31, 23 * 32, 24 * 32 - 1] {
+        let [found, expected] = [&found, &expected].map(|picture| Vec4::from(picture.radiance[pixel]));
+        assert!((found / expected - 1.0).abs().max_element() < 0.01, "{found}, not {expected} at {pixel}");
+    }
+    scene.image.background = Background::None;
+    let prepared = ready(&scene);
+    let found = gpu.render(&prepared, Wanted { display: true, ..EVERYTHING });
+    assert!(found.radiance.iter().filter(|pixel| (0.1..0.9).contains(&pixel[3])).count() > 20);
+    let expected = tone_map(&found.radiance, &prepared.view);
+    assert_eq!(expected.len(), found.display.len());
+    for (expected, found) in expected.into_iter().zip(found.display) {
+        assert!(expected.abs_diff(found) <= 1, "{found}, not {expected}");
     }
     gpu.finish();
 }

@@ -376,6 +376,7 @@ mod tests {
         let reason = |a: &_, b: &_, mask| compare(a, b, mask).unwrap_err().to_string();
         assert!(reason(&of(20, 30), &of(30, 20), false).contains("20 x 30 and 30 x 20"));
         assert!(reason(&of(10, 30), &of(10, 30), false).contains("11 x 11"));
+        assert!(compare(&of(11, 11), &of(11, 11), false).is_ok());
         assert!(reason(&of(20, 20), &of(20, 20), true).contains("no surface"));
         let opaque = Comparable { covered: None, ..of(20, 20) };
         assert!(reason(&opaque, &opaque, true).contains("alpha"));
