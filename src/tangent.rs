@@ -24,9 +24,11 @@ mod tests {
 
     #[test]
     fn tangents_are_unit_and_orthogonal_to_every_normal_whatever_they_go_by() {
-        for uv in fibonacci_lattice(500) {
+        let normal = |uv: glam::DVec2| {
             let z = 2.0 * uv.x - 1.0;
-            let n = ((1.0 - z * z).sqrt() * glam::DVec2::from_angle(std::f64::consts::TAU * uv.y)).extend(z).as_vec3();
+            ((1.0 - z * z).sqrt() * glam::DVec2::from_angle(std::f64::consts::TAU * uv.y)).extend(z).as_vec3()
+        };
+        for n in fibonacci_lattice(500).map(normal).chain([Vec3::Z, Vec3::NEG_Z]) {
             for direction in [Vec3::X, Vec3::ZERO, n, 1e-30 * Vec3::Y, 1e30 * Vec3::ONE, n + 1e-4 * Vec3::Z] {
                 let tangent = tangent_along(direction, n);
                 assert!(tangent.is_normalized() && tangent.dot(n).abs() < 1e-4, "{direction} at {n}: {tangent}");

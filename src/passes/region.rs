@@ -175,8 +175,12 @@ mod tests {
     fn where_vertices_may_be_off_there_is_room_for_them() {
         let view = view();
         let (right, up, forward) = view.camera.basis();
-        for error in [0.0, 1e-4, 1e-3, 9e-3] {
-            let at = forward + 0.1 * right - 0.05 * up;
+        // From edge to edge of a tile, which is 0.021 wide there.
+        for (error, step) in
+            [0.0, 1e-4, 1e-3, 9e-3].into_iter().flat_map(|error| (0..16).map(move |step| (error, step)))
+        {
+            let beside = 0.0013 * f64::from(step);
+            let at = forward + (0.1 + beside) * right - (0.05 + beside) * up;
             let [left, top, width, height] = Region::of_boxes(&view, TILE_PX, [Corner { from_eye: at, error }])
                 .subpixels(&view)
                 .map(|subpixels| f64::from(subpixels) / 2.0);

@@ -78,6 +78,9 @@ mod tests {
         let steps = [0.0, 0.005, 0.01, 0.012, 0.015, 0.02, 0.5, f32::INFINITY].map(clear);
         assert!(steps.is_sorted_by(|a, b| a[0] >= b[0] && a[1] >= b[1]), "{steps:?}");
         assert_eq!([steps[0], steps[2]], [CLEAR; 2]);
+        let flanked = LobeShape { flank_rad: 0.01, ..lobe };
+        let later = GivingWay::of(&flanked, &table(16, 0.0)).clear;
+        assert!(later[0] > steps[0][0] && later[1] > steps[0][1], "beside steep flanks later: {later:?}");
         assert!(steps[4][1] < 2.1 && steps.iter().all(|clear| clear[0] >= 0.7 * CLEAR[0]), "{steps:?}");
     }
 }
