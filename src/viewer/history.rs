@@ -219,6 +219,10 @@ mod tests {
         assert!(user.undoes());
         assert_eq!((user.scene.image.exposure, user.scene.camera, user.scene.image.width), (1.0, Some(camera), 30));
         assert!(!user.undoes(), "moving the camera is nothing to undo");
+        // Nor is it something else done.
+        user.does(&Change::Camera(None));
+        user.does(&Change::Size(60, 40));
+        assert!(user.redoes() && user.scene.image.exposure == 2.0);
     }
 
     #[test]

@@ -157,7 +157,8 @@ mod tests {
             rms_to_finished: None,
         };
         assert_eq!(answers, [answer(3.0, 10.0, Some(10.0)), answer(1.0, 50.0, None), answer(2.0, 40.0, Some(490.0))]);
-        assert_eq!([0.0, 0.5, 1.0].map(|quantile| latency.shown_ms(quantile)), [Some(10.0), Some(40.0), Some(50.0)]);
+        let shown = [0.0, 0.4, 0.5, 0.95].map(|quantile| latency.shown_ms(quantile));
+        assert_eq!(shown, [10.0, 40.0, 40.0, 50.0].map(Some));
         // The oldest goes.
         latency.asked(&input(4.0), after(600), Some(3));
         latency.shown(3, false, after(601));
@@ -173,5 +174,11 @@ mod tests {
         assert!(!latency.is_awaited(9, false));
         latency.shown(9, false, start);
         assert!(latency.answers().is_empty() && latency.shown_ms(0.5).is_none());
+        // Nor for the end of a draft of it.
+        latency.asked(&input(2.0), start, Some(10));
+        latency.shown(10, true, start);
+        assert!(latency.is_awaited(10, false));
+        latency.failed();
+        assert!(!latency.is_awaited(10, false));
     }
 }
