@@ -332,3 +332,21 @@ fn the_reference_tells_its_error_and_comes_from_the_cache_the_second_time() {
     }
     assert!(differences[0] < 0.2 && differences[1] < 2e-3, "{differences:?}");
 }
+
+#[test]
+fn what_a_method_knows_nothing_of_is_ignored_with_a_warning() {
+    let folder = workplace();
+    let small = "--size 8x6 --environment map.hdr --material clay -o image.exr";
+    let warnings = |flags: &str| {
+        let output = render(&folder, &format!("{small} {flags}")).output().unwrap();
+        assert!(output.status.success());
+        String::from_utf8(output.stderr).unwrap()
+    };
+    let ignored = warnings("--method cosine --threads 2 --pattern fixed");
+    assert!(ignored.contains("--pattern is ignored: method \"cosine\"") && ignored.lines().count() == 1, "{ignored}");
+    let ignored = warnings("--method reference --tolerance 0.1 --threads 2 --seed 3 --repeat 2");
+    for flag in ["--threads", "--seed", "--repeat"] {
+        assert!(ignored.contains(&format!("{flag} is ignored: method \"reference\"")), "{ignored}");
+    }
+    assert_eq!(warnings("--method filtered --threads 2 --seed 3 --repeat 2 --pattern fixed"), "");
+}
