@@ -184,6 +184,19 @@ fn a_made_file_has_the_values_that_were_put_in() {
 }
 
 #[test]
+fn a_material_that_was_measured_at_two_azimuths_is_isotropic() {
+    let mut fields = made(&[]);
+    fields[0] = numbers("phi_i", &[2], [0.0, std::f32::consts::PI]);
+    fields[4] = numbers("vndf", &[2, 2, 3, 4], [1.0; 48]);
+    let (_, _, shape, bytes) = rgb();
+    fields.push(("rgb", 10, [&[2], &shape[1..]].concat(), bytes.repeat(2)));
+    let (once, twice) = (parse(&made(&[rgb()])).unwrap(), parse(&fields).unwrap());
+    assert!(twice.is_isotropic());
+    let (w_i, w_o) = (dvec3(-0.3, 0.4, 0.75f64.sqrt()), dvec3(0.6, 0.0, 0.8));
+    assert!(once.evaluate(w_i, w_o).distance(twice.evaluate(w_i, w_o)) < 1e-6);
+}
+
+#[test]
 fn spectra_have_their_colour_under_daylight() {
     let every = |step: usize| (360..=1000).step_by(step).map(|nm| nm as f32).collect::<Vec<_>>();
     // From Mitsuba's tables of observer and illuminant, 360 to 830 nm summed in steps of 1 nm, by a program of its own.
@@ -244,7 +257,8 @@ fn files_that_are_none_are_refused_with_a_reason() {
         (with("sigma", numbers("sigma", &[2, 2], [0.25, 0.25, 0.0, 0.25])), "holds 0e0 in sigma, at position 2"),
         (with("rgb", numbers("rgb", &[1, 2, 3, 2, 2], [f32::INFINITY; 24])), "inf in rgb"),
         (with("rgb", numbers("rgb", &[1, 2, 4, 3, 1], [1.0; 24])), "do not go with its 1 x 2 angles"),
-        (tensor_file(&made(&spectra(vec![500.0, 600.0], |_| 1.0))), "from 500 to 600 nm"),
+        (tensor_file(&made(&spectra(vec![500.0, 700.0], |_| 1.0))), "from 500 to 700 nm"),
+        (tensor_file(&made(&spectra(vec![400.0, 600.0], |_| 1.0))), "from 400 to 600 nm"),
         (tensor_file(&made(&spectra(vec![600.0, 400.0, 700.0], |_| 1.0))), "wavelengths that does not ascend"),
         (tensor_file(&made(&spectra(vec![400.0, 700.0], |_| 1.0)[1..])), "no field wavelengths"),
     ];
