@@ -69,3 +69,21 @@ pub fn strays(kernels: &[Kernel], sets: usize, unit: f64, f_cos: &FCos) -> Vec<u
     };
     (0..kernels.len()).filter(|k| strays(&kernels[*k])).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_kernel_strays_by_what_its_set_gives_alone_and_not_beside_a_peak_or_if_it_is_wide() {
+        let kernel = Kernel { direction: DVec3::Z, level: 0.0, weight: DVec3::ONE };
+        let peak = 1.0 / (TAU * (FINEST_WIDTH_RAD.powi(2) + NARROWEST_RAD.powi(2)));
+        let strays =
+            |sets: usize, level: f64, f_cos: &FCos| !strays(&[Kernel { level, ..kernel }], sets, 1.0, f_cos).is_empty();
+        assert!(strays(1, 0.0, &|_| DVec3::ZERO) && !strays(1, 3.0, &|_| DVec3::ZERO));
+        let half = |_: DVec3| DVec3::splat(0.5 * peak);
+        assert!(!strays(1, 0.0, &half) && strays(4, 0.0, &half));
+        let beside = |w: DVec3| DVec3::splat(if w.z > 1.0 - 1e-9 { 0.0 } else { peak });
+        assert!(!strays(1, 0.0, &beside));
+    }
+}
