@@ -8,35 +8,35 @@ layout(set = 0, binding = 0) uniform samplerCube environment_pyramid;
 layout(set = 0, binding = 1, std430) writeonly buffer Sums {
     vec4 sums[];
 };
+// Rows of `lookup_count` lookups: direction, z up, and level.
+layout(set = 0, binding = 2, std430) readonly buffer Lookups {
+    vec4 lookups[];
+};
 
 layout(push_constant) uniform Push {
     uint pixel_count;
     uint lookup_count; // of each pixel
-    float level; // lookups are of this level and up to LEVELS beside it
+    uint row_count;
 } push;
 
-// As far as levels of threads are apart: those of a glossy material go over four.
-const float LEVELS = 2.0;
-
 void main() {
-    uint pixel = (gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * gl_WorkGroupSize.x + gl_LocalInvocationID.x;
+    uint group = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
+    uint pixel = group * gl_WorkGroupSize.x + gl_LocalInvocationID.x;
     if (pixel >= push.pixel_count) {
         return;
     }
-    // As with threads, neighbouring pixels look in neighbouring directions, one pixel all around: by the golden angle about
-    // an axis, which is another one for the next lookup.
-    const float golden_angle = radians(137.50776);
-    float turn = radians(360.0) * float(pixel) / float(push.pixel_count);
-    vec3 direction = vec3(0.8 * cos(turn), 0.8 * sin(turn), 0.6);
+    // Pixels that are near each other see a surface from about the same angle, in one row. Rows take turns from the first to the last.
+    uint group_count = (push.pixel_count - 1) / gl_WorkGroupSize.x + 1;
+    uint row = uint(float(group) / float(group_count) * float(push.row_count));
+    // With rows they are points of a spiral over the hemisphere, which are as far from each other along it as across it.
+    float turns = sqrt(float(push.pixel_count) / radians(360.0));
+    float turn = radians(360.0) * fract(turns * (float(pixel) / float(push.pixel_count)));
+    mat2 turned = mat2(cos(turn), sin(turn), -sin(turn), cos(turn));
     vec3 sum = vec3(0.0);
     uint k = 0;
     do {
-        // From thread to thread in no order, from pixel to pixel gradually.
-        float place = fract(0.618034 * float(k) + float(pixel) / float(push.pixel_count));
-        float level = push.level + LEVELS * (abs(4.0 * place - 2.0) - 1.0);
-        sum += textureLod(environment_pyramid, direction, level).rgb;
-        vec2 turned = cos(golden_angle) * direction.xy + sin(golden_angle) * vec2(-direction.y, direction.x);
-        direction = vec3(turned, direction.z).yzx;
+        vec4 lookup = lookups[row * push.lookup_count + k];
+        sum += textureLod(environment_pyramid, vec3(turned * lookup.xy, lookup.z), lookup.w).rgb;
     } while (++k < push.lookup_count);
     sums[pixel] = vec4(sum, 1.0);
 }

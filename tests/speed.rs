@@ -7,7 +7,7 @@ use threadlight::low_level::environment::Pyramid;
 use threadlight::low_level::evaluate::speed::{self, Growth, Speed, Timings};
 use threadlight::low_level::evaluate::{Cases, Shard};
 use threadlight::low_level::method::Method;
-use threadlight::low_level::passes::BareLookups;
+use threadlight::low_level::passes::{BareLookup, BareLookups};
 use threadlight::low_level::pipeline::time_bare_lookups;
 use threadlight::low_level::scene::{Camera, Scene, Source};
 use threadlight::low_level::vulkan::PipelineCache;
@@ -37,7 +37,9 @@ fn bare_lookups_see_the_environment_as_often_as_asked_for() {
     let pyramid = Pyramid::box_filtered(&environment);
     let cache = PipelineCache::new(&gpu.device, None).unwrap();
     for (pixels, lookups) in [(1, 1), (1000, 16), (70_000, 3)] {
-        let bare = BareLookups::new(&gpu.device, &cache, &pyramid, pixels, lookups, None).unwrap();
+        let rows: Vec<_> =
+            (0..7 * lookups).map(|k| BareLookup { direction: [0.6, 0.0, 0.8], level: k as f32 }).collect();
+        let bare = BareLookups::new(&gpu.device, &cache, &pyramid, [pixels, lookups], &rows, None).unwrap();
         let (gpu_ms, sums) = time_bare_lookups(&gpu.device, &bare).unwrap();
         assert!(gpu_ms > 0.0);
         assert_eq!(sums.len(), pixels as usize);

@@ -24,7 +24,7 @@ pub use light_map::{Alias, LightMap};
 pub use procedural::builtin_names;
 pub use pyramid::{FractionBits, Pyramid};
 pub use sources::{LightSource, MAX_SOURCES, SmallSources, SourceRecord};
-pub use vmf_pyramid::{BlurKernel, BlurStep, VmfPyramid};
+pub use vmf_pyramid::{BlurKernel, BlurStep, VmfPyramid, width_rad_of};
 
 file_formats!(Environment: hdr_file, exr_file);
 

@@ -114,8 +114,13 @@ impl VmfPyramid {
 
     /// Width of the kernel of level 0, in radians.
     pub fn finest_width_rad(&self) -> f64 {
-        2.0 * TEXELS_A_WIDTH / self.levels.face_size as f64
+        width_rad_of(self.levels.face_size)
     }
+}
+
+/// The width of the kernel whose level has faces of this size.
+pub fn width_rad_of(face_size: usize) -> f64 {
+    2.0 * TEXELS_A_WIDTH / face_size as f64
 }
 
 /// 1 - the mean cosine of a vMF kernel, 1 + 1 / kappa - coth(kappa). Mean cosines multiply under convolution.
@@ -140,7 +145,7 @@ fn texel_deficit(kernel: BlurKernel, size: usize, direction: DVec3) -> f64 {
     }
     // Means of 2 x 2 are of texels of half the size, and moved by half of that along each axis.
     let (texel, size) = if kernel == BlurKernel::Mean { (solid_angle / 4.0, 2 * size) } else { (solid_angle, size) };
-    let width = 2.0 * TEXELS_A_WIDTH / size as f64;
+    let width = width_rad_of(size);
     let tent = texel / 6.0;
     let deficit = (vmf_deficit(width.powi(-2)) - tent) / (1.0 - tent);
     if kernel == BlurKernel::Mean { deficit + texel / 4.0 * (1.0 - deficit) } else { deficit }

@@ -1,15 +1,21 @@
 //! What a frame costs: by the number of threads beside the floor (the paper's table 1), and as other things double.
+use std::f64::consts::TAU;
 use std::sync::Arc;
 
+use glam::DVec2;
 use serde::Serialize;
 
 use super::cases::{Cases, Estimator, Place};
+use crate::environment::width_rad_of;
 use crate::error::{Error, Result};
 use crate::memo::{Key, Keyed, Memo};
-use crate::passes::{BareLookups, PlacedMesh};
+use crate::passes::{BareLookup, BareLookups, PlacedMesh};
 use crate::pipeline::{DeviceScene, Rendering, Wanted, median, time_bare_lookups};
 use crate::progress::Observer;
 use crate::steps::{BoxFilter, CheckDevice, pipelines};
+use crate::threads::fitted::kernel::FINEST_WIDTH_RAD;
+use crate::threads::fitted::{FittedTable, PackedKernel};
+use crate::threads::slice::{fibonacci_lattice, on_sphere};
 use crate::vulkan::{Device, PassTime};
 
 /// What to measure, and how.
@@ -235,7 +241,13 @@ impl Entrant {
         let pixels = lookups.div_ceil(u64::from(threads)) as u32;
         let pyramid = round.ask(&BoxFilter { environment: &prepared.environment, face_size: None })?;
         let way_around = round.ask(&CheckDevice(device))?.way_around(device)?;
-        let floor = BareLookups::new(device, &*pipelines(&round, device)?, &pyramid, pixels, threads, way_around)?;
+        let fitted = prepared.materials.iter().find_map(|material| material.threads.as_deref()?.fitted());
+        let rows = match fitted {
+            Some(table) => lookups_of(table, pyramid.face_size),
+            None => lookups_all_around(threads, pyramid.face_size),
+        };
+        let cache = pipelines(&round, device)?;
+        let floor = BareLookups::new(device, &cache, &pyramid, [pixels, threads], &rows, way_around)?;
         time_bare_lookups(device, &floor)?;
         let triangles = |object: &PlacedMesh| prepared.meshes[object.mesh].1.indices.len() as u64 / 3;
         let frame = TimedFrame {
@@ -281,6 +293,32 @@ impl Entrant {
         frame.ns_per_lookup = 1e6 * frame.pass_ms("shade") / frame.lookups as f64;
         frame
     }
+}
+
+/// The lookups of these threads in a pyramid with such faces, row by row of the view angle; of an anisotropic BRDF those of one azimuth.
+fn lookups_of(table: &FittedTable, face_size: usize) -> Vec<BareLookup> {
+    let table = table.for_subpixels();
+    let finest = (width_rad_of(face_size) / FINEST_WIDTH_RAD).log2() as f32;
+    let lookup = |kernel: &PackedKernel| {
+        let kernel = kernel.unpack();
+        BareLookup { direction: kernel.direction().to_array(), level: (kernel.level - finest).max(0.0) }
+    };
+    (0..table.rows).flat_map(|row| table.row(row)).map(lookup).collect()
+}
+
+/// As many lookups in each of 64 rows, evenly all around. Their texels are about as large as a lookup's share of the hemisphere; levels go over
+/// four, as those of samples of a glossy material do, in no order.
+fn lookups_all_around(count: u32, face_size: usize) -> Vec<BareLookup> {
+    const ROWS: u32 = 64;
+    const LEVELS: f64 = 4.0;
+    let texel_sr = 2.0 * TAU / (6 * face_size * face_size) as f64;
+    let middle = 0.5 * (TAU / f64::from(count) / texel_sr).log2();
+    let lookup = |point: DVec2| BareLookup {
+        direction: on_sphere(point).as_vec3().to_array(),
+        // The lattice's other coordinate has an order.
+        level: (middle + LEVELS * (point.y - 0.5)).max(0.0) as f32,
+    };
+    fibonacci_lattice((ROWS * count) as usize).map(lookup).collect()
 }
 
 impl TimedFrame {

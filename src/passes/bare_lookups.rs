@@ -4,9 +4,9 @@ use super::light::DevicePyramid;
 use crate::Result;
 use crate::environment::Pyramid;
 use crate::graph::{BufferDesc, BufferHandle, FrameGraph};
-use crate::vulkan::{ComputePipeline, Device, PipelineCache, compiled};
+use crate::vulkan::{Buffer, ComputePipeline, Device, PipelineCache, compiled};
+use ash::vk;
 use bytemuck::{Pod, Zeroable};
-use std::f64::consts::TAU;
 use std::sync::Arc;
 
 /// Workgroups along an axis that every device can dispatch.
@@ -16,7 +16,18 @@ const MAX_GROUPS: u32 = 65535;
 pub struct BareLookups {
     pipeline: ComputePipeline,
     pyramid: DevicePyramid,
+    lookups: Buffer,
     push: Push,
+}
+
+/// A lookup: a unit direction, z up, and the pyramid's level.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub struct BareLookup {
+    /// x, y, z.
+    pub direction: [f32; 3],
+    /// 0 is the finest; between two whole ones both are fetched.
+    pub level: f32,
 }
 
 #[repr(C)]
@@ -24,11 +35,12 @@ pub struct BareLookups {
 struct Push {
     pixel_count: u32,
     lookup_count: u32,
-    level: f32,
+    row_count: u32,
 }
 
 impl BareLookups {
-    /// `lookup_count` lookups in `pyramid`, uploaded by `way_around`, for each of `pixel_count` pixels (at least 1).
+    /// `lookup_count` lookups (at least 1) in `pyramid`, uploaded by `way_around`, for each of `pixel_count` pixels (at least 1): a row of `rows`,
+    /// turned about z.
     ///
     /// # Errors
     /// No device memory left, or a driver that cannot compile the shader.
@@ -36,19 +48,18 @@ impl BareLookups {
         device: &Arc<Device>,
         cache: &PipelineCache,
         pyramid: &Pyramid,
-        pixel_count: u32,
-        lookup_count: u32,
+        [pixel_count, lookup_count]: [u32; 2],
+        rows: &[BareLookup],
         way_around: Option<WayAround>,
     ) -> Result<Self> {
-        // About where texels are as large as a lookup's share of the hemisphere, and between two levels, so that both are fetched.
-        let texel_sr = 2.0 * TAU / (6.0 * (pyramid.face_size * pyramid.face_size) as f64);
-        let level = 0.5 * (TAU / f64::from(lookup_count) / texel_sr).log2();
-        let level = level.clamp(0.0, (pyramid.levels.len() - 1) as f64 - 0.5).floor() + 0.5;
+        let row_count = rows.len() as u32 / lookup_count;
         let scale = pyramid.radiance_scale();
+        let storage = vk::BufferUsageFlags::STORAGE_BUFFER;
         Ok(Self {
             pipeline: ComputePipeline::new(device, cache, &compiled::BARE_LOOKUPS, &[])?,
             pyramid: DevicePyramid::new(device, "environment pyramid", pyramid, scale, way_around)?,
-            push: Push { pixel_count, lookup_count, level: level as f32 },
+            lookups: Buffer::with_contents(device, "lookups", storage, bytemuck::cast_slice(rows))?,
+            push: Push { pixel_count, lookup_count, row_count },
         })
     }
 
@@ -60,12 +71,13 @@ impl BareLookups {
 
 /// Looks up; leaves for each pixel the sum of what it saw, RGB in units of the pyramid's texels, and 1.
 pub fn bare_lookups<'a>(graph: &mut FrameGraph<'a>, bare: &'a BareLookups) -> BufferHandle {
-    let BareLookups { pipeline, pyramid, push } = bare;
+    let BareLookups { pipeline, pyramid, lookups, push } = bare;
     let mut sums = graph.buffer("sums", BufferDesc { size_bytes: bare.sums_bytes() });
     let groups = push.pixel_count.div_ceil(pipeline.group_size()[0]);
     graph
         .compute("bare_lookups", pipeline)
         .sampled("environment_pyramid", &pyramid.image, &pyramid.sampler)
+        .bind("Lookups", lookups)
         .write("Sums", &mut sums)
         .push(push)
         .groups([groups.min(MAX_GROUPS), groups.div_ceil(MAX_GROUPS), 1]);

@@ -22,7 +22,7 @@ mod view;
 mod vmf_pyramid;
 
 pub use background::{Background, BackgroundMap, background};
-pub use bare_lookups::{BareLookups, bare_lookups};
+pub use bare_lookups::{BareLookup, BareLookups, bare_lookups};
 pub use classify::{Classify, Counters, MAX_SHADERS, SMOOTH_DEG, SmoothVariance, Tiles, classify, upload_shaders};
 pub use cube_borders::WayAround;
 pub use device_check::{Answers, Questions, Volume, ask};

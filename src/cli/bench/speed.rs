@@ -19,8 +19,9 @@ Examples:
   threadlight bench speed --methods paper,filtered --counts 16,64 --size 320x240 --json speed.json --plot plots
 
 The first tables are the paper's table 1: for each number of threads the time on the GPU of each pass and of all of them, and \
-the floor: what a compute pass takes that makes as many trilinear lookups in the same environment, of levels that differ from \
-lookup to lookup and from pixel to pixel, and nothing else.
+the floor: what a compute pass takes that makes as many trilinear lookups in the same environment, and nothing else. Of fitted \
+threads and Gaussians these have the directions and levels of the threads at all view angles, one row for pixels that are near each \
+other; of other methods they are all around, over four levels.
 
 The others have what a frame costs as its pixels (a quarter, half, all of --size), its sub-pixels (1, 2 and 4 per axis), its \
 threads (a quarter, half, all of --threads) and its triangles (each split into 4 and 16) grow; ratio is the time over that of \
