@@ -1,4 +1,6 @@
 //! What a program needs to render: a renderer, scenes, pictures.
+use crate::Result;
+use crate::environment::{self, CustomEnvironment};
 use crate::evaluate::reference::{ReferenceSettings, reference};
 use crate::memo::Memo;
 use crate::method::Method;
@@ -6,10 +8,9 @@ use crate::output::{self, ExrHeader, Format};
 use crate::pipeline::{DeviceScene, Rendering, Wanted};
 use crate::prepare::{prepare, threads_of};
 use crate::progress::Observer;
-use crate::scene::{Background, ImageSettings, MaterialSource, Scene, Source, mesh};
+use crate::scene::{Background, CustomMesh, EnvironmentSource, ImageSettings, MaterialSource, MeshSource, Scene, mesh};
 use crate::threads::{ThreadSettings, Threads};
 use crate::vulkan::{Device, Instance};
-use crate::{Result, environment};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -184,15 +185,15 @@ impl Scene {
         self
     }
 
-    /// The same in this environment: a built-in's name, or the path of a file.
-    pub fn with_environment(mut self, environment: &str) -> Self {
-        self.environment.source = Source::named(environment, environment::builtin_names());
+    /// The same in this environment: a built-in's name, the path of a file, or a [`CustomEnvironment`].
+    pub fn with_environment(mut self, environment: impl Into<EnvironmentSource>) -> Self {
+        self.environment.source = environment.into();
         self
     }
 
-    /// The same with this mesh in the place of all objects: a built-in's name, or the path of a file.
-    pub fn with_mesh(mut self, name: &str) -> Self {
-        self.use_mesh(Source::named(name, mesh::builtin_names()));
+    /// The same with this mesh in the place of all objects: a built-in's name, the path of a file, or a [`CustomMesh`].
+    pub fn with_mesh(mut self, mesh: impl Into<MeshSource>) -> Self {
+        self.use_mesh(mesh.into());
         self
     }
 
@@ -224,6 +225,32 @@ impl From<&str> for MaterialSource {
 
 impl From<crate::Custom> for MaterialSource {
     fn from(custom: crate::Custom) -> Self {
+        Self::Custom(custom)
+    }
+}
+
+/// A built-in's name, or the path of a file.
+impl From<&str> for EnvironmentSource {
+    fn from(name: &str) -> Self {
+        Self::named(name, environment::builtin_names())
+    }
+}
+
+impl From<CustomEnvironment> for EnvironmentSource {
+    fn from(custom: CustomEnvironment) -> Self {
+        Self::Custom(custom)
+    }
+}
+
+/// A built-in's name, or the path of a file.
+impl From<&str> for MeshSource {
+    fn from(name: &str) -> Self {
+        Self::named(name, mesh::builtin_names())
+    }
+}
+
+impl From<CustomMesh> for MeshSource {
+    fn from(custom: CustomMesh) -> Self {
         Self::Custom(custom)
     }
 }

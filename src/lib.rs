@@ -32,8 +32,9 @@
 //! # Ok::<(), threadlight::Error>(())
 //! ```
 //!
-//! Custom BRDFs are types that implement [`CustomBrdf`]. The [`guide`] has all of it at length: usage, every equation with the function that
-//! holds it, architecture, results, limits. [`low_level`] is the rest of the program, part by part.
+//! Custom BRDFs are types that implement [`CustomBrdf`]; [`CustomEnvironment`] and [`CustomMesh`] are light and meshes from memory. The
+//! [`guide`] has all of it at length: usage, every equation with the function that holds it, architecture, results, limits. [`low_level`] is
+//! the rest of the program, part by part.
 //!
 //! The frame on one screen is `declare` in `src/pipeline.rs`.
 
@@ -43,12 +44,12 @@ pub mod guide;
 pub mod low_level;
 
 pub use brdf::{Brdf, Custom, CustomBrdf};
-pub use environment::Environment;
+pub use environment::{CustomEnvironment, Environment};
 pub use error::{Error, Result};
 pub use facade::{Picture, Renderer};
 pub use method::Method;
 pub use progress::Observer;
-pub use scene::Scene;
+pub use scene::{CustomMesh, Scene};
 pub use threads::Threads;
 
 use low_level::*;

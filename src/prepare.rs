@@ -5,7 +5,7 @@ use crate::geometry_texel::MAX_MATERIALS;
 use crate::memo::{Key, Keyed, Memo, Round, Step};
 use crate::method::{Method, Variant};
 use crate::passes::{PlacedMesh, PlacedTangent, Sampling, SmoothVariance, View};
-use crate::scene::{Camera, MaterialSource, Mesh, Scene, Source, TangentRule};
+use crate::scene::{Camera, MaterialSource, Mesh, MeshSource, Scene, TangentRule};
 use crate::steps::{DraftThreads, FindLobe, FitThreads, LoadBrushedMesh, LoadEnvironment, LoadMaterial, LoadMesh};
 use crate::threads::azimuths::azimuth_count;
 use crate::threads::{ThreadSettings, Threads, WithThreads};
@@ -293,7 +293,7 @@ fn place_meshes(scene: &Scene, round: &Round) -> Result<(Vec<NamedMesh>, Vec<Pla
 }
 
 /// The place of `mesh`, which comes from `source`, among `meshes`: the last if it was not yet there.
-fn index_of_mesh(meshes: &mut Vec<NamedMesh>, mesh: Keyed<Mesh>, source: &Source) -> usize {
+fn index_of_mesh(meshes: &mut Vec<NamedMesh>, mesh: Keyed<Mesh>, source: &MeshSource) -> usize {
     meshes.iter().position(|(_, known)| known.key == mesh.key).unwrap_or_else(|| {
         meshes.push((source.to_string(), mesh));
         meshes.len() - 1

@@ -15,7 +15,8 @@ use threadlight::low_level::output::write_exr;
 use threadlight::low_level::pipeline::{Rendering, Wanted};
 use threadlight::low_level::prepare::Prepared;
 use threadlight::low_level::scene::{
-    Background, MAX_SAMPLES, MAX_SUBPIXELS, MaterialSettings, MaterialSource, ObjectSettings, Pattern, Scene, Source,
+    Background, EnvironmentSource, MAX_SAMPLES, MAX_SUBPIXELS, MaterialSettings, MaterialSource, ObjectSettings,
+    Pattern, Scene, Source,
 };
 use threadlight::low_level::shading::{CpuShader, Surface};
 
@@ -39,7 +40,7 @@ fn render(gpu: &Validated, prepared: &Prepared) -> Rendering {
 /// A sphere without background, shaded by `variant`.
 fn scene(
     material: MaterialSource,
-    environment: Source,
+    environment: EnvironmentSource,
     variant: impl Into<Variant>,
     samples: u32,
     size: (u32, u32),
@@ -53,7 +54,7 @@ fn scene(
 }
 
 /// A built-in environment on 128 x 64 pixels, as a file.
-fn small_environment(folder: &Path, name: &str) -> Source {
+fn small_environment(folder: &Path, name: &str) -> EnvironmentSource {
     let full = Environment::builtin(name).unwrap();
     let (width, height) = (128, 64);
     let step = full.width / width;

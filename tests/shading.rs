@@ -4,6 +4,7 @@ mod common;
 use common::{EVERYTHING, Validated, analytic_materials, model, pixels, ready, sphere, texels_of};
 use glam::{DVec3, UVec2, Vec3, Vec4};
 use rayon::prelude::*;
+use std::sync::Arc;
 use threadlight::Method;
 use threadlight::low_level::brdf::{Brdf, Custom, CustomBrdf};
 use threadlight::low_level::evaluate::reference::{ReferenceSettings, reference};
@@ -473,7 +474,7 @@ fn a_planted_nan_is_counted() {
         // Above the sphere, where whoever looks up meets it; readers of files do not let it pass.
         let mut environment = (*prepared.environment).clone();
         let (width, height) = (environment.width, environment.height);
-        environment.texels[..width * height / 4].fill([f32::NAN, 1.0, 1.0]);
+        Arc::make_mut(&mut environment.texels)[..width * height / 4].fill([f32::NAN, 1.0, 1.0]);
         prepared.environment = Keyed::new(Key::of_bytes(b"planted"), environment);
         assert!(count(&prepared) > 0, "{method}");
     }

@@ -13,5 +13,5 @@ pub(super) const FORMAT: FileFormat<Environment> =
 fn parse(path: &Path, bytes: &[u8]) -> Result<Environment> {
     let picture = output::parse_exr(path, bytes)?;
     let texels = picture.rgba.iter().map(|&[r, g, b, _]| [r, g, b]).collect();
-    Environment::of_file(path, picture.width as usize, picture.height as usize, texels)
+    Environment::of_pixels(path.display(), picture.width as usize, picture.height as usize, texels)
 }

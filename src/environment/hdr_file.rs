@@ -45,7 +45,7 @@ fn parse(path: &Path, bytes: &[u8]) -> Result<Environment> {
         let [r, g, b] = header.colour_correction;
         tracing::warn!("{}: its COLORCORR of {r} {g} {b} is not divided out", path.display());
     }
-    Environment::of_file(path, width, height, texels)
+    Environment::of_pixels(path.display(), width, height, texels)
 }
 
 /// Takes the next line off `bytes`; some programs end it by CR LF. None if it has no end.
@@ -234,7 +234,7 @@ mod tests {
         for header in ["#?RGBE\nFORMAT=32-bit_rle_rgbe\n\n", "#?RADIANCE\r\n# x\r\nFORMAT=32-bit_rle_rgbe\r\n\r\n"] {
             let end = if header.contains('\r') { "\r\n" } else { "\n" };
             let bytes = [format!("{header}-Y 1 +X 1{end}").as_bytes(), &[200, 100, 50, 129]].concat();
-            assert_eq!(environment(&bytes).texels, [plain], "{header}");
+            assert_eq!(*environment(&bytes).texels, [plain], "{header}");
         }
     }
 

@@ -1,6 +1,7 @@
 //! Lights of the built-in environments that are as small as pixels or have edges: each pixel gets the share of its solid angle that they
 //! cover.
 use std::f64::consts::{PI, TAU};
+use std::sync::Arc;
 
 use glam::{DVec3, dvec3};
 use rayon::prelude::*;
@@ -82,7 +83,7 @@ pub(super) fn with_lights(mut environment: Environment, lights: &[Light]) -> Env
         covered.into_iter().map(|(light, sum)| light.radiance * (sum / all)).sum()
     });
     let added: Vec<DVec3> = added.collect();
-    for (texel, light) in environment.texels.iter_mut().zip(added) {
+    for (texel, light) in Arc::make_mut(&mut environment.texels).iter_mut().zip(added) {
         *texel = (to_dvec3(texel) + light).as_vec3().to_array();
     }
     environment

@@ -23,12 +23,12 @@ impl Environment {
         Self::FILES.load(path)
     }
 
-    /// The environment in the file at `path`, of pixels that may hold anything.
-    pub(super) fn of_file(path: &Path, width: usize, height: usize, texels: Vec<[f32; 3]>) -> Result<Self> {
+    /// The environment of this name, of pixels that may hold anything.
+    pub(super) fn of_pixels(name: impl ToString, width: usize, height: usize, texels: Vec<[f32; 3]>) -> Result<Self> {
         if texels.is_empty() {
-            return Err(Error::in_file(path, "has no pixels", "give a lat-long picture of at least 1x1"));
+            return Err(Error::input(name, "has no pixels", "give a lat-long picture of at least 1x1"));
         }
-        Ok(Self::repaired(path.display().to_string(), width, height, texels))
+        Ok(Self::repaired(name.to_string(), width, height, texels))
     }
 
     /// An environment of pixels that may hold anything.
@@ -176,7 +176,7 @@ mod tests {
     fn light_is_not_brighter_than_sums_of_it_can_be() {
         let environment =
             Environment::repaired(String::new(), 2, 1, vec![[f32::MAX, 1.0, 0.0], [f32::INFINITY, 1.0, 0.0]]);
-        assert_eq!(environment.texels, [[MOST_RADIANCE, 1.0, 0.0]; 2]);
+        assert_eq!(*environment.texels, [[MOST_RADIANCE, 1.0, 0.0]; 2]);
         assert_eq!(environment.repaired, RepairCounts { infinite: 2, ..RepairCounts::default() });
     }
 
@@ -259,7 +259,7 @@ mod tests {
         let error = write("depth.exr", &["Z", "N.X"]).unwrap_err().to_string();
         assert!(error.contains("depth.exr") && error.contains("N.X, Z"), "{error}");
         for names in [&["R", "G", "B"][..], &["A", "R", "G", "B"], &["Y"], &["view.R", "view.G", "view.B", "view.Z"]] {
-            assert_eq!(write("colour.exr", names).unwrap().texels, [[1.0; 3]; 4], "{names:?}");
+            assert_eq!(*write("colour.exr", names).unwrap().texels, [[1.0; 3]; 4], "{names:?}");
         }
     }
 }

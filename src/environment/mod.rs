@@ -1,12 +1,13 @@
 //! Distant light from all directions: the lat-long environment, and the function of direction that is its ground truth.
 use std::f64::consts::{PI, TAU};
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 use glam::DVec3;
 
 use crate::file_format::file_formats;
 
 pub mod cube;
+mod custom;
 mod ggx_pyramid;
 mod irradiance;
 mod light_map;
@@ -18,6 +19,7 @@ pub mod sources;
 pub mod vmf_file;
 mod vmf_pyramid;
 
+pub use custom::CustomEnvironment;
 pub use ggx_pyramid::{FINEST_ALPHA, ggx_pyramid, level_of_alpha};
 pub use irradiance::irradiance_map;
 pub use light_map::{Alias, LightMap};
@@ -28,12 +30,12 @@ pub use vmf_pyramid::{BlurKernel, BlurStep, VmfPyramid, width_rad_of};
 
 file_formats!(Environment: hdr_file, exr_file);
 
-/// How many pixels of a file were no radiance, by the worst that was wrong with each.
+/// How many pixels of a picture were no radiance, by the worst that was wrong with each.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RepairCounts {
     /// Pixels with a NaN: replaced by the mean of those of their eight neighbours that were whole, or by black.
     pub nan: usize,
-    /// Pixels with a channel that is infinite or above 1e30: set to the largest finite value in the file, but at most to 1e30.
+    /// Pixels with a channel that is infinite or above 1e30: set to the largest finite value in the picture, but at most to 1e30.
     pub infinite: usize,
     /// Pixels with a negative channel (colours outside Rec. 709, or ringing): set to 0, and what they lacked taken from
     /// their surroundings, so that the light stays the same as a whole.
@@ -47,15 +49,15 @@ pub struct RepairCounts {
 /// is +Z, its top row +Y.
 #[derive(Clone, Debug)]
 pub struct Environment {
-    /// The built-in's name, or the file's as it was given.
+    /// The built-in's name, or the file's or a program's as it was given.
     pub name: String,
     /// Columns, at least 1.
     pub width: usize,
     /// Rows, at least 1.
     pub height: usize,
     /// Radiance at the pixel centres, row by row from the top; finite and not negative.
-    pub texels: Vec<[f32; 3]>,
-    /// What had to be repaired when the file was read.
+    pub texels: Arc<Vec<[f32; 3]>>,
+    /// What had to be repaired when it was read.
     pub repaired: RepairCounts,
     /// Made when first asked for.
     small_sources: OnceLock<SmallSources>,
@@ -72,6 +74,7 @@ impl Environment {
         texels: Vec<[f32; 3]>,
         repaired: RepairCounts,
     ) -> Self {
+        let texels = Arc::new(texels);
         Self { name, width, height, texels, repaired, small_sources: OnceLock::new(), fingerprint: OnceLock::new() }
     }
 

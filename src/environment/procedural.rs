@@ -1,5 +1,7 @@
 //! The built-in environments: a soft sky, the same with a small sun, a studio with area lights, halls of many lamps, and the white
 //! furnace.
+use std::sync::Arc;
+
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -48,10 +50,10 @@ impl Environment {
 /// The picture of a function of direction, sampled at the pixel centres: functions here are smooth over a pixel.
 fn procedural(name: &str, (width, height): (usize, usize), radiance: impl Fn(DVec3) -> DVec3 + Sync) -> Environment {
     let mut environment = Environment::new(name.into(), width, height, Vec::new(), RepairCounts::default());
-    environment.texels = (0..width * height)
+    let texels = (0..width * height)
         .into_par_iter()
-        .map(|i| radiance(environment.direction((i % width) as f64, (i / width) as f64)).as_vec3().to_array())
-        .collect();
+        .map(|i| radiance(environment.direction((i % width) as f64, (i / width) as f64)).as_vec3().to_array());
+    environment.texels = Arc::new(texels.collect());
     environment
 }
 

@@ -324,6 +324,7 @@ fn coarser_level(finer: &[[f32; 3]], size: usize) -> Vec<[f32; 3]> {
 mod tests {
     use super::super::tests::{environment, reference_environment};
     use super::*;
+    use std::sync::Arc;
 
     /// The mean over the sphere of a level.
     fn mean(pyramid: &Pyramid, level: usize) -> DVec3 {
@@ -364,8 +365,8 @@ mod tests {
             // A quarter of the rows and columns: as hard, and faster.
             let (width, height) = ((full.width / 4).max(1), (full.height / 4).max(1));
             let step = full.width / width;
-            full.texels =
-                (0..width * height).map(|i| full.texels[(i / width * step) * full.width + i % width * step]).collect();
+            let texel = |i| full.texels[(i / width * step) * full.width + i % width * step];
+            full.texels = Arc::new((0..width * height).map(texel).collect());
             (full.width, full.height) = (width, height);
             assert_energy(&full, 1e-4);
         }
@@ -433,7 +434,8 @@ mod tests {
         let mut map = environment(64, 32, |_, _| [0.0; 3]);
         for i in 0..64 * 32 {
             let direction = map.direction((i % 64) as f64, (i / 64) as f64);
-            map.texels[i] = [1.0 + direction.x * direction.z, 1.0 + direction.y.powi(3), 0.5].map(|value| value as f32);
+            Arc::make_mut(&mut map.texels)[i] =
+                [1.0 + direction.x * direction.z, 1.0 + direction.y.powi(3), 0.5].map(|value| value as f32);
         }
         let pyramid = Pyramid::box_filtered(&map);
         for i in 0..2000 {
@@ -452,7 +454,7 @@ mod tests {
             let mut map = environment(64, 32, |_, _| [0.0; 3]);
             for i in 0..64 * 32 {
                 let direction = map.direction((i % 64) as f64, (i / 64) as f64);
-                map.texels[i] = [if direction.dot(axis) > 0.9 { 1.0 } else { 0.0 }; 3];
+                Arc::make_mut(&mut map.texels)[i] = [if direction.dot(axis) > 0.9 { 1.0 } else { 0.0 }; 3];
             }
             Pyramid::box_filtered(&map)
         };

@@ -15,7 +15,7 @@ use crate::passes::Sampling;
 use crate::pipeline::DeviceScene;
 use crate::prepare::{Prepared, PreparedMaterial, ask_threads, prepare};
 use crate::progress::{Observer, OnlyCancels};
-use crate::scene::{Background, MaterialSettings, MaterialSource, Scene, Source};
+use crate::scene::{Background, EnvironmentSource, MaterialSettings, MaterialSource, Scene};
 use crate::steps::{LoadEnvironment, LoadMaterial};
 use crate::threads::Threads;
 use crate::vulkan::Device;
@@ -86,7 +86,7 @@ pub struct Cases {
     /// Materials, by names that differ. One at a time is that of all objects.
     pub materials: Vec<(String, MaterialSource)>,
     /// Environments, by names that differ. Turn and intensity are the scene's.
-    pub environments: Vec<(String, Source)>,
+    pub environments: Vec<(String, EnvironmentSource)>,
     /// Scenes, by names that differ. What they say of materials, environment, method, threads and background is not used.
     pub scenes: Vec<(String, Scene)>,
     /// Seed of whatever is random.
@@ -221,7 +221,7 @@ impl Cases {
         };
         scene.materials = vec![MaterialSettings { name: "placeholder".to_owned(), source: placeholder }];
         scene.objects.iter_mut().for_each(|object| object.material = "placeholder".to_owned());
-        scene.environment.source = Source::Builtin("white".to_owned());
+        scene.environment.source = EnvironmentSource::Builtin("white".to_owned());
         scene.image.background = Background::None;
         scene.shading.method = Method::Uniform;
         prepare(&scene, round)

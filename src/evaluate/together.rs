@@ -11,7 +11,7 @@ use crate::memo::{Memo, Round};
 use crate::pipeline::{DeviceScene, Rendering, median};
 use crate::prepare::prepare;
 use crate::progress::{Observer, OnlyCancels};
-use crate::scene::{MaterialSettings, MaterialSource, ObjectSettings, Scene, Source};
+use crate::scene::{EnvironmentSource, MaterialSettings, MaterialSource, ObjectSettings, Scene, Source};
 use crate::vulkan::Device;
 
 /// What to measure, and how often.
@@ -20,7 +20,7 @@ pub struct Together {
     /// Materials, by names that differ: a sphere of each.
     pub materials: Vec<(String, MaterialSource)>,
     /// Environments, by names that differ.
-    pub environments: Vec<(String, Source)>,
+    pub environments: Vec<(String, EnvironmentSource)>,
     /// Fitted threads of each material, 1 to [`crate::threads::fitted::MAX_COUNT`].
     pub threads: u32,
     /// Columns and rows of the picture.
@@ -132,7 +132,7 @@ pub fn run(
 
 impl Together {
     /// As many spheres as there are materials, in rows, with `materials` in turn.
-    fn scene(&self, environment: &Source, materials: &[(String, MaterialSource)]) -> Scene {
+    fn scene(&self, environment: &EnvironmentSource, materials: &[(String, MaterialSource)]) -> Scene {
         let count = self.materials.len();
         // Pictures are four by three as a rule.
         let columns = (count as f32 * 4.0 / 3.0).sqrt().ceil() as usize;

@@ -80,7 +80,7 @@ pub fn parse_image(path: &Path, bytes: &[u8]) -> Result<PictureFile> {
 }
 
 /// Largest picture that is read.
-const MAX_PIXELS: u64 = 1 << 28;
+pub(crate) const MAX_PIXELS: u64 = 1 << 28;
 
 /// Checks a picture's size before anything is allocated for it: a header of some bytes can claim any number of pixels, but compression
 /// makes only so many, `most`, of a byte of the file. `pixels` are those of each layer and channel.

@@ -377,7 +377,7 @@ impl<'a> SceneText<'a> {
             image: &scene.image,
             camera: scene.camera,
             environment: toml::Table::from_iter([
-                source_entry(&environment.source, "file", folder)?,
+                source_entry("environment", &environment.source, "file", folder)?,
                 ("rotation_deg".into(), environment.rotation_deg.into()),
                 ("intensity".into(), environment.intensity.into()),
             ]),
@@ -421,7 +421,7 @@ fn object_table(object: &ObjectSettings, folder: Option<&Path>) -> Result<toml::
         ("tangent".into(), value)
     };
     let entries = [
-        source_entry(&object.mesh, "mesh", folder)?,
+        source_entry("mesh", &object.mesh, "mesh", folder)?,
         ("material".into(), object.material.clone().into()),
         ("translate".into(), vector(object.translate.to_array())),
         ("rotate_deg".into(), vector(object.rotate_deg.to_array())),
@@ -430,11 +430,20 @@ fn object_table(object: &ObjectSettings, folder: Option<&Path>) -> Result<toml::
     Ok(entries.into_iter().chain(object.tangent.map(rule)).collect())
 }
 
-/// The key and value of a source; `file_key` is the key of files.
-fn source_entry(source: &Source, file_key: &str, folder: Option<&Path>) -> Result<(String, toml::Value)> {
+/// The key and value of the source of `what`; `file_key` is the key of files.
+fn source_entry<T: std::fmt::Display>(
+    what: &str,
+    source: &Source<T>,
+    file_key: &str,
+    folder: Option<&Path>,
+) -> Result<(String, toml::Value)> {
     Ok(match source {
         Source::File(path) => (file_key.into(), path_value(path, folder)?),
         Source::Builtin(name) => ("builtin".into(), name.clone().into()),
+        Source::Custom(custom) => {
+            let subject = format!("{what} \"{custom}\"");
+            return Err(Error::input(subject, "is defined by a program", "choose a file or a built-in before saving"));
+        }
     })
 }
 

@@ -1,4 +1,4 @@
-//! Triangle meshes: read from files, or built in.
+//! Triangle meshes: read from files, built in, or made by a program.
 use std::collections::HashMap;
 use std::path::Path;
 

@@ -8,10 +8,12 @@ use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::brdf::{Brdf, Custom, base_files, base_files_of};
+use crate::environment::CustomEnvironment;
 use crate::error::{Error, Result};
 use crate::file_format::file_formats;
 
 pub mod camera;
+mod custom_mesh;
 mod drawing_order;
 mod file;
 pub mod mesh;
@@ -23,6 +25,7 @@ mod tangent_rule;
 mod texture_tangents;
 
 pub use camera::Camera;
+pub use custom_mesh::CustomMesh;
 pub use mesh::Mesh;
 pub use method::Method;
 pub use obj_file::TexturedMesh;
@@ -110,17 +113,25 @@ pub enum Background {
     None,
 }
 
-/// A file, or something of that name made by the program.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+/// A file, something of that name made by the program, or a `T` that a user of the crate makes.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Source {
+pub enum Source<T> {
     /// Read from the disk.
     File(PathBuf),
     /// Built in.
     Builtin(String),
+    /// Given by a user of the crate; no file can have it.
+    #[serde(skip)]
+    Custom(T),
 }
 
-impl Source {
+/// Where light comes from.
+pub type EnvironmentSource = Source<CustomEnvironment>;
+/// Where a mesh comes from.
+pub type MeshSource = Source<CustomMesh>;
+
+impl<T> Source<T> {
     /// What a flag names: one of `builtin_names`, or else a file.
     ///
     /// A file that is called like one of these is named by its path: `./sphere`.
@@ -132,18 +143,19 @@ impl Source {
     pub fn file(&self) -> Option<&PathBuf> {
         match self {
             Self::File(path) => Some(path),
-            Self::Builtin(_) => None,
+            Self::Builtin(_) | Self::Custom(_) => None,
         }
     }
 }
 
-impl std::fmt::Display for Source {
+impl<T: std::fmt::Display> std::fmt::Display for Source<T> {
     fn fmt(&self, formatter: &mut std::fmt::Formatter) -> std::fmt::Result {
         match self {
             // A bare name is that of a built-in.
             Self::File(path) if is_bare(path) => write!(formatter, "./{}", path.display()),
             Self::File(path) => path.display().fmt(formatter),
             Self::Builtin(name) => name.fmt(formatter),
+            Self::Custom(custom) => custom.fmt(formatter),
         }
     }
 }
@@ -156,8 +168,8 @@ fn is_bare(path: &Path) -> bool {
 /// `[environment]`: the light.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EnvironmentSettings {
-    /// Lat-long picture or built-in.
-    pub source: Source,
+    /// Lat-long picture of a file or a program's own, or built-in.
+    pub source: EnvironmentSource,
     /// Turn of the environment about +Y in degrees, counter-clockwise seen from above (it takes +Z towards +X).
     pub rotation_deg: f64,
     /// Factor of its radiance; not negative.
@@ -234,8 +246,8 @@ impl MaterialSource {
 /// `[[object]]`: a mesh at its place, of one material.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ObjectSettings {
-    /// OBJ file or built-in.
-    pub mesh: Source,
+    /// OBJ file, built-in, or a program's own.
+    pub mesh: MeshSource,
     /// Name of its material.
     pub material: String,
     /// Displacement, after rotation and scale.
@@ -274,7 +286,7 @@ impl Scene {
     }
 
     /// Puts `mesh`, of the first object's material, in the place of all objects.
-    pub fn use_mesh(&mut self, mesh: Source) {
+    pub fn use_mesh(&mut self, mesh: MeshSource) {
         let material = self.objects.first().map(|object| object.material.clone()).unwrap_or_default();
         self.objects = vec![ObjectSettings::new(mesh, &material)];
     }
@@ -283,9 +295,9 @@ impl Scene {
 impl Scene {
     /// The files that it names: of its environment, its meshes and its materials, with those under their coats.
     pub fn files(&self) -> Vec<PathBuf> {
-        let sources = std::iter::once(&self.environment.source).chain(self.objects.iter().map(|object| &object.mesh));
+        let of_meshes = self.objects.iter().filter_map(|object| object.mesh.file());
         let of_materials = self.materials.iter().flat_map(|material| material.source.files());
-        sources.filter_map(Source::file).cloned().chain(of_materials).collect()
+        self.environment.source.file().into_iter().chain(of_meshes).cloned().chain(of_materials).collect()
     }
 
     /// Names of the materials that objects have, each once, in the order in which objects name them first.
@@ -371,7 +383,7 @@ impl Default for ShadingSettings {
 
 impl ObjectSettings {
     /// A mesh of a material, where it is.
-    pub fn new(mesh: Source, material: &str) -> Self {
+    pub fn new(mesh: MeshSource, material: &str) -> Self {
         Self {
             mesh,
             material: material.into(),
@@ -397,16 +409,16 @@ mod tests {
 
     #[test]
     fn a_file_called_like_a_built_in_is_never_taken_for_it() {
-        let builtin = Source::named("sphere", mesh::builtin_names());
+        let builtin = MeshSource::named("sphere", mesh::builtin_names());
         assert_eq!(builtin, Source::Builtin("sphere".into()));
         for name in ["./sphere", "sphere.obj", "meshes/sphere", "/sphere"] {
-            let file = Source::named(name, mesh::builtin_names());
+            let file = MeshSource::named(name, mesh::builtin_names());
             assert_eq!((&file, file.to_string().as_str()), (&Source::File(name.into()), name));
         }
         // As a scene file in the folder where the program runs names it.
-        let file = Source::File("sphere".into());
+        let file = MeshSource::File("sphere".into());
         assert_ne!(file.to_string(), builtin.to_string());
-        assert_eq!(Source::named(&file.to_string(), mesh::builtin_names()), Source::File("./sphere".into()));
+        assert_eq!(MeshSource::named(&file.to_string(), mesh::builtin_names()), Source::File("./sphere".into()));
         assert_eq!(MaterialSource::named("gold"), MaterialSource::Builtin("gold".into()));
         assert_eq!(MaterialSource::named("./gold"), MaterialSource::File("./gold".into()));
     }

@@ -51,17 +51,7 @@ fn parse_parts(path: &Path, bytes: &[u8], is_textured: bool) -> Result<TexturedM
     // Some editors put a byte order mark first, which would be part of the first word.
     let obj = read_obj(&whole_lines(text.trim_start_matches('\u{feff}')), is_textured)
         .map_err(|problem| Error::in_file(path, problem, "repair or export it again"))?;
-    let (textured, dropped) = clean(&obj);
-    let mesh = &textured.mesh;
-    if mesh.indices.is_empty() {
-        return Err(Error::in_file(path, "has no triangle with an area", "give a mesh with faces"));
-    }
-    // A file that is read for its tangents was read without them before.
-    if dropped > 0 && !is_textured {
-        tracing::warn!("{}: dropped {dropped} degenerate triangles", path.display());
-    }
-    tracing::debug!("{}: {} triangles, {} vertices", path.display(), mesh.indices.len() / 3, mesh.positions.len());
-    Ok(textured)
+    obj.cleaned(path.display(), is_textured)
 }
 
 /// `text` without comments, its lines ended by LF, and each line of the mesh that a backslash continues as one. Lines after it keep their
@@ -102,10 +92,33 @@ enum SmoothingGroup {
 }
 
 /// What an OBJ says of faces.
-struct Obj {
+pub(super) struct Obj {
     mesh: tobj::Mesh,
     /// That of each face.
     smoothing_groups: Vec<SmoothingGroup>,
+}
+
+impl Obj {
+    /// An OBJ of triangles without smoothing groups.
+    pub(super) fn of_triangles(mesh: tobj::Mesh) -> Self {
+        let smoothing_groups = vec![SmoothingGroup::Unsaid; mesh.indices.len() / 3];
+        Self { mesh, smoothing_groups }
+    }
+
+    /// The mesh of this name without its degenerate triangles.
+    pub(super) fn cleaned(&self, name: impl std::fmt::Display, is_textured: bool) -> Result<TexturedMesh> {
+        let (textured, dropped) = clean(self);
+        let mesh = &textured.mesh;
+        if mesh.indices.is_empty() {
+            return Err(Error::input(name, "has no triangle with an area", "give a mesh with faces"));
+        }
+        // What is read for its tangents was read without them before.
+        if dropped > 0 && !is_textured {
+            tracing::warn!("{name}: dropped {dropped} degenerate triangles");
+        }
+        tracing::debug!("{name}: {} triangles, {} vertices", mesh.indices.len() / 3, mesh.positions.len());
+        Ok(textured)
+    }
 }
 
 /// The faces in the text of an OBJ, each corner with an index into the positions and one into the normals; a corner

@@ -1,19 +1,25 @@
 //! Loads what scenes name: meshes, environments and BRDFs, with their tables. A file is its contents, so an edited one is another.
 use crate::Result;
 use crate::brdf::{Brdf, LobeShape, base_files, base_files_of, tabulate};
-use crate::environment::Environment;
+use crate::environment::{CustomEnvironment, Environment};
 use crate::error::Error;
 use crate::file_format::FileKind;
 use crate::memo::{Key, Keyed, Memo, Round, Step};
-use crate::scene::{MaterialSource, Mesh, Source, TexturedMesh};
+use crate::scene::{CustomMesh, EnvironmentSource, MaterialSource, Mesh, MeshSource, Source, TexturedMesh};
 use crate::threads::SliceTable;
 use std::path::{Path, PathBuf};
 
-/// The key of what `source` names, in a file of one of the formats `files`.
-fn key_of<T>(memo: &Memo, files: &FileKind<T>, source: &Source) -> Result<Key> {
+/// The key of what `source` names, in a file of one of the formats `files`, or with the digest that `digest` tells.
+fn key_of<T, C>(
+    memo: &Memo,
+    files: &FileKind<T>,
+    source: &Source<C>,
+    digest: impl Fn(&C) -> blake3::Hash,
+) -> Result<Key> {
     Ok(match source {
         Source::File(path) => file_key(memo, files, path)?,
         Source::Builtin(name) => Key::builder("builtin").text(name).build(),
+        Source::Custom(custom) => Key::builder("custom").key(Key::of_digest(digest(custom))).build(),
     })
 }
 
@@ -34,33 +40,34 @@ fn with_files(memo: &Memo, key: Key, files: &[PathBuf]) -> Result<Key> {
 }
 
 /// Loads or makes a mesh, in object space.
-pub struct LoadMesh<'a>(pub &'a Source);
+pub struct LoadMesh<'a>(pub &'a MeshSource);
 
 impl Step for LoadMesh<'_> {
     type Output = Mesh;
     const NAME: &'static str = "mesh";
 
     fn key(&self, memo: &Memo) -> Result<Key> {
-        key_of(memo, &Mesh::FILES, self.0)
+        key_of(memo, &Mesh::FILES, self.0, CustomMesh::digest)
     }
 
     fn make(&self, round: &Round) -> Result<Mesh> {
         match self.0 {
             Source::File(path) => Mesh::FILES.parse(path, &round.memo().file_bytes(path)?),
             Source::Builtin(name) => Mesh::builtin(name),
+            Source::Custom(custom) => Ok(custom.mesh(false)?.mesh),
         }
     }
 }
 
 /// The same with the tangents of its texture coordinates, if it has any.
-pub struct LoadBrushedMesh<'a>(pub &'a Source);
+pub struct LoadBrushedMesh<'a>(pub &'a MeshSource);
 
 impl Step for LoadBrushedMesh<'_> {
     type Output = Mesh;
     const NAME: &'static str = "tangents";
 
     fn key(&self, memo: &Memo) -> Result<Key> {
-        Ok(Key::builder("with tangents").key(key_of(memo, &TexturedMesh::FILES, self.0)?).build())
+        Ok(Key::builder("with tangents").key(key_of(memo, &TexturedMesh::FILES, self.0, CustomMesh::digest)?).build())
     }
 
     fn make(&self, round: &Round) -> Result<Mesh> {
@@ -68,20 +75,22 @@ impl Step for LoadBrushedMesh<'_> {
             Source::File(path) => Ok(TexturedMesh::FILES.parse(path, &round.memo().file_bytes(path)?)?.with_tangents()),
             // None has texture coordinates.
             Source::Builtin(name) => Mesh::builtin(name),
+            Source::Custom(custom) => Ok(custom.mesh(true)?.with_tangents()),
         }
     }
 }
 
 /// Loads or makes an environment, without its turn and intensity.
-pub struct LoadEnvironment<'a>(pub &'a Source);
+pub struct LoadEnvironment<'a>(pub &'a EnvironmentSource);
 
 impl Step for LoadEnvironment<'_> {
     type Output = Environment;
     const NAME: &'static str = "environment";
 
     fn key(&self, memo: &Memo) -> Result<Key> {
+        let digest = |custom: &CustomEnvironment| custom.environment().fingerprint();
         // It knows its name.
-        Ok(Key::builder(&self.0.to_string()).key(key_of(memo, &Environment::FILES, self.0)?).build())
+        Ok(Key::builder(&self.0.to_string()).key(key_of(memo, &Environment::FILES, self.0, digest)?).build())
     }
 
     fn content_key(&self, environment: &Environment) -> Option<Key> {
@@ -92,6 +101,8 @@ impl Step for LoadEnvironment<'_> {
         match self.0 {
             Source::File(path) => Environment::FILES.parse(path, &round.memo().file_bytes(path)?),
             Source::Builtin(name) => Environment::builtin(name),
+            // They share the pixels.
+            Source::Custom(custom) => Ok(custom.environment().clone()),
         }
     }
 }

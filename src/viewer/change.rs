@@ -5,8 +5,8 @@ use crate::error::{Error, Result};
 use crate::method::Method;
 use crate::prepare::check_count;
 use crate::scene::{
-    Background, Camera, EXPOSURE, GAMMA, INTENSITY, MAX_SAMPLES, MAX_SIZE_PX, MAX_SUBPIXELS, MaterialSource, Pattern,
-    Scene, ShadingSettings, Source, within,
+    Background, Camera, EXPOSURE, EnvironmentSource, GAMMA, INTENSITY, MAX_SAMPLES, MAX_SIZE_PX, MAX_SUBPIXELS,
+    MaterialSource, MeshSource, Pattern, Scene, ShadingSettings, Source, within,
 };
 use std::path::Path;
 
@@ -34,13 +34,13 @@ pub enum Change {
         value: toml::Value,
     },
     /// The light.
-    Environment(Source),
+    Environment(EnvironmentSource),
     /// Turn of the environment in degrees.
     Rotation(f64),
     /// Factor of its radiance.
     Intensity(f64),
     /// The mesh in place of all objects.
-    Mesh(Source),
+    Mesh(MeshSource),
     /// Name of the shading method. The number of threads becomes what suits it.
     Method(Method),
     /// Number of threads or samples; none for as many as suit the method.

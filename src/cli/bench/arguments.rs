@@ -15,7 +15,8 @@ use threadlight::low_level::method::{Method, Variant};
 use threadlight::low_level::output;
 use threadlight::low_level::progress::Observer;
 use threadlight::low_level::scene::{
-    MAX_SAMPLES, MAX_SUBPIXELS, MaterialSettings, MaterialSource, ObjectSettings, Scene, Source, mesh,
+    EnvironmentSource, MAX_SAMPLES, MAX_SUBPIXELS, MaterialSettings, MaterialSource, ObjectSettings, Scene, Source,
+    mesh,
 };
 use threadlight::low_level::vulkan::{Device, Instance};
 use threadlight::{Error, Result};
@@ -166,7 +167,7 @@ pub fn files_of_materials(texts: &[String], materials: &[(String, MaterialSource
 }
 
 /// The environments that `texts` name, with their names.
-pub fn named_environments(flag: &str, texts: &[String]) -> Result<Vec<(String, Source)>> {
+pub fn named_environments(flag: &str, texts: &[String]) -> Result<Vec<(String, EnvironmentSource)>> {
     let source = |text| Source::named(text, environment::builtin_names());
     Ok(named(flag, texts)?.into_iter().map(|(name, text)| (name, source(text))).collect())
 }
