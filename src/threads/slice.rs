@@ -31,7 +31,9 @@ impl Resolution {
         let long_axis = DVec2::from_angle(-phi_o).rotate(lobe.long_axis);
         // GGX then leaves an error of 2 e^(-narrowness phi), as in `Brdf::albedo_from`.
         let phi = self.phi.max((8.0 / narrowness).ceil() as usize);
-        Self { phi, ellipse: Some(Ellipse { narrowness, long_axis }), ..self }
+        let mut ellipse = Ellipse { narrowness, long_axis, start: 0.0 };
+        ellipse.start = ellipse.circle_of(DVec2::NEG_X).to_angle();
+        Self { phi, ellipse: Some(ellipse), ..self }
     }
 }
 
@@ -43,6 +45,8 @@ impl Resolution {
 struct Ellipse {
     narrowness: f64,
     long_axis: DVec2,
+    /// The angle of -x, where azimuths begin: on a circle, too, so that they move steadily while one axis outgrows the other.
+    start: f64,
 }
 
 impl Ellipse {
@@ -113,17 +117,21 @@ fn half_vector(x: f64, phi: DVec2) -> DVec3 {
 }
 
 impl Resolution {
-    /// The direction of phi_h at a part of the way around, counted from -x or, on an ellipse, from an end; and how much wider steps of
-    /// phi_h are there than even ones.
+    /// The direction of phi_h at a part of the way around, counted from -x; and how much wider steps of phi_h are there than even ones.
     fn azimuth(&self, turn: f64) -> (DVec2, f64) {
-        let circle = DVec2::from_angle(2.0 * PI * turn - PI);
-        self.ellipse.map_or((circle, 1.0), |ellipse| ellipse.of_circle(circle))
+        let angle = 2.0 * PI * turn;
+        match self.ellipse {
+            None => (DVec2::from_angle(angle - PI), 1.0),
+            Some(ellipse) => ellipse.of_circle(DVec2::from_angle(angle + ellipse.start)),
+        }
     }
 
     /// The inverse: the part of the way around, of a direction of any length.
     fn turn(&self, direction: DVec2) -> f64 {
-        let circle = self.ellipse.map_or(direction, |ellipse| ellipse.circle_of(direction));
-        (circle.y.atan2(circle.x) + PI) / (2.0 * PI)
+        match self.ellipse {
+            None => (direction.y.atan2(direction.x) + PI) / (2.0 * PI),
+            Some(ellipse) => ((ellipse.circle_of(direction).to_angle() - ellipse.start) / (2.0 * PI)).rem_euclid(1.0),
+        }
     }
 }
 
@@ -422,14 +430,18 @@ mod tests {
 
     #[test]
     fn coordinate_inverts_direction() {
-        for (name, brdf) in test_materials::all() {
-            for theta_o_deg in [0.0f64, 45.0, 85.0] {
-                let slice = Slice::new(&SeenBrdf::from_all_around(&brdf), theta_o_deg.to_radians());
-                for uv in fibonacci_lattice(101) {
-                    let back = slice.coordinate(slice.direction(uv));
-                    // v is periodic.
-                    let error = (back - uv).abs();
-                    assert!(error.x < 1e-6 && error.y.min(1.0 - error.y) < 1e-6, "{name} {theta_o_deg}: {uv} {back}");
+        for (name, brdf) in [test_materials::all(), test_materials::anisotropic()].concat() {
+            let lobe = LobeShape::of(&brdf);
+            for theta_o in [0.0f64, 45.0, 85.0].map(f64::to_radians) {
+                let seen = SeenBrdf::from_azimuth(&brdf, 0.4);
+                let [on_ellipse, _] = Slice::with_lobes(&seen, theta_o, Resolution::FULL.along(&lobe, 0.4));
+                for slice in [Slice::new(&seen, theta_o), on_ellipse] {
+                    for uv in fibonacci_lattice(101) {
+                        let back = slice.coordinate(slice.direction(uv));
+                        // v is periodic.
+                        let error = (back - uv).abs();
+                        assert!(error.x < 1e-6 && error.y.min(1.0 - error.y) < 1e-6, "{name} {theta_o}: {uv} {back}");
+                    }
                 }
             }
         }
