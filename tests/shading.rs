@@ -173,6 +173,48 @@ fn compare_with_twin(
 }
 
 #[test]
+fn lamps_of_many_sizes_are_shaded_as_by_the_cpu_twin() {
+    let gpu = Validated::new();
+    let folder = tempfile::tempdir().unwrap();
+    let [map, ground] = ["lamps.exr", "ground.obj"].map(|name| folder.path().join(name));
+    // Wide, long, of one pixel, and low ones all around; of shades that differ from part to part, and from one side of the seam to the other.
+    let texel = |(x, y): (i32, i32)| match (x, y) {
+        (20..28, 14..20) | (60..84, 40..42) | (76, 20) => {
+            [2000.0 + 30.0 * x as f32, 3000.0, 4000.0 - 30.0 * y as f32, 1.0]
+        }
+        (_, 31..33) if x % 16 < 2 => [3000.0, 2000.0 + 900.0 * (x % 2) as f32, 1000.0, 1.0],
+        _ => [0.5, 0.4, 0.01 * (x + y) as f32, 1.0],
+    };
+    let texels: Vec<_> = (0..64).flat_map(|y| (0..128).map(move |x| texel((x, y)))).collect();
+    threadlight::low_level::output::write_exr(&map, 128, 64, &texels, false, &Default::default()).unwrap();
+    // As far as the view grazes it.
+    std::fs::write(&ground, "v -90 -1 90\nv 90 -1 90\nv 90 -1 -90\nv -90 -1 -90\nf 1 2 3 4\n").unwrap();
+    let memo = Memo::default();
+    let mut _held = None;
+    for (name, parameters) in [
+        ("narrow", "model = 'conductor'\ndistribution = 'beckmann'\nalpha = 0.005\nmetal = 'Cr'"),
+        ("wide", "model = 'conductor'\ndistribution = 'ggx'\nalpha = 0.2\nmetal = 'Au'"),
+        ("steep", "model = 'conductor'\ndistribution = 'beckmann'\nalpha = 0.05\nmetal = 'Al'"),
+    ] {
+        let mut scene = sphere(model(parameters), "white", 4, (48, 36));
+        scene.environment.source = Source::File(map.clone());
+        scene.objects.push(ObjectSettings { mesh: Source::File(ground.clone()), ..scene.objects[0].clone() });
+        scene.environment.rotation_deg = 150.0;
+        scene.image.background = Background::None;
+        let (eye, target) = (DVec3::new(1.5, 1.0, 3.5), DVec3::new(-0.3, 0.0, 0.1));
+        scene.camera = Some(Camera { eye, target, up: DVec3::Y, fov_y_deg: 27.0 });
+        let prepared = ready(&scene);
+        let rendering = gpu.render(&prepared, EVERYTHING);
+        let round = memo.round(&());
+        let twin = shading::CpuShader::new(&prepared, &round).unwrap();
+        _held = Some(round.held());
+        let most = if gpu.has_exact_functions() { 2e-3 } else { 0.03 };
+        compare_with_twin(&prepared, &rendering, &twin, most, name);
+    }
+    gpu.finish();
+}
+
+#[test]
 fn materials_that_need_different_shaders_are_shaded_as_their_cpu_twin_side_by_side() {
     let gpu = Validated::new();
     // Kernels sharper than the pyramid, a tangent, no lobe at all, tables; and one that is as another.
