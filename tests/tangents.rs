@@ -2,7 +2,7 @@
 mod common;
 
 use common::{EVERYTHING, Validated, model, pixels, ready, sphere, texels_of};
-use glam::{DVec3, Mat3, UVec2, Vec3, Vec4};
+use glam::{DAffine3, DMat3, DVec3, EulerRot, Mat3, UVec2, Vec3, Vec4};
 use threadlight::Method;
 use threadlight::low_level::evaluate::{Comparable, Display, compare};
 use threadlight::low_level::geometry_texel::GeometryTexel;
@@ -11,7 +11,7 @@ use threadlight::low_level::output::write_exr;
 use threadlight::low_level::passes::Sampling;
 use threadlight::low_level::pipeline::Rendering;
 use threadlight::low_level::prepare::{Prepared, prepare};
-use threadlight::low_level::scene::{Background, Camera, MaterialSource, Scene, Source, TangentRule};
+use threadlight::low_level::scene::{Background, Camera, MaterialSource, ObjectSettings, Scene, Source, TangentRule};
 use threadlight::low_level::shading::{CpuShader, Surface};
 
 /// A metal of this roughness, both along the tangent and across it.
@@ -70,6 +70,45 @@ fn tangents_go_around_an_axis_or_along_it_on_the_turned_object() {
     let isotropic = ready(&scene(brushed("alpha = 0.2"), Method::Uniform, 1));
     let rendering = gpu.render(&isotropic, EVERYTHING);
     assert!(seen(&isotropic, &rendering).iter().all(|(_, texel, _)| texel.tangent.is_none()));
+    gpu.finish();
+}
+
+#[test]
+fn normals_and_tangents_of_a_stretched_sphere_are_those_of_an_ellipsoid_from_within_too_and_beside_a_huge_object() {
+    let gpu = Validated::new();
+    let axis = DVec3::new(0.2, 1.0, -0.3).normalize();
+    let (outside, inside) = (DVec3::new(1.0, 2.5, 3.0), DVec3::new(0.1, 0.05, 0.1));
+    for (stretch, eye, side, beside) in [
+        (DVec3::new(1.0, 0.4, 0.7), outside, 1.0, false),
+        (DVec3::new(-1.0, 0.4, 0.7), outside, 1.0, false),
+        (DVec3::new(1.0, 0.4, 0.7), inside, -1.0, false),
+        (DVec3::new(1.0, 0.4, 0.7), outside, 1.0, true),
+    ] {
+        let mut scene = scene(brushed("alpha_x = 0.1; alpha_y = 0.4"), Method::Uniform, 1);
+        scene.image.subpixels = 1;
+        scene.camera.as_mut().unwrap().eye = eye;
+        scene.objects[0].tangent = Some(TangentRule::Along(axis.as_vec3()));
+        // Behind the eye.
+        if beside {
+            let place = 2e5 * eye.as_vec3();
+            scene.objects.push(ObjectSettings { translate: place, scale: 2e5, ..scene.objects[0].clone() });
+        }
+        let mut prepared = ready(&scene);
+        let to_world = DMat3::from_euler(EulerRot::XYZ, 0.4, 1.2, -0.2) * DMat3::from_diagonal(stretch);
+        prepared.objects[0].to_world = DAffine3::from_mat3(to_world);
+        let texels = seen(&prepared, &gpu.render(&prepared, EVERYTHING));
+        assert!(texels.len() > 300, "{}", texels.len());
+        for (pixel, GeometryTexel { normal, tangent, .. }, w_o) in texels {
+            let outwards = side * normal.as_dvec3();
+            // Where the ellipsoid has this normal.
+            let place = to_world * (to_world.transpose() * outwards).normalize();
+            let past = (place - eye).cross(w_o.as_dvec3()).length();
+            let along = to_world * axis;
+            let expected = (along - along.dot(outwards) * outwards).normalize().as_vec3();
+            let away = tangent.expect("a tangent").distance(expected);
+            assert!(past < 0.01 && away < 0.02, "{stretch} from {eye} at {pixel}: {past} {away}");
+        }
+    }
     gpu.finish();
 }
 
