@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use threadlight::Method;
 use threadlight::low_level::evaluate::Display;
 use threadlight::low_level::evaluate::reference::{
-    Integrator, Processor, ReferenceSettings, TOLERANCE, reference, tone_map,
+    Integrator, Processor, ReferenceImage, ReferenceSettings, TOLERANCE, reference, tone_map,
 };
 use threadlight::low_level::output::{read_image, write_exr};
 use threadlight::low_level::pipeline::{Wanted, render_geometry};
@@ -144,16 +144,24 @@ fn the_reference_has_the_background_and_the_display_values_of_other_pictures() {
     };
     let expected = truth(&ready(&scene));
     scene.shading.method = Method::Cosine;
-    let found = gpu.render(&ready(&scene), EVERYTHING);
+    let over_environment = ready(&scene);
+    let found = gpu.render(&over_environment, EVERYTHING);
     // Corners, where no sphere is.
     for pixel in [0, 31, 23 * 32, 24 * 32 - 1] {
         let [found, expected] = [&found, &expected].map(|picture| Vec4::from(picture.radiance[pixel]));
         assert!((found / expected - 1.0).abs().max_element() < 0.01, "{found}, not {expected} at {pixel}");
     }
+    let whole = found.radiance;
     scene.image.background = Background::None;
     let prepared = ready(&scene);
     let found = gpu.render(&prepared, Wanted { display: true, ..EVERYTHING });
     assert!(found.radiance.iter().filter(|pixel| (0.1..0.9).contains(&pixel[3])).count() > 20);
+    // Edges have as much of it as they are open.
+    let bare = ReferenceImage { radiance: found.radiance.clone(), ..ReferenceImage::default() };
+    for (found, expected) in whole.into_iter().zip(bare.over_background(&over_environment)) {
+        let [found, expected] = [found, expected].map(Vec4::from);
+        assert!((found / expected - 1.0).abs().max_element() < 0.01, "{found}, not {expected}");
+    }
     let expected = tone_map(&found.radiance, &prepared.view);
     assert_eq!(expected.len(), found.display.len());
     for (expected, found) in expected.into_iter().zip(found.display) {
