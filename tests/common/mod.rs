@@ -141,7 +141,7 @@ pub fn data() -> Option<PathBuf> {
 
 /// A MERL file of a made-up material: diffuse and a lobe.
 pub fn merl_like_table() -> Vec<u8> {
-    merl_file(|theta_h, theta_d| {
+    merl_file(|theta_h, theta_d, _| {
         let fresnel = 0.04 + 0.96 * (1.0 - theta_d.cos()).powi(5);
         let lobe = 8.0 * fresnel * (-(theta_h.tan() / 0.15).powi(2)).exp();
         [0.12, 0.05, 0.02].map(|diffuse| diffuse + lobe)
@@ -152,7 +152,7 @@ pub fn merl_like_table() -> Vec<u8> {
 pub fn alumina_oxide() -> Option<Vec<u8>> {
     let slice = std::fs::read(data()?.join("merl/slices/alumina-oxide.slice")).ok()?;
     let values: Vec<f32> = slice.chunks_exact(4).map(|v| f32::from_le_bytes([v[0], v[1], v[2], v[3]])).collect();
-    Some(merl_file(|theta_h, theta_d| {
+    Some(merl_file(|theta_h, theta_d, _| {
         // Rows are theta_d in degrees, columns theta_h in its square-root bins.
         let row = theta_d.to_degrees() as usize;
         let column = (90.0 * (theta_h / std::f64::consts::FRAC_PI_2).sqrt()) as usize;
@@ -211,8 +211,13 @@ pub fn rgl_file(fields: &[(&str, &[u64], &[f32])]) -> Vec<u8> {
     [bytes, values].concat()
 }
 
-/// A MERL file of a BRDF of theta_h and theta_d (radians, bin centres), with -1 below the horizon as in the database.
-fn merl_file(brdf: impl Fn(f64, f64) -> [f64; 3]) -> Vec<u8> {
+/// A MERL file of a made-up material that is not the same on both sides of the plane of incidence, as noise makes measured ones.
+pub fn lopsided_table() -> Vec<u8> {
+    merl_file(|_, _, phi_d| [0.2, 0.1, 0.1 + 0.08 * (2.0 * phi_d).sin()])
+}
+
+/// A MERL file of a BRDF of theta_h, theta_d and phi_d (radians, bin centres), with -1 below the horizon as in the database.
+fn merl_file(brdf: impl Fn(f64, f64, f64) -> [f64; 3]) -> Vec<u8> {
     let mut bytes: Vec<u8> = [90_i32, 90, 180].iter().flat_map(|size| size.to_le_bytes()).collect();
     for (channel, scale) in [1.0, 1.15, 1.66].iter().enumerate() {
         for cell in 0..90 * 90 * 180 {
@@ -221,7 +226,7 @@ fn merl_file(brdf: impl Fn(f64, f64) -> [f64; 3]) -> Vec<u8> {
             let (theta_d, phi_d) = ((theta_d as f64 + 0.5).to_radians(), (phi_d as f64 + 0.5).to_radians());
             let swing = theta_h.sin() * theta_d.sin() * phi_d.cos();
             let below = theta_h.cos() * theta_d.cos() - swing.abs() < 0.0;
-            let stored = if below { -1.0 } else { brdf(theta_h, theta_d)[channel] * 1500.0 / scale };
+            let stored = if below { -1.0 } else { brdf(theta_h, theta_d, phi_d)[channel] * 1500.0 / scale };
             bytes.extend_from_slice(&stored.to_le_bytes());
         }
     }
