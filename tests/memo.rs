@@ -150,6 +150,25 @@ fn light_that_brings_lamps_brings_the_brdfs_that_they_are_shaded_by() {
 }
 
 #[test]
+fn a_lobe_that_mirrors_lamps_brings_what_they_are_blurred_to() {
+    let gpu = Validated::new();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("lamp.exr");
+    let is_lamp = |i: usize| (60..63).contains(&(i % 128)) && (20..23).contains(&(i / 128));
+    let texels: Vec<_> = (0..128 * 64).map(|i| [if is_lamp(i) { 500.0 } else { 1.0 }; 4]).collect();
+    threadlight::low_level::output::write_exr(&path, 128, 64, &texels, false, &Default::default()).unwrap();
+    let mut scene = small();
+    scene.environment.source = Source::File(path);
+    scene.materials[0].source = common::model("model = 'lambert'\nreflectance = 0.5");
+    let (diffuse, _) = ask(&gpu, &scene);
+    scene.materials[0].source = common::model("model = 'conductor'\ndistribution = 'ggx'\nmetal = 'Al'\nalpha = 0.2");
+    let (_, made) = ask(&gpu, &scene);
+    assert!(made.contains(&"upload of the environment"), "{made:?}");
+    drop(diffuse);
+    gpu.finish();
+}
+
+#[test]
 fn a_rotation_of_the_material_fits_nothing() {
     let gpu = Validated::new();
     let turned = |rotation_deg: f64| {

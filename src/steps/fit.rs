@@ -121,6 +121,19 @@ mod tests {
     }
 
     #[test]
+    fn drafts_that_continue_other_threads_are_others() {
+        let memo = Memo::default();
+        let round = memo.round(&());
+        let brdf = round.ask(&LoadMaterial(&MaterialSource::Builtin("clay".into()))).unwrap();
+        let [first, second] = [4, 5].map(|count| {
+            let before =
+                round.ask(&FitThreads { brdf: &brdf, settings: ThreadSettings { count, ..SETTINGS } }).unwrap();
+            DraftThreads { brdf: &brdf, before: &before }.key(&memo).unwrap()
+        });
+        assert_ne!(first, second);
+    }
+
+    #[test]
     fn threads_of_another_size_in_their_place_are_replaced() {
         let folder = tempfile::tempdir().unwrap();
         let file = |folder: &std::path::Path| std::fs::read_dir(folder).unwrap().next().unwrap().unwrap().path();
