@@ -16,7 +16,7 @@ const PART_OF_LOBE: f64 = 0.2;
 /// far as there are threads, so that they are `count` lookups of the pixel.
 pub fn set_count(lobe: &LobeShape, count: usize, subpixels: u32) -> usize {
     let subpixels = (subpixels * subpixels) as usize;
-    let fewest = if subpixels == 1 || lobe.is_isotropic { 1 } else { FEWEST_OF_LONG_LOBE };
+    let fewest = if lobe.is_isotropic { 1 } else { FEWEST_OF_LONG_LOBE };
     (count / fewest).clamp(1, subpixels)
 }
 
@@ -47,4 +47,22 @@ pub fn pixels_have_own(lobe: &LobeShape) -> bool {
 /// dragon, and on a sphere have 0.00098 with 0.7, 0.00102 and 0.00104 with 1.5 and 3.
 pub fn share_of_sets(azimuths: usize, pixels_have_own: bool) -> f32 {
     if azimuths == 1 && !pixels_have_own { 2.0 } else { 0.7 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::brdf::Brdf;
+
+    #[test]
+    fn there_is_a_set_for_each_subpixel_as_far_as_there_are_threads_and_eight_to_a_set_of_a_long_lobe() {
+        let counts = |material: &str, subpixels: u32| {
+            let lobe = LobeShape::of(&Brdf::builtin(material).unwrap());
+            [1, 3, 7, 16, 40].map(|count| set_count(&lobe, count, subpixels))
+        };
+        assert_eq!(counts("gold", 2), [1, 3, 4, 4, 4]);
+        assert_eq!(counts("gold", 3), [1, 3, 7, 9, 9]);
+        assert_eq!(counts("brushed-steel", 2), [1, 1, 1, 2, 4]);
+        assert_eq!([counts("gold", 1), counts("brushed-steel", 1)], [[1; 5]; 2]);
+    }
 }

@@ -129,6 +129,19 @@ fn seen_gold() -> (TestLights, DVec3) {
 }
 
 #[test]
+fn lights_of_a_width_count_by_their_response_down_to_a_tenth_of_the_mean() {
+    let (lights, _) = seen_gold();
+    let of_light = |j: usize| {
+        let weight = f64::from(lights.weight[j]);
+        luminance(DVec3::from(lights.response.each_ref().map(|response| f64::from(response[j])))) + 0.1 * weight
+    };
+    for scale in lights.scales.clone() {
+        let all: Vec<_> = lights.of_scale(scale).map(of_light).collect();
+        assert!(all.iter().all(|light| (light / all[0] - 1.0).abs() < 1e-5), "{scale}: {all:?}");
+    }
+}
+
+#[test]
 fn the_best_weights_are_those_of_the_fit_and_no_others_do_better() {
     let (lights, albedo) = seen_gold();
     for sets in [1, 4] {
