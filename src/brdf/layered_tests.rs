@@ -63,6 +63,19 @@ fn no_coat_makes_more_light_than_its_base_does() {
 }
 
 #[test]
+fn a_base_that_makes_light_makes_no_more_of_it_under_a_coat() {
+    let base = "{ model = 'blinn_phong', diffuse = 0.9, specular = 0.8, exponent = 40 }";
+    let bare = under(base, 1.0, 1.0).albedo(0.0).x;
+    for (alpha, ior) in [(0.001, 1.5), (1.0, 2.5)] {
+        let coated = under(base, alpha, ior);
+        for theta_o_deg in [0.0f64, 60.0, 85.0] {
+            let albedo = coated.albedo(theta_o_deg.to_radians()).x;
+            assert!(albedo > 0.8 && albedo < bare, "{alpha} {ior} at {theta_o_deg}: {albedo}, without a coat {bare}");
+        }
+    }
+}
+
+#[test]
 fn brushed_metal_under_a_coat_makes_no_light_at_any_azimuth() {
     let brushed = "distribution = 'ggx', alpha_x = 0.05, alpha_y = 0.3, eta = 0.01, k = 100";
     for rotation_deg in [0, 45, 90] {

@@ -117,6 +117,21 @@ fn a_material_is_evaluated_at_angles_and_at_vectors() {
 }
 
 #[test]
+fn a_material_that_reflects_more_than_it_receives_is_taken_with_a_warning() {
+    let folder = workplace();
+    for (diffuse, warned) in [(0.9, true), (0.5, false)] {
+        let phong = format!("model = 'phong'\ndiffuse = [0.1, {diffuse}, 0.1]\nspecular = 0.5\nexponent = 40\n");
+        fs::write(folder.path().join("p.toml"), phong).unwrap();
+        let (code, _, said) = evaluated(&folder, "p.toml", "30 30 180\n");
+        assert_eq!(
+            (code, said.contains("reflects more light than it receives")),
+            (Some(0), warned),
+            "{diffuse}: {said}"
+        );
+    }
+}
+
+#[test]
 fn an_anisotropic_material_is_evaluated_from_any_azimuth_and_plotted_but_not_exported() {
     let folder = workplace();
     let (code, by_angles, _) = evaluated(&folder, "brushed-steel", "30 60 180 0\n30 60 180\n30 60 180 90\n");
