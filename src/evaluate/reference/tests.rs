@@ -242,6 +242,21 @@ fn suns_of_a_million_in_near_mirrors_at_grazing_angles_converge() {
 }
 
 #[test]
+fn what_is_shown_white_has_an_error_of_its_radiance_at_any_exposure() {
+    for exposure in [0.01, 100.0] {
+        let display = Display { exposure, ..DISPLAY };
+        for shown in [0.5, 2.0, 30.0] {
+            let [found, expected] =
+                [display.error(shown / exposure, 0.1 * shown / exposure), DISPLAY.error(shown, 0.1 * shown)];
+            assert!(
+                expected > 0.0 && (found / expected - 1.0).abs() < 1e-9,
+                "{exposure} {shown}: {found}, not {expected}"
+            );
+        }
+    }
+}
+
+#[test]
 fn dim_light_at_a_long_exposure_is_as_bright_light_at_a_short_one() {
     let (map, brdf) = (sky(500.0), conductor(0.1));
     let [bright, dim] = [1.0, 1e-8].map(|intensity| {
