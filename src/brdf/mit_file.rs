@@ -143,6 +143,15 @@ mod tests {
     }
 
     #[test]
+    fn values_at_the_end_of_single_precision_are_numbers_between_bins_too() {
+        let brdf = parse(Path::new("x.dat"), &made(true, |_, _| f32::MAX)).unwrap();
+        for t in (0..200).map(f64::from) {
+            let found = brdf.evaluate(direction((t * 7.31) % 89.9, t * 31.7), direction((t * 3.77) % 89.9, t * 11.3));
+            assert!(found.is_finite() && found.min_element() > 1e29, "{found}");
+        }
+    }
+
+    #[test]
     fn files_that_are_none_are_refused_with_a_reason() {
         let good = made(true, |_, _| 0.3);
         let with = |index: usize, number: i32| {
