@@ -25,7 +25,7 @@ void main() {
     if (pixel >= push.pixel_count) {
         return;
     }
-    // Pixels that are near each other see a surface from about the same angle, in one row. Rows take turns from the first to the last.
+    // Pixels that are near each other see a surface from about the same angle, in one row. Rows follow each other from the first to the last.
     uint group_count = (push.pixel_count - 1) / gl_WorkGroupSize.x + 1;
     uint row = uint(float(group) / float(group_count) * float(push.row_count));
     // With rows they are points of a spiral over the hemisphere, which are as far from each other along it as across it.

@@ -3,7 +3,8 @@ use std::f64::consts::{FRAC_1_PI, FRAC_PI_2, PI, TAU};
 
 use glam::{DVec2, DVec3, dvec2, dvec3};
 
-use crate::brdf::{LobeShape, SeenBrdf, luminance};
+use super::azimuths::View;
+use crate::brdf::{Brdf, LobeShape, SeenBrdf, luminance};
 
 /// Numbers of steps over theta_h and phi_h.
 #[derive(Clone, Copy, Debug)]
@@ -23,7 +24,7 @@ impl Resolution {
     pub const DRAFT: Self = Self { theta: 64, phi: 32, ..Self::FULL };
 
     /// The same for a BRDF with this lobe, seen from the azimuth `phi_o` (radians from the tangent).
-    pub fn along(self, lobe: &LobeShape, phi_o: f64) -> Self {
+    fn along(self, lobe: &LobeShape, phi_o: f64) -> Self {
         if lobe.is_isotropic {
             return self;
         }
@@ -185,6 +186,16 @@ impl<'a> Slice<'a> {
         values.sort_by(f64::total_cmp);
         let cells = cells(brdf, w_o, resolution);
         [0.0, values[POINTS / 2]].map(|base| Self::above(brdf, w_o, &cells, resolution, base))
+    }
+
+    /// The same of `brdf` for a view, at the azimuths that suit its `lobe`.
+    pub(super) fn with_lobes_of_view(
+        brdf: &'a Brdf,
+        lobe: &LobeShape,
+        View { theta_o, phi_o }: View,
+        resolution: Resolution,
+    ) -> [Self; 2] {
+        Self::with_lobes(&SeenBrdf::from_azimuth(brdf, phi_o), theta_o, resolution.along(lobe, phi_o))
     }
 
     fn above(brdf: &SeenBrdf<'a>, w_o: DVec3, cells: &[Cell], resolution: Resolution, base: f64) -> Self {
@@ -415,8 +426,7 @@ mod tests {
             for (theta_o, phi_o) in [(0.0, 0.0), (1.0, 1.2), (1.5, 4.0)] {
                 let exact = brdf.albedo_from(theta_o, phi_o);
                 for (resolution, bound) in [(Resolution::FULL, 1e-3), (Resolution::DRAFT, 2e-3)] {
-                    let seen = SeenBrdf::from_azimuth(&brdf, phi_o);
-                    let [slice, _] = Slice::with_lobes(&seen, theta_o, resolution.along(&lobe, phi_o));
+                    let [slice, _] = Slice::with_lobes_of_view(&brdf, &lobe, View { theta_o, phi_o }, resolution);
                     let error = ((slice.albedo() - exact) / exact).abs().max_element();
                     assert!(
                         error < bound,
@@ -434,7 +444,8 @@ mod tests {
             let lobe = LobeShape::of(&brdf);
             for theta_o in [0.0f64, 45.0, 85.0].map(f64::to_radians) {
                 let seen = SeenBrdf::from_azimuth(&brdf, 0.4);
-                let [on_ellipse, _] = Slice::with_lobes(&seen, theta_o, Resolution::FULL.along(&lobe, 0.4));
+                let view = View { theta_o, phi_o: 0.4 };
+                let [on_ellipse, _] = Slice::with_lobes_of_view(&brdf, &lobe, view, Resolution::FULL);
                 for slice in [Slice::new(&seen, theta_o), on_ellipse] {
                     for uv in fibonacci_lattice(101) {
                         let back = slice.coordinate(slice.direction(uv));

@@ -8,7 +8,7 @@ use super::lights::{Quadrature, TestLights};
 use super::sets::share_of_sets;
 use super::solve::{Effort, Fit};
 use super::table::FittedTable;
-use crate::brdf::{Brdf, LobeShape, SeenBrdf, luminance};
+use crate::brdf::{Brdf, LobeShape, luminance};
 use crate::error::Result;
 use crate::progress::Observer;
 use crate::threads::azimuths::View;
@@ -129,12 +129,7 @@ impl Drafting<'_> {
     }
 
     fn target(&self, index: usize) -> Target {
-        let View { theta_o, phi_o } = self.view(index);
-        let slices = Slice::with_lobes(
-            &SeenBrdf::from_azimuth(self.brdf, phi_o),
-            theta_o,
-            Resolution::DRAFT.along(&self.lobe, phi_o),
-        );
+        let slices = Slice::with_lobes_of_view(self.brdf, &self.lobe, self.view(index), Resolution::DRAFT);
         let count = FEWEST_LIGHTS + LIGHTS_A_THREAD * self.before.count;
         let lights = TestLights::new(&slices, count, 0, Quadrature::DRAFT);
         let albedo = slices[0].albedo();

@@ -86,9 +86,7 @@ impl Targets {
         let (azimuths, lobe) = (azimuth_count(brdf), LobeShape::of(brdf));
         let target = |index: usize| -> Result<(TestLights, DVec3)> {
             observer.check()?;
-            let View { theta_o, phi_o } = View::of_row(index, rows);
-            let resolution = Resolution::FULL.along(&lobe, phi_o);
-            let slices = Slice::with_lobes(&SeenBrdf::from_azimuth(brdf, phi_o), theta_o, resolution);
+            let slices = Slice::with_lobes_of_view(brdf, &lobe, View::of_row(index, rows), Resolution::FULL);
             let lights = match settings.kind {
                 ThreadKind::Gaussian => TestLights::directions(&slices, DIRECTIONS_A_LIGHT * count),
                 _ => TestLights::new(&slices, count, LIGHTS_SEED, Quadrature::FIT),
@@ -156,8 +154,7 @@ fn fit_all(
             .no_sharper_than(sharpest_level(&targets.lobe, to.theta_o));
         let start = match &neighbours[..] {
             [] => {
-                let seen = SeenBrdf::from_azimuth(brdf, to.phi_o);
-                let [_, lobes] = Slice::with_lobes(&seen, to.theta_o, Resolution::FULL.along(&targets.lobe, to.phi_o));
+                let [_, lobes] = Slice::with_lobes_of_view(brdf, &targets.lobe, to, Resolution::FULL);
                 let starts = in_sets(&lobes, settings.count, settings.sets);
                 best_of(&fit, starts.into_iter().map(|cells| in_units(&cells)).collect(), observer)?
             }

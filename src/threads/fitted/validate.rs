@@ -5,7 +5,8 @@ use super::kernel::Kernel;
 use super::lights::{Quadrature, TestLights};
 use super::solve::Fit;
 use super::table::FittedTable;
-use crate::brdf::{Brdf, LobeShape, SeenBrdf};
+use crate::brdf::{Brdf, LobeShape};
+use crate::threads::azimuths::View;
 use crate::threads::slice::{Resolution, Slice};
 
 /// View angles, in degrees: of rows and between them, denser where pictures of spheres have more pixels or lobes are cut.
@@ -25,8 +26,7 @@ pub fn validation_error(table: &FittedTable, brdf: &Brdf) -> f64 {
     let error = |index: usize| {
         let theta_o = ANGLES_DEG[index % ANGLES_DEG.len()].to_radians();
         let phi_o = AZIMUTHS_DEG[index / ANGLES_DEG.len()].to_radians();
-        let resolution = Resolution::FULL.along(&lobe, phi_o);
-        let slices = Slice::with_lobes(&SeenBrdf::from_azimuth(brdf, phi_o), theta_o, resolution);
+        let slices = Slice::with_lobes_of_view(brdf, &lobe, View { theta_o, phi_o }, Resolution::FULL);
         let lights = TestLights::new(&slices, LIGHTS, SEED, Quadrature::FINE);
         let in_units = |kernel: Kernel| Kernel { weight: kernel.weight / lights.unit, ..kernel };
         let kernels: Vec<_> = table.seen_from(theta_o, phi_o).into_iter().map(in_units).collect();
