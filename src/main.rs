@@ -18,13 +18,13 @@ fn main() -> ExitCode {
     let arguments = match cli::Arguments::try_parse() {
         Ok(arguments) => arguments,
         Err(error) if is_mistake(&error) => return fail(2, &cli::mistake(&error)),
-        Err(help_or_version) => help_or_version.exit(),
+        Err(help_or_version) => return show(&help_or_version),
     };
     cli::start_logging(arguments.verbose);
     match arguments.run() {
         Ok(()) => ExitCode::SUCCESS,
         // Errors about files name them.
-        Err(error) if error.is::<std::io::Error>() => fail(1, &format!("standard output cannot be written ({error})")),
+        Err(error) if error.is::<std::io::Error>() => unprinted(&error),
         Err(error) => fail(exit_code(&error), &format!("{error:#}")),
     }
 }
@@ -43,6 +43,18 @@ fn outlive_file_limits() {
 fn fail(code: u8, problem: &str) -> ExitCode {
     say(format_args!("threadlight: {}", problem.replace('\n', " ")));
     ExitCode::from(code)
+}
+
+fn unprinted(cause: &dyn std::fmt::Display) -> ExitCode {
+    fail(1, &format!("standard output cannot be written ({cause})"))
+}
+
+/// Prints help or the version.
+fn show(help_or_version: &clap::Error) -> ExitCode {
+    match cli::unless_unheard(help_or_version.print()) {
+        Err(cause) if !help_or_version.use_stderr() => unprinted(&cause),
+        _ => ExitCode::from(help_or_version.exit_code() as u8),
+    }
 }
 
 /// Whether clap means an error, rather than help or the version that was asked for.

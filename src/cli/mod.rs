@@ -83,6 +83,12 @@ fn none_of(messages: &[String]) -> anyhow::Result<()> {
 
 /// What is wrong with the command line, on one line: clap's error and its tips, without the usage and what helps with no value here.
 pub fn mistake(error: &clap::Error) -> String {
+    if error.kind() == clap::error::ErrorKind::InvalidUtf8 {
+        // It does not say where.
+        let unreadable = std::env::args_os().filter(|argument| argument.to_str().is_none());
+        let names = unreadable.map(|argument| format!("{argument:?}")).collect::<Vec<_>>().join(", ");
+        return format!("{names}: is not UTF-8; give the file a name that is");
+    }
     let text = error.to_string();
     let paragraphs = text.trim_start_matches("error: ").split("\n\n");
     let of_use = paragraphs
@@ -103,7 +109,7 @@ fn print(text: impl std::fmt::Display) -> io::Result<()> {
 }
 
 /// What was `printed` into a pipe without a reader is no error.
-fn unless_unheard(printed: io::Result<()>) -> io::Result<()> {
+pub fn unless_unheard(printed: io::Result<()>) -> io::Result<()> {
     printed.or_else(|cause| if cause.kind() == ErrorKind::BrokenPipe { Ok(()) } else { Err(cause) })
 }
 

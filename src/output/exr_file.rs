@@ -151,7 +151,7 @@ fn sort_attributes(bytes: &mut [u8]) {
 /// Reads an EXR: the channels R, G and B (perhaps with a common prefix, such as `beauty.R`), or else Y, which then stands for all three. Of
 /// several such layers it is the picture itself, if one is called so, and the first if not; a warning tells which. Half, float and integer samples,
 /// any compression that the crate knows. The picture is what the display window shows: black, and transparent if there is alpha, where the
-/// layer has no data. Colours of other primaries become those of Rec. 709.
+/// layer has no data; an error where that is everywhere. Colours of other primaries become those of Rec. 709.
 pub fn parse_exr(path: &Path, bytes: &[u8]) -> Result<PictureFile> {
     let broken = |cause: exr::error::Error| {
         Error::in_file(
@@ -204,6 +204,10 @@ pub fn parse_exr(path: &Path, bytes: &[u8]) -> Result<PictureFile> {
             .convert(path, rgba.iter_mut().map(|[colour @ .., _]| colour));
     }
     let window = image.attributes.display_window;
+    if !overlap(window, IntegerBounds::new(layer.attributes.layer_position, layer.size)) {
+        let problem = "shows nothing, as its data window is outside of its display window";
+        return Err(Error::in_file(path, problem, "save it again, with the display window around the picture"));
+    }
     Ok(PictureFile {
         width: window.size.0 as u32,
         height: window.size.1 as u32,
@@ -263,6 +267,15 @@ fn check_dwa_chunks(meta: &MetaData, bytes: &[u8]) -> exr::error::UnitResult {
         }
     }
     Ok(())
+}
+
+/// Whether any pixel is in both.
+fn overlap(a: IntegerBounds, b: IntegerBounds) -> bool {
+    let starts_before_end = |a: i32, b: i32, size: usize| i64::from(a) < i64::from(b) + size as i64;
+    [(a, b), (b, a)].into_iter().all(|(a, b)| {
+        starts_before_end(a.position.0, b.position.0, b.size.0)
+            && starts_before_end(a.position.1, b.position.1, b.size.1)
+    })
 }
 
 /// `pixels` of `layer` where `window` shows them, `nothing` where it has none.
@@ -371,7 +384,11 @@ mod tests {
     use exr::prelude::{ImageAttributes, Layers, SpecificChannels, f16};
 
     /// The picture that an EXR of 2 x 1 pixels, the first at (3, -1), shows in a window of this place and size.
-    fn shown(position: (i32, i32), size: (usize, usize), chromaticities: Option<Chromaticities>) -> PictureFile {
+    fn shown(
+        position: (i32, i32),
+        size: (usize, usize),
+        chromaticities: Option<Chromaticities>,
+    ) -> Result<PictureFile> {
         let attributes = LayerAttributes { layer_position: Vec2(3, -1), ..LayerAttributes::default() };
         let colours = SpecificChannels::rgba(|Vec2(x, _): Vec2<usize>| (1.0 + x as f32, 0.5, 0.25, 0.75_f32));
         let layer = Layer::new((2, 1), attributes, Encoding::UNCOMPRESSED, colours);
@@ -380,7 +397,7 @@ mod tests {
         image.attributes.chromaticities = chromaticities;
         let mut bytes = Cursor::new(Vec::new());
         image.write().to_buffered(&mut bytes).unwrap();
-        parse_exr(Path::new("test.exr"), &bytes.into_inner()).unwrap()
+        parse_exr(Path::new("test.exr"), &bytes.into_inner())
     }
 
     #[test]
@@ -391,11 +408,20 @@ mod tests {
             ((2, -2), (3, 2), vec![nothing, nothing, nothing, nothing, first, second]),
             ((4, -1), (1, 1), vec![second]),
             ((4, -1), (2, 1), vec![second, nothing]),
-            ((-5, 7), (2, 1), vec![nothing; 2]),
         ] {
-            let picture = shown(position, size, None);
+            let picture = shown(position, size, None).unwrap();
             assert_eq!((picture.width as usize, picture.height as usize), size);
             assert_eq!(picture.rgba, rgba, "{position:?} {size:?}");
+        }
+    }
+
+    #[test]
+    fn a_display_window_beside_the_data_is_an_error() {
+        for (position, size) in
+            [((-5, 7), (2, 1)), ((1, -1), (2, 1)), ((5, -1), (9, 9)), ((3, -9), (2, 8)), ((3, 0), (2, 1))]
+        {
+            let error = shown(position, size, None).unwrap_err().to_string();
+            assert!(error.starts_with("test.exr: shows nothing"), "{error}");
         }
     }
 
@@ -403,7 +429,7 @@ mod tests {
     fn colours_of_other_primaries_are_converted_and_alpha_is_not() {
         let red = Vec2(0.713, 0.293);
         let (green, blue, white) = (Vec2(0.165, 0.830), Vec2(0.128, 0.044), Vec2(0.32168, 0.33767));
-        let picture = shown((3, -1), (1, 1), Some(Chromaticities { red, green, blue, white }));
+        let picture = shown((3, -1), (1, 1), Some(Chromaticities { red, green, blue, white })).unwrap();
         // ACEScg's published matrix times (1, 0.5, 0.25).
         let expected = [1.37334, 0.43750, 0.19976, 0.75];
         assert!(picture.rgba[0].iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-3), "{:?}", picture.rgba);
@@ -472,7 +498,7 @@ mod tests {
 
     #[test]
     fn a_window_may_show_far_more_than_the_data_but_not_more_than_a_file_can_hold() {
-        assert_eq!(shown((0, -2), (1000, 1000), None).rgba[1000 + 3], [1.0, 0.5, 0.25, 0.75]);
+        assert_eq!(shown((0, -2), (1000, 1000), None).unwrap().rgba[1000 + 3], [1.0, 0.5, 0.25, 0.75]);
         let mut bytes = of_one_colour((2, 1), Compression::Uncompressed);
         let name = b"displayWindow\0box2i\0";
         let place = bytes.windows(name.len()).position(|bytes| bytes == name).unwrap();

@@ -74,6 +74,17 @@ fn unknown_names_are_told_with_the_known_ones() {
     refuses(&folder, "threads gold -1", &["unexpected argument '-1' found; see --help"]);
 }
 
+#[cfg(unix)]
+#[test]
+fn a_name_that_is_no_text_is_told() {
+    use std::os::unix::ffi::OsStrExt;
+    let mut command = assert_cmd::Command::new(env!("CARGO_BIN_EXE_threadlight"));
+    command.args(["render", "-o", "image.png", "--mesh"]).arg(std::ffi::OsStr::from_bytes(b"dragon\xff.obj"));
+    let output = command.output().unwrap();
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.code() == Some(2) && said.contains("\"dragon\\xFF.obj\": is not UTF-8; "), "{said}");
+}
+
 #[test]
 fn a_command_that_would_write_nothing_is_refused() {
     let folder = workplace();

@@ -30,9 +30,18 @@ fn hostile_environments_are_refused() {
         ("head.exr", colour[..60].to_vec(), "EXR"),
         ("depth.exr", exr(&["Z"]), "R, G, B"),
         ("red.exr", exr(&["R", "A"]), "R, G, B"),
+        (
+            "beside.exr",
+            with_windows(&colour, &["displayWindow"], [4, 0, 7, 1]),
+            "data window is outside of its display window",
+        ),
         ("map.jpg", b"hello".to_vec(), ".hdr"),
         ("noise.hdr", noise(4096), "Radiance"),
-        ("claims.exr", claiming(&colour, 16000), "more than 1032 pixels for each"),
+        (
+            "claims.exr",
+            with_windows(&colour, &["dataWindow", "displayWindow"], [0, 0, 15999, 15999]),
+            "more than 1032 pixels for each",
+        ),
         ("tiles.exr", with_large_tiles(), "more than 1032 pixels for each"),
         ("noise.exr", noise(4096), "EXR"),
     ] {
@@ -48,14 +57,13 @@ fn hostile_environments_are_refused() {
     }
 }
 
-/// An EXR whose header says that it is this wide and high.
-fn claiming(exr: &[u8], side: i32) -> Vec<u8> {
+/// An EXR whose header says that these windows have their first and last pixels at these places.
+fn with_windows(exr: &[u8], windows: &[&str], corners: [i32; 4]) -> Vec<u8> {
     let mut bytes = exr.to_vec();
-    for window in ["dataWindow\0box2i\0", "displayWindow\0box2i\0"] {
+    for window in windows.iter().map(|window| format!("{window}\0box2i\0")) {
         let name = exr.windows(window.len()).position(|bytes| bytes == window.as_bytes()).expect("a window");
-        // After the size of the value, 4 bytes, its corners: 0, 0, and the last pixel.
-        let last = name + window.len() + 4 + 8;
-        bytes[last..last + 8].copy_from_slice(&[side - 1; 2].map(i32::to_le_bytes).concat());
+        // After the size of the value, 4 bytes.
+        bytes[name + window.len() + 4..][..16].copy_from_slice(&corners.map(i32::to_le_bytes).concat());
     }
     bytes
 }

@@ -46,8 +46,10 @@ fn a_full_disk_is_an_error_that_names_the_file() {
     std::os::unix::fs::symlink("/dev/full", place.path("full.svg")).unwrap();
     let output = place.threadlight(&["materials", "plot", "clay", "-o", "full.svg"]).output().unwrap();
     assert_refused(&output, 1, &["full.svg", full]);
-    let output = place.by_shell("exec >/dev/full; exec ", &["materials"]).output().unwrap();
-    assert_refused(&output, 1, &["standard output", full]);
+    for arguments in [&["materials"][..], &["--help"], &["render", "--help"], &["--version"]] {
+        let output = place.by_shell("exec >/dev/full; exec ", arguments).output().unwrap();
+        assert_refused(&output, 1, &["standard output", full]);
+    }
     // A disk of 64 KiB, in name spaces of its own: for the cache, which has to do without, and for what is written.
     let picture = place.picture();
     std::fs::create_dir_all(place.path("cache")).unwrap();

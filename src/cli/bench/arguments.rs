@@ -271,6 +271,11 @@ impl OutputArguments {
 
 /// An error if `folder` is none, or cannot be made or written to.
 pub fn check_folder(folder: &Path) -> Result<()> {
+    let is_like = |extension: &str| folder.extension().is_some_and(|of| of.eq_ignore_ascii_case(extension));
+    if !folder.exists() && ["svg", "png", "exr", "html"].into_iter().any(is_like) {
+        let problem = "is named like a file, and what is written is a folder of them";
+        return Err(Error::in_file(folder, problem, "name a folder, or make one of this name"));
+    }
     // A folder that is not there yet has to be made.
     output::check_writable(&if folder.exists() { folder.join("plot.svg") } else { folder.to_owned() })
 }

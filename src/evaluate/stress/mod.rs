@@ -82,7 +82,7 @@ fn draws(method: &str) -> bool {
 /// Runs cases on `device`; `found` has what was seen until an error or an interruption.
 ///
 /// # Errors
-/// Whatever Vulkan refuses, a folder for files that cannot be made; cancelled.
+/// A part of names that no case has; whatever Vulkan refuses, a folder for files that cannot be made; cancelled.
 pub fn run(
     extent: &Extent,
     device: &Arc<Device>,
@@ -91,20 +91,19 @@ pub fn run(
     found: &mut Vec<Stressed>,
 ) -> Result<()> {
     let folder = tempfile::tempdir().map_err(|cause| Error::unwritable(std::env::temp_dir(), cause))?;
-    let is_asked = |case: &Case| {
-        let is_named = extent.only.is_empty() || extent.only.iter().any(|only| case.name.contains(only.as_str()));
-        (extent.all || !case.is_slow) && is_named
-    };
-    let cases: Vec<Case> = cases::cases(folder.path()).into_iter().filter(is_asked).collect();
-    if cases.is_empty() {
-        let asked = extent.only.join(", ");
-        let remedy = if extent.all {
-            "give a part of a name in the table"
-        } else {
-            "give a part of a name in the table, or --all"
-        };
-        return Err(Error::input("--only", format!("no case has {asked} in its name"), remedy));
+    let is_possible = |case: &Case| extent.all || !case.is_slow;
+    let mut cases: Vec<Case> = cases::cases(folder.path()).into_iter().filter(is_possible).collect();
+    let is_in = |case: &Case, only: &String| case.name.contains(only.as_str());
+    if let Some(only) = extent.only.iter().find(|only| !cases.iter().any(|case| is_in(case, only))) {
+        let names = cases.iter().map(|case| format!("{:?}", case.name)).collect::<Vec<_>>().join(", ");
+        let or = if extent.all { "" } else { ", or --all for more of them" };
+        return Err(Error::input(
+            format!("--only {only:?}"),
+            "is in the name of no case",
+            format!("give a part of one of {names}{or}"),
+        ));
     }
+    cases.retain(|case| extent.only.is_empty() || extent.only.iter().any(|only| is_in(case, only)));
     let methods = || Method::ALL.iter().filter(|method| method.runs_on_gpu());
     let methods: Vec<Method> = methods().filter(|method| extent.all || method.threads().is_some()).copied().collect();
     let formats: &[bool] = if extent.all { &[false, true] } else { &[false] };
