@@ -1,10 +1,10 @@
 //! The pdf of incident directions for one view angle, equation (4), with its integral, its CDF and the CDF's inverse.
 use std::f64::consts::{FRAC_1_PI, FRAC_PI_2, PI, TAU};
 
-use glam::{DVec2, DVec3, dvec2, dvec3};
+use glam::{DVec2, DVec3, dvec3};
 
 use super::azimuths::View;
-use crate::brdf::{Brdf, LobeShape, SeenBrdf, luminance};
+use crate::brdf::{Brdf, Ellipse, LobeShape, SeenBrdf, luminance};
 
 /// Numbers of steps over theta_h and phi_h.
 #[derive(Clone, Copy, Debug)]
@@ -13,8 +13,9 @@ pub struct Resolution {
     pub theta: usize,
     /// Azimuths of each.
     pub phi: usize,
-    /// The ellipse whose azimuths these are; none for a circle.
-    ellipse: Option<Ellipse>,
+    /// The ellipse whose azimuths these are, none for a circle; and its angle of -x, where azimuths begin: on a circle, too, so that they move
+    /// steadily while one axis outgrows the other.
+    ellipse: Option<(Ellipse, f64)>,
 }
 
 impl Resolution {
@@ -28,39 +29,9 @@ impl Resolution {
         if lobe.is_isotropic {
             return self;
         }
-        let narrowness = lobe.narrowness.sqrt();
-        let long_axis = DVec2::from_angle(-phi_o).rotate(lobe.long_axis);
-        // GGX then leaves an error of 2 e^(-narrowness phi), as in `Brdf::albedo_from`.
-        let phi = self.phi.max((8.0 / narrowness).ceil() as usize);
-        let mut ellipse = Ellipse { narrowness, long_axis, start: 0.0 };
-        ellipse.start = ellipse.circle_of(DVec2::NEG_X).to_angle();
-        Self { phi, ellipse: Some(ellipse), ..self }
-    }
-}
-
-/// What spaces azimuths of the half vector: a ring crosses a long lobe within few degrees of its long axis.
-///
-/// It is as narrow as the root of the lobe's narrowness: wide rings cross GGX's lobe within that narrowness, in radians, small ones evenly, and
-/// the sums over both converge equally fast then.
-#[derive(Clone, Copy, Debug)]
-struct Ellipse {
-    narrowness: f64,
-    long_axis: DVec2,
-    /// The angle of -x, where azimuths begin: on a circle, too, so that they move steadily while one axis outgrows the other.
-    start: f64,
-}
-
-impl Ellipse {
-    /// The direction at the angle of a unit vector of a circle, and by how much steps are wider there than the circle's.
-    fn of_circle(self, circle: DVec2) -> (DVec2, f64) {
-        let point = dvec2(circle.x, self.narrowness * circle.y);
-        (self.long_axis.rotate(point.normalize()), self.narrowness / point.length_squared())
-    }
-
-    /// The point of the circle, of any length, for a direction of any length.
-    fn circle_of(self, direction: DVec2) -> DVec2 {
-        let point = dvec2(direction.dot(self.long_axis), self.long_axis.perp_dot(direction));
-        dvec2(self.narrowness * point.x, point.y)
+        let ellipse = Ellipse::of(lobe).turned(-phi_o);
+        let start = ellipse.circle_of(DVec2::NEG_X).to_angle();
+        Self { phi: ellipse.azimuths(self.phi), ellipse: Some((ellipse, start)), ..self }
     }
 }
 
@@ -123,7 +94,7 @@ impl Resolution {
         let angle = 2.0 * PI * turn;
         match self.ellipse {
             None => (DVec2::from_angle(angle - PI), 1.0),
-            Some(ellipse) => ellipse.of_circle(DVec2::from_angle(angle + ellipse.start)),
+            Some((ellipse, start)) => ellipse.of_circle(DVec2::from_angle(angle + start)),
         }
     }
 
@@ -131,7 +102,7 @@ impl Resolution {
     fn turn(&self, direction: DVec2) -> f64 {
         match self.ellipse {
             None => (direction.y.atan2(direction.x) + PI) / (2.0 * PI),
-            Some(ellipse) => ((ellipse.circle_of(direction).to_angle() - ellipse.start) / (2.0 * PI)).rem_euclid(1.0),
+            Some((ellipse, start)) => ((ellipse.circle_of(direction).to_angle() - start) / (2.0 * PI)).rem_euclid(1.0),
         }
     }
 }
