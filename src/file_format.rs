@@ -5,6 +5,7 @@
 use std::path::Path;
 
 use crate::error::{Error, Result};
+use crate::progress::Observer;
 
 /// A format of files that hold a `T`.
 pub struct FileFormat<T: 'static> {
@@ -14,8 +15,8 @@ pub struct FileFormat<T: 'static> {
     pub name: &'static str,
     /// Tells bytes of this format from those of other kinds of file with the same extension.
     pub is_of_format: fn(&[u8]) -> bool,
-    /// Reads the bytes of the file at `path`, which is only named in errors.
-    pub parse: fn(path: &Path, bytes: &[u8]) -> Result<T>,
+    /// Reads the bytes of the file at `path`, which is only named in errors. What takes long may be cancelled.
+    pub parse: fn(path: &Path, bytes: &[u8], observer: &dyn Observer) -> Result<T>,
 }
 
 /// Declares the modules of formats, and `FORMATS`, the list of them: an entry each.
@@ -60,7 +61,15 @@ impl<T> FileKind<T> {
     /// # Errors
     /// An extension of no format, and the format's own.
     pub fn parse(&self, path: &Path, bytes: &[u8]) -> Result<T> {
-        (self.format_of(path)?.parse)(path, bytes)
+        self.parse_watched(path, bytes, &())
+    }
+
+    /// The same, which `observer` may end.
+    ///
+    /// # Errors
+    /// As for [`Self::parse`]; cancelled.
+    pub fn parse_watched(&self, path: &Path, bytes: &[u8], observer: &dyn Observer) -> Result<T> {
+        (self.format_of(path)?.parse)(path, bytes, observer)
     }
 
     /// The format of the file at `path`, by its extension.

@@ -1,7 +1,7 @@
 //! Long computations stop soon after they are told to: a window waits for them when it closes.
 mod common;
 use common::{Validated, data, model, ready, sphere};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
@@ -11,7 +11,7 @@ use threadlight::low_level::evaluate::reference::{ReferenceSettings, STAGES, pro
 use threadlight::low_level::pipeline::{Wanted, render_geometry};
 use threadlight::low_level::prepare::Prepared;
 use threadlight::low_level::progress::Observer;
-use threadlight::low_level::scene::{MaterialSource, Scene, Source};
+use threadlight::low_level::scene::{MaterialSource, Mesh, Scene, Source};
 use threadlight::low_level::steps::{LoadEnvironment, blurred_light};
 use threadlight::low_level::threads::{ThreadKind, ThreadSettings, generate};
 use threadlight::{Error, Result};
@@ -129,6 +129,22 @@ fn an_environment_stops_being_blurred_at_once() {
         assert!(time < SOON, "cancelled after {after:?}: {time:?}");
     }
     gpu.finish();
+}
+
+#[test]
+fn a_mesh_stops_being_read_at_once() {
+    let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
+    let columns = 1000;
+    let corners = (0..columns * columns).map(|i| format!("v {} {} {}\n", i % columns, i / columns, i % 7));
+    let first = (1..columns * (columns - 1)).filter(|corner| corner % columns != 0);
+    let faces = first.map(|a| format!("f {a} {} {} {}\n", a + 1, a + columns + 1, a + columns));
+    let text: String = corners.chain(faces).collect();
+    for after in [10, 300, 1000].map(Duration::from_millis) {
+        let read = |flag: &Flag| Mesh::FILES.parse_watched(Path::new("large.obj"), text.as_bytes(), flag);
+        let time = time_to_stop(after, read);
+        println!("a mesh of {} bytes, cancelled after {after:?}: {time:?}", text.len());
+        assert!(time < SOON, "cancelled after {after:?}: {time:?}");
+    }
 }
 
 #[test]

@@ -5,8 +5,12 @@ use super::{Brdf, MerlTable};
 use crate::error::{Error, Result};
 use crate::file_format::FileFormat;
 
-pub(super) const FORMAT: FileFormat<Brdf> =
-    FileFormat { extension: "binary", name: "a MERL .binary", is_of_format: |_| true, parse };
+pub(super) const FORMAT: FileFormat<Brdf> = FileFormat {
+    extension: "binary",
+    name: "a MERL .binary",
+    is_of_format: |_| true,
+    parse: |path, bytes, _| parse(path, bytes),
+};
 
 fn parse(path: &Path, bytes: &[u8]) -> Result<Brdf> {
     MerlTable::from_bytes(bytes).map(Brdf::MerlTable).map_err(|problem| {

@@ -20,8 +20,12 @@ use super::goniometric::{Axes, Goniometric, Nodes};
 use crate::error::{Error, Result};
 use crate::file_format::FileFormat;
 
-pub(super) const FORMAT: FileFormat<Brdf> =
-    FileFormat { extension: "dat", name: "an MIT CSAIL .dat", is_of_format: |_| true, parse };
+pub(super) const FORMAT: FileFormat<Brdf> = FileFormat {
+    extension: "dat",
+    name: "an MIT CSAIL .dat",
+    is_of_format: |_| true,
+    parse: |path, bytes, _| parse(path, bytes),
+};
 
 const HEADER_BYTES: usize = 64;
 

@@ -19,8 +19,12 @@ use super::tensor_file::{Tensor, TensorFile};
 use crate::error::{Error, Result};
 use crate::file_format::FileFormat;
 
-pub(super) const FORMAT: FileFormat<Brdf> =
-    FileFormat { extension: "bsdf", name: "an RGL .bsdf", is_of_format: |_| true, parse };
+pub(super) const FORMAT: FileFormat<Brdf> = FileFormat {
+    extension: "bsdf",
+    name: "an RGL .bsdf",
+    is_of_format: |_| true,
+    parse: |path, bytes, _| parse(path, bytes),
+};
 
 /// The greatest of measured values and densities of normals that are read, and the least projected area: of what is within, f is a
 /// number in single precision.

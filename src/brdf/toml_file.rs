@@ -6,8 +6,12 @@ use super::{Brdf, model_of};
 use crate::error::{Error, Result};
 use crate::file_format::{FileFormat, text};
 
-pub(super) const FORMAT: FileFormat<Brdf> =
-    FileFormat { extension: "toml", name: "a .toml with a model and its parameters", is_of_format: has_model, parse };
+pub(super) const FORMAT: FileFormat<Brdf> = FileFormat {
+    extension: "toml",
+    name: "a .toml with a model and its parameters",
+    is_of_format: has_model,
+    parse: |path, bytes, _| parse(path, bytes),
+};
 
 /// A material has a model at its top; a scene has nothing but sections there.
 pub(crate) fn has_model(bytes: &[u8]) -> bool {

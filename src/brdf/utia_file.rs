@@ -17,8 +17,12 @@ use super::goniometric::{Axes, Goniometric, Nodes};
 use crate::error::{Error, Result};
 use crate::file_format::FileFormat;
 
-pub(super) const FORMAT: FileFormat<Brdf> =
-    FileFormat { extension: "bin", name: "a UTIA .bin", is_of_format: |_| true, parse };
+pub(super) const FORMAT: FileFormat<Brdf> = FileFormat {
+    extension: "bin",
+    name: "a UTIA .bin",
+    is_of_format: |_| true,
+    parse: |path, bytes, _| parse(path, bytes),
+};
 
 /// Angles to the normal, and azimuths.
 const THETAS: usize = 6;

@@ -6,8 +6,12 @@ use crate::error::Result;
 use crate::file_format::FileFormat;
 use crate::output;
 
-pub(super) const FORMAT: FileFormat<Environment> =
-    FileFormat { extension: "exr", name: "an OpenEXR .exr", is_of_format: |_| true, parse };
+pub(super) const FORMAT: FileFormat<Environment> = FileFormat {
+    extension: "exr",
+    name: "an OpenEXR .exr",
+    is_of_format: |_| true,
+    parse: |path, bytes, _| parse(path, bytes),
+};
 
 /// EXR needs channels R, G, B or only Y; alpha is ignored.
 fn parse(path: &Path, bytes: &[u8]) -> Result<Environment> {

@@ -7,8 +7,12 @@ use crate::error::{Error, Result};
 use crate::file_format::FileFormat;
 use crate::output::{self, Primaries};
 
-pub(super) const FORMAT: FileFormat<Environment> =
-    FileFormat { extension: "hdr", name: "a Radiance .hdr", is_of_format: |_| true, parse };
+pub(super) const FORMAT: FileFormat<Environment> = FileFormat {
+    extension: "hdr",
+    name: "a Radiance .hdr",
+    is_of_format: |_| true,
+    parse: |path, bytes, _| parse(path, bytes),
+};
 
 /// A run of each of four channels takes two bytes and is of 127 pixels at most.
 const MAX_PIXELS_PER_BYTE: u64 = 16;

@@ -119,7 +119,7 @@ impl CustomMesh {
             indices,
             ..Default::default()
         };
-        Obj::of_triangles(mesh).cleaned(name, is_textured)
+        Obj::of_triangles(mesh).cleaned(name, is_textured, &())
     }
 }
 

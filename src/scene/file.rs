@@ -123,8 +123,12 @@ impl Scene {
 /// Of a scene that cannot be used.
 const REMEDY: &str = "the guide shows a scene file with every key, in src/guide/usage.md";
 
-const FORMAT: FileFormat<Scene> =
-    FileFormat { extension: "toml", name: "a scene .toml", is_of_format: |bytes| !has_model(bytes), parse: parse_file };
+const FORMAT: FileFormat<Scene> = FileFormat {
+    extension: "toml",
+    name: "a scene .toml",
+    is_of_format: |bytes| !has_model(bytes),
+    parse: |path, bytes, _| parse_file(path, bytes),
+};
 
 fn parse_file(path: &Path, bytes: &[u8]) -> Result<Scene> {
     parse(text(path, bytes)?, path.parent().unwrap_or(Path::new("")))

@@ -2,6 +2,7 @@
 use std::borrow::Cow;
 use std::collections::HashMap;
 use std::fmt::Write;
+use std::io::{BufReader, Read};
 use std::path::Path;
 
 use glam::{DVec3, Vec2, Vec3};
@@ -10,6 +11,7 @@ use super::Mesh;
 use super::polygon::triangles_of;
 use crate::error::{Error, Result};
 use crate::file_format::FileFormat;
+use crate::progress::Observer;
 
 /// A mesh and where its vertices are on a texture.
 #[derive(Clone, Debug, Default)]
@@ -19,6 +21,12 @@ pub struct TexturedMesh {
     /// One a position, not finite where there is none; or empty.
     pub uvs: Vec<Vec2>,
 }
+
+/// So many lines or triangles are read from one look at whether to go on to the next.
+const BETWEEN_CHECKS: usize = 4096;
+
+/// Why reading ends early.
+const CANCELLED: &str = "is not read to its end";
 
 /// What lines of the mesh begin with.
 const MESH_KEYWORDS: [&str; 5] = ["v", "vn", "vt", "f", "s"];
@@ -30,28 +38,30 @@ pub(super) const FORMAT: FileFormat<Mesh> =
 pub(super) const TEXTURED_FORMAT: FileFormat<TexturedMesh> =
     FileFormat { extension: "obj", name: "a Wavefront .obj", is_of_format: |_| true, parse: parse_textured };
 
-fn parse(path: &Path, bytes: &[u8]) -> Result<Mesh> {
-    parse_parts(path, bytes, false).map(|TexturedMesh { mesh, .. }| mesh)
+fn parse(path: &Path, bytes: &[u8], observer: &dyn Observer) -> Result<Mesh> {
+    parse_parts(path, bytes, false, observer).map(|TexturedMesh { mesh, .. }| mesh)
 }
 
-fn parse_textured(path: &Path, bytes: &[u8]) -> Result<TexturedMesh> {
-    parse_parts(path, bytes, true)
+fn parse_textured(path: &Path, bytes: &[u8], observer: &dyn Observer) -> Result<TexturedMesh> {
+    parse_parts(path, bytes, true, observer)
 }
 
 /// Reads all triangles and polygons as one mesh; objects, groups, materials and lines are ignored, and so are texture coordinates if they are
 /// not wanted. Polygons become triangles. Where a normal is missing, zero or not finite, the mean normal of the faces that share position and
 /// smoothing group takes its place, weighted by their angles there; of a sheet that has every face twice, once
 /// reversed, those of one side. Degenerate triangles are dropped.
-fn parse_parts(path: &Path, bytes: &[u8], is_textured: bool) -> Result<TexturedMesh> {
+fn parse_parts(path: &Path, bytes: &[u8], is_textured: bool, observer: &dyn Observer) -> Result<TexturedMesh> {
     if [[0xff, 0xfe], [0xfe, 0xff]].iter().any(|mark| bytes.starts_with(mark)) {
         return Err(Error::in_file(path, "is text in UTF-16", "save it as UTF-8"));
     }
     // Names in old files are in any encoding; the numbers are ASCII in all of the others.
     let text = String::from_utf8_lossy(bytes);
     // Some editors put a byte order mark first, which would be part of the first word.
-    let obj = read_obj(&whole_lines(text.trim_start_matches('\u{feff}')), is_textured)
-        .map_err(|problem| Error::in_file(path, problem, "repair or export it again"))?;
-    obj.cleaned(path.display(), is_textured)
+    let obj = read_obj(&whole_lines(text.trim_start_matches('\u{feff}')), is_textured, observer);
+    // What is not read to its end is said to be wrong, too.
+    observer.check()?;
+    let obj = obj.map_err(|problem| Error::in_file(path, problem, "repair or export it again"))?;
+    obj.cleaned(path.display(), is_textured, observer)
 }
 
 /// `text` without comments, its lines ended by LF, and each line of the mesh that a backslash continues as one. Lines after it keep their
@@ -106,8 +116,13 @@ impl Obj {
     }
 
     /// The mesh of this name without its degenerate triangles.
-    pub(super) fn cleaned(&self, name: impl std::fmt::Display, is_textured: bool) -> Result<TexturedMesh> {
-        let (textured, dropped) = clean(self);
+    pub(super) fn cleaned(
+        &self,
+        name: impl std::fmt::Display,
+        is_textured: bool,
+        observer: &dyn Observer,
+    ) -> Result<TexturedMesh> {
+        let (textured, dropped) = clean(self, observer)?;
         let mesh = &textured.mesh;
         if mesh.indices.is_empty() {
             return Err(Error::input(name, "has no triangle with an area", "give a mesh with faces"));
@@ -124,11 +139,12 @@ impl Obj {
 /// The faces in the text of an OBJ, each corner with an index into the positions and one into the normals; a corner
 /// without a normal has one of length 0. If `is_textured` each has an index into the texture coordinates too, which are NaN where it has
 /// none. The error is what is wrong.
-fn read_obj(text: &str, is_textured: bool) -> Result<Obj, String> {
-    let (lines, smoothing_groups) = geometry_lines(text, is_textured)?;
+fn read_obj(text: &str, is_textured: bool, observer: &dyn Observer) -> Result<Obj, String> {
+    let (lines, smoothing_groups) = geometry_lines(text, is_textured, observer)?;
     let options = tobj::LoadOptions::default();
     let no_materials = |_: &Path| Ok(Default::default());
-    let (models, _) = tobj::load_obj_buf(&mut lines.as_bytes(), &options, no_materials).map_err(|cause| {
+    let mut lines = BufReader::new(Watched { bytes: lines.as_bytes(), observer });
+    let (models, _) = tobj::load_obj_buf(&mut lines, &options, no_materials).map_err(|cause| {
         let line = text.lines().position(lacks_numbers).map_or(String::new(), |index| format!("line {}: ", index + 1));
         format!("is not a sound OBJ: {line}{cause}")
     })?;
@@ -140,6 +156,18 @@ fn read_obj(text: &str, is_textured: bool) -> Result<Obj, String> {
     match vectors(&mesh.positions).into_iter().find(|position| !position.is_finite()) {
         Some(position) => Err(format!("has a vertex that is not finite, {position}")),
         None => Ok(Obj { mesh, smoothing_groups }),
+    }
+}
+
+/// Bytes that can be read until somebody cancels.
+struct Watched<'a> {
+    bytes: &'a [u8],
+    observer: &'a dyn Observer,
+}
+
+impl Read for Watched<'_> {
+    fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+        if self.observer.cancelled() { Err(std::io::Error::other(CANCELLED)) } else { self.bytes.read(buffer) }
     }
 }
 
@@ -158,7 +186,11 @@ fn lacks_numbers(line: &str) -> bool {
 /// the last in the file, as from tobj they would get that of the corner before; those without texture coordinates get NaN in the same way.
 /// Indices are checked here: errors then name the line, and of normals and texture coordinates tobj takes 0 for none, and multiplies absurd
 /// ones until they overflow.
-fn geometry_lines(text: &str, is_textured: bool) -> Result<(String, Vec<SmoothingGroup>), String> {
+fn geometry_lines(
+    text: &str,
+    is_textured: bool,
+    observer: &dyn Observer,
+) -> Result<(String, Vec<SmoothingGroup>), String> {
     let count_of = |keyword: &str| {
         let is_one = |line: &&str| line.split_ascii_whitespace().next() == Some(keyword);
         text.lines().filter(is_one).count() as i64
@@ -187,6 +219,9 @@ fn geometry_lines(text: &str, is_textured: bool) -> Result<(String, Vec<Smoothin
     let (mut lines, mut before) = (String::with_capacity(text.len()), [0; 3]);
     let (mut groups, mut group) = (Vec::new(), SmoothingGroup::Unsaid);
     for (index, line) in text.lines().enumerate() {
+        if index.is_multiple_of(BETWEEN_CHECKS) && observer.cancelled() {
+            return Err(CANCELLED.into());
+        }
         let mut words = line.split_ascii_whitespace();
         let Some(keyword) = words.next().filter(|word| MESH_KEYWORDS.contains(word)) else { continue };
         if keyword == "vt" && !is_textured {
@@ -259,7 +294,7 @@ impl MeanNormal {
 }
 
 /// Joins corners with the same position, normal and texture coordinates into vertices; gives also the number of dropped triangles.
-fn clean(Obj { mesh: obj, smoothing_groups }: &Obj) -> (TexturedMesh, usize) {
+fn clean(Obj { mesh: obj, smoothing_groups }: &Obj, observer: &dyn Observer) -> Result<(TexturedMesh, usize)> {
     let (positions, normals) = (vectors(&obj.positions), vectors(&obj.normals));
     // Normals that are none count as missing.
     let normal_at = |index: u32| {
@@ -268,7 +303,10 @@ fn clean(Obj { mesh: obj, smoothing_groups }: &Obj) -> (TexturedMesh, usize) {
     };
     let mut mean_normals = HashMap::<_, MeanNormal>::new();
     let (mut kept, mut dropped) = (Vec::new(), 0);
-    for (face, corners) in triangles(obj, &positions) {
+    for (index, (face, corners)) in triangles(obj, &positions).into_iter().enumerate() {
+        if index.is_multiple_of(BETWEEN_CHECKS) {
+            observer.check()?;
+        }
         let triangle = corners.map(|corner| obj.indices[corner]);
         let [a, b, c] = triangle.map(|position| positions[position as usize].as_dvec3());
         let area = (b - a).cross(c - a);
@@ -287,7 +325,10 @@ fn clean(Obj { mesh: obj, smoothing_groups }: &Obj) -> (TexturedMesh, usize) {
     }
     let mut vertices = HashMap::new();
     let (mut mesh, mut uvs) = (Mesh::default(), Vec::new());
-    for (corners, triangle, face_normal, group) in kept {
+    for (index, (corners, triangle, face_normal, group)) in kept.into_iter().enumerate() {
+        if index.is_multiple_of(BETWEEN_CHECKS) {
+            observer.check()?;
+        }
         for (corner, position) in corners.into_iter().zip(triangle) {
             let index = obj.normal_indices[corner];
             let (normal, direction) = match normal_at(index) {
@@ -307,7 +348,7 @@ fn clean(Obj { mesh: obj, smoothing_groups }: &Obj) -> (TexturedMesh, usize) {
             mesh.indices.push(index);
         }
     }
-    (TexturedMesh { mesh, uvs }, dropped)
+    Ok((TexturedMesh { mesh, uvs }, dropped))
 }
 
 /// The triangles that the faces of `obj` consist of: the index of the face, and the places of their corners in the indices of `obj`. Faces of
@@ -342,7 +383,7 @@ mod tests {
     fn a_backslash_continues_a_line_of_the_mesh_and_nothing_else() {
         let whole = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
         let broken = "# C:\\models\\\nv 0 \\\n0 0\nv 1 0 0\no a\\\nv 0 1 0\nf 1\\ \r\n 2 \\\n3\n";
-        let parse = |text: &str| parse(Path::new("a.obj"), text.as_bytes());
+        let parse = |text: &str| parse(Path::new("a.obj"), text.as_bytes(), &());
         let [whole, broken] = [whole, broken].map(|text| parse(text).unwrap());
         assert_eq!((whole.positions, whole.indices), (broken.positions, broken.indices));
         // Errors name the line in the file; at its end there is nothing to go on with.
@@ -354,7 +395,8 @@ mod tests {
     #[test]
     fn a_comment_may_end_any_line() {
         let corners = "v 0 0 0# x\nv 1 0 0 # v 2 2 2\nv 0 1 0\n";
-        let mesh = parse(Path::new("a.obj"), format!("{corners}f 1 2 3 # f 9 9 9 \\\nf 1 \\ # x\n 2 3\n").as_bytes());
+        let mesh =
+            parse(Path::new("a.obj"), format!("{corners}f 1 2 3 # f 9 9 9 \\\nf 1 \\ # x\n 2 3\n").as_bytes(), &());
         assert_eq!(mesh.unwrap().indices, [0, 1, 2, 0, 1, 2]);
     }
 
@@ -362,7 +404,7 @@ mod tests {
     fn lines_may_end_in_any_of_three_ways() {
         let text = "# x\nv 0 0 0\nv 1 0 0\nv 0 1 \\\n0\nf 1 2 3\n";
         for end in ["\n", "\r\n", "\r"] {
-            let parse = |text: &str| parse(Path::new("a.obj"), text.replace('\n', end).as_bytes());
+            let parse = |text: &str| parse(Path::new("a.obj"), text.replace('\n', end).as_bytes(), &());
             assert_eq!(parse(text).unwrap().positions.len(), 3, "{end:?}");
             let error = parse(&format!("{text}f 1//9 2 3\n")).unwrap_err().to_string();
             assert!(error.contains("line 7"), "{end:?} {error}");
@@ -375,7 +417,7 @@ mod tests {
         let corners = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 1 0 1\nv 1 1 1\nvn 0.6 0 0.8\n";
         let normals = |faces: &str| {
             let Mesh { positions, normals, indices, .. } =
-                parse(Path::new("a.obj"), format!("{corners}{faces}").as_bytes()).unwrap();
+                parse(Path::new("a.obj"), format!("{corners}{faces}").as_bytes(), &()).unwrap();
             let at_edge = |&&index: &&u32| positions[index as usize].x == 1.0 && positions[index as usize].z == 0.0;
             indices.iter().filter(at_edge).map(|&index| normals[index as usize]).collect::<Vec<_>>()
         };
@@ -416,7 +458,7 @@ mod tests {
             0 => face(quad) + &back(quad),
             _ => back(quad) + &face(quad),
         };
-        let parse = |faces: String| parse(Path::new("a.obj"), (corners.clone() + &faces).as_bytes()).unwrap();
+        let parse = |faces: String| parse(Path::new("a.obj"), (corners.clone() + &faces).as_bytes(), &()).unwrap();
         let single = parse(quads.iter().map(|&quad| face(quad)).collect());
         for smoothing in ["", "s 1\n"] {
             let double = parse(smoothing.to_owned() + &quads.iter().enumerate().map(both).collect::<String>());
@@ -492,9 +534,9 @@ mod tests {
         for _ in 0..20_000 {
             let mut text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1/1 2/2 3/3".to_owned();
             (0..8).for_each(|_| text.extend([" ", next()]));
-            let textured = read_obj(&text, true).map(|obj| clean(&obj).0);
-            let Ok(obj) = read_obj(&text, false) else { continue };
-            let (TexturedMesh { mesh, .. }, _) = clean(&obj);
+            let textured = read_obj(&text, true, &()).map(|obj| clean(&obj, &()).unwrap().0);
+            let Ok(obj) = read_obj(&text, false, &()) else { continue };
+            let (TexturedMesh { mesh, .. }, _) = clean(&obj, &()).unwrap();
             meshes += 1;
             // Wrong indices of texture coordinates are errors where these are wanted.
             if let Ok(textured) = textured {

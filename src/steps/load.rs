@@ -52,7 +52,7 @@ impl Step for LoadMesh<'_> {
 
     fn make(&self, round: &Round) -> Result<Mesh> {
         match self.0 {
-            Source::File(path) => Mesh::FILES.parse(path, &round.memo().file_bytes(path)?),
+            Source::File(path) => Mesh::FILES.parse_watched(path, &round.memo().file_bytes(path)?, round.observer()),
             Source::Builtin(name) => Mesh::builtin(name),
             Source::Custom(custom) => Ok(custom.mesh(false)?.mesh),
         }
@@ -72,7 +72,10 @@ impl Step for LoadBrushedMesh<'_> {
 
     fn make(&self, round: &Round) -> Result<Mesh> {
         match self.0 {
-            Source::File(path) => Ok(TexturedMesh::FILES.parse(path, &round.memo().file_bytes(path)?)?.with_tangents()),
+            Source::File(path) => {
+                let bytes = round.memo().file_bytes(path)?;
+                Ok(TexturedMesh::FILES.parse_watched(path, &bytes, round.observer())?.with_tangents())
+            }
             // None has texture coordinates.
             Source::Builtin(name) => Mesh::builtin(name),
             Source::Custom(custom) => Ok(custom.mesh(true)?.with_tangents()),
