@@ -6,7 +6,7 @@ use crate::output::ExrHeader;
 use crate::passes::*;
 use crate::prepare::Prepared;
 use crate::progress::Observer;
-use crate::scene::Mesh;
+use crate::scene::{ImageSettings, Mesh};
 use crate::specialise::{ShadersOfMaterials, classify_constants};
 use crate::steps::{
     CheckDevice, CompileCompute, CompileGeometryCache, UploadBackground, UploadLight, UploadMaterials, UploadMesh,
@@ -269,8 +269,19 @@ fn ask_geometry_cache(device: &Arc<Device>, prepared: &Prepared, round: &Round) 
 
 /// An error for a view whose geometry cache is larger than images of `device` can be.
 pub(crate) fn check_size(device: &Device, view: &View) -> Result<()> {
+    check_cache_size(device, view.cache_size())
+}
+
+/// The same for a picture of which nothing has been prepared yet.
+///
+/// # Errors
+/// More sub-pixels along a side than images of `device` can have.
+pub fn check_image(device: &Device, image: &ImageSettings) -> Result<()> {
+    check_cache_size(device, [image.width, image.height].map(|side| side.saturating_mul(image.subpixels)))
+}
+
+fn check_cache_size(device: &Device, [width, height]: [u32; 2]) -> Result<()> {
     let largest = device.limits().max_image_dimension2_d;
-    let [width, height] = view.cache_size();
     if width.max(height) <= largest {
         return Ok(());
     }

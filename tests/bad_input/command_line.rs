@@ -48,8 +48,9 @@ fn numbers_out_of_range_name_the_flag_and_the_range() {
     refuses(&folder, "render --threads 129 -o out/image.png", &["threads", "129", "128", "fitted"]);
     let many = "render --method uniform --threads 9000 --subpixels 4 -o out/image.png";
     refuses(&folder, many, &["threads", "9000", "4062", "sub-pixels"]);
-    // More sub-pixels than an image of the device holds, though each flag is within its range.
-    refuses(&folder, "render --threads 2 --size 16384x1 --subpixels 4 -o out/image.png", &["65536 x 4", "--size"]);
+    // More sub-pixels than an image of the device holds, though each flag is within its range. It is said before a material is asked for.
+    let large = "render --material unobtainium --size 16384x1 --subpixels 4 -o out/image.png";
+    refuses(&folder, large, &["65536 x 4", "--size"]);
 }
 
 #[test]
