@@ -90,8 +90,8 @@ fn normals_and_tangents_of_a_stretched_sphere_are_those_of_an_ellipsoid_from_wit
         scene.objects[0].tangent = Some(TangentRule::Along(axis.as_vec3()));
         // Behind the eye.
         if beside {
-            let place = 2e5 * eye.as_vec3();
-            scene.objects.push(ObjectSettings { translate: place, scale: 2e5, ..scene.objects[0].clone() });
+            let place = 2e7 * eye.as_vec3();
+            scene.objects.push(ObjectSettings { translate: place, scale: 2e7, ..scene.objects[0].clone() });
         }
         let mut prepared = ready(&scene);
         let to_world = DMat3::from_euler(EulerRot::XYZ, 0.4, 1.2, -0.2) * DMat3::from_diagonal(stretch);

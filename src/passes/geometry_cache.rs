@@ -20,7 +20,7 @@ const DEPTH_FORMAT: vk::Format = vk::Format::D32_SFLOAT;
 /// Bytes of a position, of a normal, and of a tangent.
 const VERTEX_STRIDE: u32 = size_of::<[f32; 3]>() as u32;
 
-/// Distance of the near plane in units of the scene's extent: with reversed, infinite depth it costs no precision to keep it
+/// Distance of the near plane in units of the extent of what may be seen: with reversed, infinite depth it costs no precision to keep it
 /// nearer than any surface that a camera outside of the scene sees.
 const NEAR_PLANE: f64 = 1e-6;
 
@@ -212,15 +212,15 @@ impl GeometryCache {
         object.placed_sphere(self.meshes[object.mesh].sphere)
     }
 
-    /// Distance from the eye to the far side of the scene: the unit of length in which it is drawn, so that neither tiny nor
+    /// Distance from the eye to the far side of what may be in the picture: the unit of length in which it is drawn, so that neither tiny nor
     /// huge scenes leave the range of single precision.
     fn extent(&self, view: &View) -> f64 {
         let far_side = |object: &PlacedMesh| {
             let (center, radius) = self.sphere(object);
             center.distance(view.camera.eye) + radius
         };
-        let farthest = self.objects.iter().map(far_side).fold(0.0, f64::max);
-        // A scene that is a single point at the eye has no extent, and nothing to be seen in any unit.
+        let farthest = self.seen(view).map(far_side).fold(0.0, f64::max);
+        // Nothing, and a single point at the eye, have no extent, and nothing to be seen in any unit.
         if farthest > 0.0 { farthest } else { 1.0 }
     }
 }
