@@ -4,6 +4,7 @@ mod common;
 use common::{EVERYTHING, Validated, analytic_materials, model, pixels, ready, sphere, texels_of};
 use glam::{DVec3, UVec2, Vec3, Vec4};
 use rayon::prelude::*;
+use std::f32::consts::PI;
 use std::sync::Arc;
 use threadlight::Method;
 use threadlight::low_level::brdf::{Brdf, Custom, CustomBrdf};
@@ -455,6 +456,35 @@ fn a_narrow_lobe_shows_a_lamp_with_dim_edges_as_the_reference_does() {
         println!("{name}: RMS {rms:.4}");
         assert!(rms < most, "{name}: {rms}");
     }
+    gpu.finish();
+}
+
+#[test]
+fn a_wide_lobe_with_steep_flanks_shows_a_lamp_beside_the_horizon_as_the_reference_does() {
+    let gpu = Validated::new();
+    let folder = tempfile::tempdir().unwrap();
+    let [map, wall] = ["lamp.exr", "wall.obj"].map(|name| folder.path().join(name));
+    // As an umbrella before a flash, to the left: in the light of its edge the wall is seen at a slant.
+    let texel = |(x, y): (u32, u32)| {
+        let (phi, theta) = (PI * (x as f32 + 0.5) / 128.0, PI * (y as f32 + 0.5) / 128.0);
+        let direction = Vec3::new(theta.sin() * phi.sin(), theta.cos(), -theta.sin() * phi.cos());
+        let away_deg = direction.angle_between(Vec3::new(-0.95, 0.1, 0.15)).to_degrees();
+        [if away_deg < 22.0 { 4.0 + 60.0 * (-(away_deg / 7.0).powi(2)).exp() } else { 0.02 }; 4]
+    };
+    let texels: Vec<_> = (0..128).flat_map(|y| (0..256).map(move |x| texel((x, y)))).collect();
+    threadlight::low_level::output::write_exr(&map, 256, 128, &texels, false, &Default::default()).unwrap();
+    let corners = "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nvn -1 -1 3\nvn 1 -1 3\nvn 1 1 3\nvn -1 1 3\n";
+    std::fs::write(&wall, format!("{corners}f 1//1 2//2 3//3 4//4\n")).unwrap();
+    let metal = model("model = 'conductor'\ndistribution = 'beckmann'\nalpha = 0.2\nmetal = 'Au'");
+    let mut scene = sphere(metal, "white", 16, (80, 60));
+    scene.objects[0].mesh = Source::File(wall);
+    scene.environment.source = Source::File(map);
+    scene.image.background = Background::None;
+    scene.camera = Some(Camera { eye: DVec3::new(2.2, 0.5, 1.6), target: DVec3::ZERO, up: DVec3::Y, fov_y_deg: 45.0 });
+    // 0.006 where flanks are as wide as they are seen along the normal, or four points lean to one side.
+    let rms = rms_beside_reference(&gpu, &scene);
+    println!("RMS {rms:.4}");
+    assert!(rms < 0.002, "{rms}");
     gpu.finish();
 }
 

@@ -20,22 +20,35 @@ struct Lobe {
     vec3 w_o;
     vec3 mirror;  // the mirrored view, in the environment's coordinates
     float width;  // lobe_width of what is seen from w_o
-    float flank;  // its flank
     float radius; // and its lobe_radius
+    float foot;   // where flanks end: sin theta_h
 };
 
-// How far `direction` is from the middle of the lobe, in radians: of a long one measured across it, with what is along it shortened by as
+bool is_isotropic(Material material) {
+    return HAS_TANGENTS == 0 || material.threads.azimuth_count == 1;
+}
+
+// sin theta_h and cos theta_d of light from `direction`: of a long lobe theta_h is measured across it, with what is along it shortened by as
 // much as the lobe is long (F34).
+vec2 half_angles(Lobe lobe, Surface surface, Material material, vec3 direction) {
+    vec3 h = direction * surface.frame + lobe.w_o;
+    // Opposite directions have no half vector; 1e-6 is far below any other sum of two above the horizon.
+    float twice_cos_theta_d = max(length(h), 1e-6);
+    vec2 sin_theta_h = h.xy / twice_cos_theta_d;
+    if (!is_isotropic(material)) {
+        sin_theta_h = turned(vec3(sin_theta_h, 0.0), surface.phi_o).xy;
+        vec2 axis = material.long_axis;
+        sin_theta_h = vec2(dot(sin_theta_h, axis) * material.narrowness, dot(sin_theta_h, vec2(-axis.y, axis.x)));
+    }
+    return vec2(length(sin_theta_h), 0.5 * twice_cos_theta_d);
+}
+
+// How far `direction` is from the middle of the lobe, in radians; reflection doubles angles.
 float away_from(Lobe lobe, Surface surface, Material material, vec3 direction) {
-    if (HAS_TANGENTS == 0 || material.threads.azimuth_count == 1) {
+    if (is_isotropic(material)) {
         return distance(direction, lobe.mirror);
     }
-    // Opposite directions have no half vector; 1e-6 is far below any other sum of two above the horizon.
-    vec3 h = turned(direction * surface.frame + lobe.w_o, surface.phi_o);
-    h /= max(length(h), 1e-6);
-    vec2 axis = material.long_axis;
-    // Reflection doubles angles.
-    return 2.0 * length(vec2(dot(h.xy, axis) * material.narrowness, dot(h.xy, vec2(-axis.y, axis.x))));
+    return 2.0 * half_angles(lobe, surface, material, direction).x;
 }
 
 // How far a source is from where the BRDF cannot be taken at a few points of it, because it is mirrored towards the eye and wider than
@@ -56,11 +69,13 @@ const float VERY_FAR = 40.0;
 const float OPENED_WITHIN = 12.0;
 const float WIDTHS_ON_THE_WAY = 4.2;
 
-// Where f is like e^-(x/flank)^2, x the angle of the half vector, half of that from the mirrored view, log f changes by STEEP/2 or more within a
-// standard deviation of the source where that times the angle from the mirrored view is above STEEP flank^2. Flanks end END flanks from
-// the mirrored view, where f has fallen by e^16 and is dark under any lamp. Measured: less steep ones cost time and gain nothing.
-const float STEEP = 1.4;
-const float END = 8.0;
+// Where f is like e^-(theta_h/flank)^2, log f changes by STEEP or more within a standard deviation of the source where that times theta_h is above
+// STEEP flank^2 cos theta_d: the half vector moves by up to 1 / (2 cos theta_d) of what light does. Measured: less steep ones cost time and gain
+// nothing.
+const float STEEP = 0.7;
+
+// Where f falls below this, in 1/sr, were all light reflected, it is dark under any lamp.
+const float DARK = 1.5e-4;
 
 // Of a source that is wider, in radians, the shape matters.
 const float WIDEST_WHOLE_RAD = 0.1;
@@ -83,7 +98,11 @@ bool opens(Source source, Lobe lobe, Surface surface, Material material, float l
     float width = source.direction.w;
     float away = away_from(lobe, surface, material, source.direction.xyz);
     bool is_near = away + WIDTHS_ON_THE_WAY * lobe.width < OPENED_WITHIN * width;
-    bool is_on_flank = away * width > STEEP * lobe.flank * lobe.flank && away < END * lobe.flank;
+    bool is_on_flank = false;
+    if (material.flank > 0.0) {
+        vec2 at = half_angles(lobe, surface, material, source.direction.xyz);
+        is_on_flank = at.x * width > STEEP * material.flank * material.flank * at.y && at.x < lobe.foot;
+    }
     return width > least_width && (is_near || is_on_flank || width > WIDEST_WHOLE_RAD);
 }
 
@@ -122,7 +141,9 @@ Lobe lobe_of(Surface surface, Material material) {
     vec3 w_o = view_direction(surface);
     float narrower = max(w_o.z, 0.05);
     vec3 mirror = surface.frame * vec3(-w_o.x, -w_o.y, w_o.z);
-    return Lobe(w_o, mirror, narrower * material.lobe_width, narrower * material.flank, narrower * material.lobe_radius);
+    // Such a lobe has its peak at 1 / (4 pi flank^2); 1e-8 is far below any flank squared.
+    float foot = material.flank * sqrt(-log(4.0 * radians(180.0) * DARK * max(material.flank * material.flank, 1e-8)));
+    return Lobe(w_o, mirror, narrower * material.lobe_width, narrower * material.lobe_radius, foot);
 }
 
 // Up to this deviation of their normals, in radians, sub-pixels are one surface to any lobe that is not narrower: src/threads/fitted/sets.rs.
@@ -183,7 +204,8 @@ Points points_on_square(int side, bool sets) {
     return Points(last, side == 2 && !sets ? 2.0 : sqrt(12.0) / float(side), vec2(1.0 / float(side), 0.0), false);
 }
 
-// Four of equal weight: equal steps up, the outer two to one side and the inner two to the other, as far as its standard deviation.
+// Four of equal weight in equal steps up, so far to the sides that they have all moments of the square up to the third but for the variance up, which
+// is 15/16 of it: on the flank of a lobe f is steep both ways.
 Points points_on_stairs() {
     return Points(vec2(1.5, 0.0), sqrt(12.0) / 4.0, vec2(0.5, 0.0), true);
 }
@@ -230,8 +252,8 @@ void add_source(inout AtSources sum, Source source, float clear, Surface surface
     do {
         vec2 at = points.between * place;
         if (points.is_stairs) {
-            // 1 at the ends, -1 between.
-            at.y = place.x * place.x - 1.25;
+            // 1, -3, 3 and -1, over the square root of 5.
+            at.y = place.x * (41.0 - 20.0 * place.x * place.x) / (6.0 * sqrt(5.0));
         }
         vec2 weights = points.weight.x + points.weight.y * abs(place);
         vec3 w_i = normalize(middle + at.x * x + at.y * y);

@@ -54,7 +54,7 @@ pub struct LobeShape {
     /// The width, or where that is so small that it may be of a cusp, [`lobe_radius`] seen along the normal.
     pub radius_rad: f64,
     /// The angle of the half vector to the normal, in radians, at which a Gaussian that falls to a thousandth where f does has fallen by e.
-    /// Across the long axis. 0 if flanks are not as steep as a Gaussian's, or wider than 0.1.
+    /// Across the long axis. 0 if flanks are not as steep as a Gaussian's, or have no foot.
     pub flank_rad: f64,
     /// Whether that width is but of a cusp on a wider lobe, as many measured tables have it: narrower than what kernels tell, and of little of
     /// what is reflected.
@@ -154,8 +154,8 @@ const FOOT: f64 = 1e-3;
 /// They are steep if they end within so many widths of the lobe. A Gaussian's do within 4.9, GGX's within 14.
 const STEEP_WITHIN: f64 = 8.0;
 
-/// Wider ones are slight slopes to any part of a lamp: these are no wider than `WIDEST_WHOLE_RAD` in glsl/methods/fitted.glsl.
-const WIDEST_FLANK_RAD: f64 = 0.1;
+/// Wider ones have no foot: f does not fall that far.
+const WIDEST_FLANK_RAD: f64 = 0.5;
 
 /// [`LobeShape::flank_rad`] of a lobe of this width, towards `azimuth`.
 fn flank(brdf: &Brdf, azimuth: DVec2, width_rad: f64) -> f64 {
@@ -235,11 +235,12 @@ mod tests {
                 assert!((0.3..1.0).contains(&(width / alpha)), "{distribution} {alpha}: {width}");
             }
         }
-        // A Gaussian of slopes falls by e at its roughness; GGX has no such flanks, and beside scattered light no lobe has.
+        // A Gaussian of slopes falls by e at its roughness; a wide one has no foot, GGX has no such flanks, and beside scattered light no lobe has.
         for (parameters, expected) in [
             ("distribution = 'beckmann'\nalpha = 0.02\neta = 0.2\nk = 3.9", 0.02),
             ("distribution = 'beckmann'\nalpha_x = 0.3\nalpha_y = 0.01\neta = 0.2\nk = 3.9", 0.01),
-            ("distribution = 'beckmann'\nalpha = 0.2\neta = 0.2\nk = 3.9", 0.0),
+            ("distribution = 'beckmann'\nalpha = 0.2\neta = 0.2\nk = 3.9", 0.2),
+            ("distribution = 'beckmann'\nalpha = 0.5\neta = 0.2\nk = 3.9", 0.0),
             ("distribution = 'ggx'\nalpha = 0.02\neta = 0.2\nk = 3.9", 0.0),
         ] {
             let flank =

@@ -61,8 +61,8 @@ const FAR: f32 = 4.0;
 const VERY_FAR: f32 = 40.0;
 const OPENED_WITHIN: f32 = 12.0;
 const WIDTHS_ON_THE_WAY: f32 = 4.2;
-const STEEP: f32 = 1.4;
-const END: f32 = 8.0;
+const STEEP: f32 = 0.7;
+const DARK: f32 = 1.5e-4;
 const WIDEST_WHOLE_RAD: f32 = 0.1;
 const LOW_COSINE: f32 = 0.3;
 const LOW_DEVIATIONS: f32 = 20.0;
@@ -74,8 +74,8 @@ struct Lobe<'a> {
     w_o: Vec3,
     mirror: Vec3,
     width: f32,
-    flank: f32,
     radius: f32,
+    foot: f32,
 }
 
 impl<'a> Lobe<'a> {
@@ -89,22 +89,37 @@ impl<'a> Lobe<'a> {
             w_o,
             mirror,
             width: narrower * record.lobe_width,
-            flank: narrower * record.flank,
             radius: narrower * record.lobe_radius,
+            foot: record.flank * (-(4.0 * PI * DARK * record.flank.powi(2).max(1e-8)).ln()).sqrt(),
         }
+    }
+
+    /// Twin of `is_isotropic`.
+    fn is_isotropic(&self) -> bool {
+        self.point.fitted_threads().is_some_and(|table| table.azimuths == 1)
+    }
+
+    /// Twin of `half_angles`.
+    fn half_angles(&self, direction: Vec3) -> [f32; 2] {
+        let (surface, record) = (&self.point.surface, self.point.record());
+        let h = surface.frame.transpose() * direction + self.w_o;
+        let twice_cos_theta_d = h.length().max(1e-6);
+        let mut sin_theta_h = h.truncate() / twice_cos_theta_d;
+        if !self.is_isotropic() {
+            sin_theta_h = turned(sin_theta_h.extend(0.0), surface.phi_o).truncate();
+            let axis = Vec2::from(record.long_axis);
+            sin_theta_h = Vec2::new(sin_theta_h.dot(axis) * record.narrowness, sin_theta_h.dot(axis.perp()));
+        }
+        [sin_theta_h.length(), 0.5 * twice_cos_theta_d]
     }
 
     /// Twin of `away_from`.
     fn away(&self, direction: Vec3) -> f32 {
-        let (surface, record) = (&self.point.surface, self.point.record());
-        let is_isotropic = self.point.fitted_threads().is_some_and(|table| table.azimuths == 1);
-        if is_isotropic {
+        if self.is_isotropic() {
             return direction.distance(self.mirror);
         }
-        let h = turned(surface.frame.transpose() * direction + self.w_o, surface.phi_o);
-        let h = (h / h.length().max(1e-6)).truncate();
-        let axis = Vec2::from(record.long_axis);
-        2.0 * (h.dot(axis) * record.narrowness).hypot(h.dot(axis.perp()))
+        let [sin_theta_h, _] = self.half_angles(direction);
+        2.0 * sin_theta_h
     }
 
     /// Twin of `clearance_of`.
@@ -118,7 +133,9 @@ impl<'a> Lobe<'a> {
         let width = source.direction.w;
         let away = self.away(source.direction.truncate());
         let is_near = away + WIDTHS_ON_THE_WAY * self.width < OPENED_WITHIN * width;
-        let is_on_flank = away * width > STEEP * self.flank * self.flank && away < END * self.flank;
+        let [sin_theta_h, cos_theta_d] = self.half_angles(source.direction.truncate());
+        let flank = self.point.record().flank;
+        let is_on_flank = sin_theta_h * width > STEEP * flank * flank * cos_theta_d && sin_theta_h < self.foot;
         width > least_width && (is_near || is_on_flank || width > WIDEST_WHOLE_RAD)
     }
 
@@ -210,7 +227,8 @@ impl Points {
         (0..columns * rows).map(move |i| {
             let place = IVec2::new(i % columns, i / columns).as_vec2() - self.last;
             let at = self.between * place;
-            let at = if self.is_stairs { at.with_y(place.x * place.x - 1.25) } else { at };
+            let to_side = place.x * (41.0 - 20.0 * place.x * place.x) / (6.0 * 5.0_f32.sqrt());
+            let at = if self.is_stairs { at.with_y(to_side) } else { at };
             (at, (self.weight.x + self.weight.y * place.abs()).element_product())
         })
     }
@@ -390,7 +408,10 @@ mod tests {
         }
         let stairs_variances = [mean(&stairs, &|at| at.x * at.x), mean(&stairs, &|at| at.y * at.y)];
         assert!(Vec2::from(stairs_variances).abs_diff_eq(Vec2::new(1.0 - 1.0 / 16.0, 1.0), 1e-6));
-        assert!(mean(&stairs, &|at| at.x * at.y).abs() < 1e-6);
+        // They lean to no side.
+        for (x, y) in [(1, 1), (3, 0), (2, 1), (1, 2), (0, 3)] {
+            assert!(mean(&stairs, &|at| at.x.powi(x) * at.y.powi(y)).abs() < 1e-6, "x^{x} y^{y}");
+        }
         // Along the way up, 1 of which is a standard deviation: parts against the whole.
         for z in [-2.0_f32, -1.7, -1.0, -0.3, 0.0, 0.4, 1.1, 1.7, 2.0] {
             let [whole, _] = risen(z, 1.0);

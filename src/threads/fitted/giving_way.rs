@@ -21,6 +21,9 @@ const WIDE_UNDER_CUSP_RAD: f64 = 0.005;
 const CLEAR: [f32; 2] = [1.25, 2.5];
 /// Steep flanks show the edges of lamps, which kernels know better than squares in the place of parts.
 const CLEAR_OF_FLANKS: [f32; 2] = [2.5, 4.0];
+/// Wider ones are slight slopes to the parts of a lamp near the mirrored view: these are no wider than `WIDEST_WHOLE_RAD` in
+/// glsl/methods/fitted.glsl.
+const WIDEST_STEEP_RAD: f64 = 0.1;
 /// Kernels that are expected to err by more than this part of the radiance give way sooner, with its square root,
 const GOOD_ERROR: f32 = 0.01;
 /// but no sooner than this part. Measured on 20 materials with 8 to 64 threads under the lamps of a studio: of those expected to err by less
@@ -32,7 +35,7 @@ impl GivingWay {
     pub fn of(lobe: &LobeShape, table: &FittedTable) -> Self {
         let is_fitted = table.count >= MANY_KERNELS && lobe.radius_rad > WIDE_UNDER_CUSP_RAD;
         let sooner = (GOOD_ERROR / table.mean_relative_error()).sqrt().clamp(SOONEST, 1.0);
-        let clear = if lobe.flank_rad > 0.0 { CLEAR_OF_FLANKS } else { CLEAR };
+        let clear = if lobe.flank_rad > 0.0 && lobe.flank_rad < WIDEST_STEEP_RAD { CLEAR_OF_FLANKS } else { CLEAR };
         Self {
             lobe_radius_rad: if is_fitted { lobe.width_rad } else { lobe.radius_rad },
             clear: clear.map(|clearance| sooner * clearance),
