@@ -13,12 +13,12 @@ const MEAN_AZIMUTHS: usize = 24;
 #[derive(Clone, Debug)]
 pub struct SeenBrdf<'a> {
     brdf: &'a Brdf,
-    from: From,
+    from: Viewpoint,
 }
 
-/// Where from. Azimuths are from the tangent, as their cosines and sines.
+/// Azimuths are from the tangent, as their cosines and sines.
 #[derive(Clone, Debug)]
-enum From {
+enum Viewpoint {
     /// Along the tangent, or no matter.
     Tangent,
     /// The azimuth phi_o of w_o.
@@ -30,14 +30,17 @@ enum From {
 impl<'a> SeenBrdf<'a> {
     /// From the azimuth `phi_o` of w_o, in radians from the tangent.
     pub fn from_azimuth(brdf: &'a Brdf, phi_o: f64) -> Self {
-        Self { brdf, from: if phi_o == 0.0 { From::Tangent } else { From::Azimuth(DVec2::from_angle(phi_o)) } }
+        Self {
+            brdf,
+            from: if phi_o == 0.0 { Viewpoint::Tangent } else { Viewpoint::Azimuth(DVec2::from_angle(phi_o)) },
+        }
     }
 
     /// From any: itself if it is isotropic, else the mean over azimuths. These are such that half vectors have those that suit its lobe: see
     /// [`Ellipse`].
     pub fn from_all_around(brdf: &'a Brdf) -> Self {
         if brdf.is_isotropic() {
-            return Self { brdf, from: From::Tangent };
+            return Self { brdf, from: Viewpoint::Tangent };
         }
         let ellipse = Ellipse::of(&LobeShape::of(brdf));
         let count = ellipse.azimuths(MEAN_AZIMUTHS);
@@ -45,16 +48,16 @@ impl<'a> SeenBrdf<'a> {
             let (azimuth, widened) = ellipse.of_circle(DVec2::from_angle(TAU * (i as f64 + 0.5) / count as f64));
             (azimuth, widened / count as f64)
         };
-        Self { brdf, from: From::AllAround((0..count).map(azimuth).collect()) }
+        Self { brdf, from: Viewpoint::AllAround((0..count).map(azimuth).collect()) }
     }
 
     /// f(w_i, w_o) as [`Brdf::evaluate`], `w_o` in the plane of x and z.
     pub fn evaluate(&self, w_i: DVec3, w_o: DVec3) -> DVec3 {
         let from = |azimuth| self.brdf.evaluate(turned(w_i, azimuth), turned(w_o, azimuth));
         match &self.from {
-            From::Tangent => self.brdf.evaluate(w_i, w_o),
-            From::Azimuth(azimuth) => from(*azimuth),
-            From::AllAround(azimuths) => {
+            Viewpoint::Tangent => self.brdf.evaluate(w_i, w_o),
+            Viewpoint::Azimuth(azimuth) => from(*azimuth),
+            Viewpoint::AllAround(azimuths) => {
                 let h = (w_i + w_o).truncate().normalize_or(DVec2::X);
                 let back = dvec2(h.x, -h.y);
                 azimuths.iter().map(|&(azimuth, share)| from(azimuth.rotate(back)) * share).sum()
@@ -65,12 +68,12 @@ impl<'a> SeenBrdf<'a> {
     /// [`Brdf::evaluate_all`], `w_o` in the plane of x and z.
     pub fn evaluate_all(&self, w_i: &[DVec3], w_o: DVec3) -> Vec<DVec3> {
         match &self.from {
-            From::Tangent => self.brdf.evaluate_all(w_i, w_o),
-            From::Azimuth(azimuth) => {
+            Viewpoint::Tangent => self.brdf.evaluate_all(w_i, w_o),
+            Viewpoint::Azimuth(azimuth) => {
                 let directions: Vec<_> = w_i.iter().map(|w| turned(*w, *azimuth)).collect();
                 self.brdf.evaluate_all(&directions, turned(w_o, *azimuth))
             }
-            From::AllAround(_) => w_i.iter().map(|w_i| self.evaluate(*w_i, w_o)).collect(),
+            Viewpoint::AllAround(_) => w_i.iter().map(|w_i| self.evaluate(*w_i, w_o)).collect(),
         }
     }
 }
