@@ -6,6 +6,7 @@ use glam::DVec3;
 
 use crate::file_format::file_formats;
 
+mod box_filter;
 pub mod cube;
 mod custom;
 mod ggx_pyramid;
@@ -123,26 +124,6 @@ impl Environment {
         row(top).lerp(row(top + 1.0), y - top)
     }
 
-    /// The mean of [`Self::radiance`] over a box of `theta_rad` x `phi_rad` around `direction`, each angle counting the same:
-    /// exact, as each pixel's weight is a tent in each of the two. `columns` is room to work in.
-    fn mean_over_box(&self, direction: DVec3, theta_rad: f64, phi_rad: f64, columns: &mut Vec<(usize, f64)>) -> DVec3 {
-        let (x, y) = self.pixel(direction);
-        let across = tents_over(x, phi_rad / TAU * self.width as f64);
-        columns.clear();
-        columns.extend(across.map(|(column, weight)| (column.rem_euclid(self.width as isize) as usize, weight)));
-        let across: f64 = columns.iter().map(|(_, weight)| weight).sum();
-        let (mut sum, mut down) = (DVec3::ZERO, 0.0);
-        for (row, weight) in tents_over(y, theta_rad / PI * self.height as f64) {
-            let row = row.clamp(0, self.height as isize - 1) as usize;
-            let texels = &self.texels[row * self.width..][..self.width];
-            let mut of_row = DVec3::ZERO;
-            columns.iter().for_each(|&(column, weight)| of_row += weight * to_dvec3(&texels[column]));
-            sum += weight * of_row;
-            down += weight;
-        }
-        sum / (across * down)
-    }
-
     /// The direction of a pixel's centre, unit; fractions name points between the centres.
     pub fn direction(&self, column: f64, row: f64) -> DVec3 {
         let phi = TAU * (column + 0.5) / self.width as f64;
@@ -206,17 +187,6 @@ impl Environment {
 fn angles(direction: DVec3) -> [f64; 2] {
     let DVec3 { x, y, z } = direction;
     [x.atan2(-z), (x * x + z * z).sqrt().atan2(y)]
-}
-
-/// The integrals over `centre` +- `extent` / 2 of the tents max(0, 1 - |x - k|) around those whole k that reach into it.
-fn tents_over(centre: f64, extent: f64) -> impl Iterator<Item = (isize, f64)> {
-    // The integral of the tent around 0 from minus infinity to x.
-    let integral = |x: f64| {
-        let x = x.clamp(-1.0, 1.0);
-        0.5 + x - 0.5 * x * x.abs()
-    };
-    let (from, to) = (centre - 0.5 * extent, centre + 0.5 * extent);
-    (from.floor() as isize..=to.ceil() as isize).map(move |k| (k, integral(to - k as f64) - integral(from - k as f64)))
 }
 
 fn to_dvec3(texel: &[f32; 3]) -> DVec3 {

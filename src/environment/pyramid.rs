@@ -6,7 +6,8 @@ use glam::{DVec3, Vec3};
 use half::f16;
 use rayon::prelude::*;
 
-use super::cube::{self, direction_of, exact_texel_solid_angle, face_of, point_of};
+use super::box_filter::BoxFilter;
+use super::cube::{self, direction_of, exact_texel_solid_angle, face_of};
 use super::{Environment, to_dvec3};
 use crate::error::Result;
 use crate::progress::Observer;
@@ -58,7 +59,7 @@ pub struct Pyramid {
 
 impl Pyramid {
     /// The means of [`Environment::radiance`] over the solid angles of the texels. Constants stay constant to the bit,
-    /// and the energy of a single bright pixel arrives to 3e-3 wherever it is (5e-4 RMS).
+    /// and the energy of a single bright pixel arrives to 1e-3 wherever it is.
     pub fn box_filtered(environment: &Environment) -> Self {
         Self::box_filtered_to(environment, Self::face_size_for(environment), &()).expect("nobody cancels")
     }
@@ -72,11 +73,13 @@ impl Pyramid {
 
     /// The same with faces of this size, a power of two; the only error is that `observer` cancels it.
     pub fn box_filtered_to(environment: &Environment, face_size: usize, observer: &dyn Observer) -> Result<Self> {
-        let mut levels = vec![finest_level(environment, face_size, observer)?];
-        for size in (0..face_size.ilog2()).rev().map(|log2| 1 << log2) {
+        // Of a face of one texel the mean is that of four, which meet at the poles.
+        let finest_size = face_size.max(2);
+        let mut levels = vec![finest_level(environment, finest_size, observer)?];
+        for size in (0..finest_size.ilog2()).rev().map(|log2| 1 << log2) {
             levels.push(coarser_level(levels.last().expect("there is level 0"), size));
         }
-        Ok(Self { face_size, levels })
+        Ok(Self { face_size, levels: levels.split_off((face_size == 1).into()) })
     }
 
     /// Texels along the edge of a face at `level`.
@@ -185,49 +188,18 @@ impl Pyramid {
     }
 }
 
-/// Level 0: for each texel the mean of a grid of samples, each itself the exact mean of the bilinear environment over a box
-/// in theta and phi as large as the sample's share of the texel. Point samples would miss the energy of a single bright
-/// pixel by per cents, and near the poles, where pixels are slivers, altogether.
+/// Level 0: the means over the solid angles of the texels.
 fn finest_level(environment: &Environment, face_size: usize, observer: &dyn Observer) -> Result<Vec<[f32; 3]>> {
-    let row_rad = PI / environment.height as f64;
-    let texel_rad = 2.0 / face_size as f64;
-    // As many as there are rows in the texel, half as many again as there are columns, which get narrow towards the poles, and
-    // so many that a sample is small against its distance to the pole: a box in theta and phi is a good likeness of it then.
-    let samples_per_edge = |direction: DVec3| {
-        let sin_theta = direction.x.hypot(direction.z).max(0.25 * row_rad);
-        let column_rad = TAU / environment.width as f64 * sin_theta;
-        let pixels = (texel_rad / row_rad).max(1.5 * texel_rad / column_rad).round();
-        let count = pixels.max((32.0 * texel_rad / sin_theta).ceil()) as usize;
-        // On a face of one texel an odd number would put a sample on the pole, where phi is undefined.
-        if face_size == 1 { count.next_multiple_of(2) } else { count.clamp(1, 512) }
-    };
-    let lit = LitCells::new(environment, face_size);
-    let texel = |columns: &mut Vec<_>, texel: usize| {
+    let (filter, lit) = (BoxFilter::new(environment, face_size), LitCells::new(environment, face_size));
+    let texel = |texel: usize| {
         observer.check()?;
         let (face, row, column) = (texel / face_size / face_size, texel / face_size % face_size, texel % face_size);
         if !lit.reach(face, row, column) {
             return Ok([0.0; 3]);
         }
-        let middle = |index: usize| (index as f64 + 0.5) / face_size as f64;
-        let axes =
-            [point_of(face, 1.0, 0.0) - point_of(face, 0.0, 0.0), point_of(face, 0.0, 1.0) - point_of(face, 0.0, 0.0)];
-        let count = samples_per_edge(direction_of(face, middle(column), middle(row)));
-        let samples_size = face_size * count;
-        let sides = axes.map(|axis| axis / samples_size as f64);
-        let (mut sum, mut weight_sum) = (DVec3::ZERO, 0.0);
-        for sample in 0..count * count {
-            let s = ((column * count + sample % count) as f64 + 0.5) / samples_size as f64;
-            let t = ((row * count + sample / count) as f64 + 0.5) / samples_size as f64;
-            let point = point_of(face, s, t);
-            let (theta_rad, phi_rad) = box_around(point, sides);
-            // In proportion to the solid angle.
-            let weight = point.length_recip().powi(3);
-            sum += weight * environment.mean_over_box(point, theta_rad, phi_rad, columns);
-            weight_sum += weight;
-        }
-        Ok((sum / weight_sum).as_vec3().to_array())
+        Ok(filter.mean_over_texel(face, row, column).as_vec3().to_array())
     };
-    (0..6 * face_size * face_size).into_par_iter().map_init(Vec::new, texel).collect()
+    (0..6 * face_size * face_size).into_par_iter().map(texel).collect()
 }
 
 /// Which cells of a cube map light reaches: of a few lamps alone, hardly any.
@@ -259,9 +231,9 @@ impl LitCells {
         let tiles = (0..are_lit.len()).filter(|&tile| are_lit[tile]);
         let tiles: Vec<_> =
             tiles.map(|tile| environment.direction(centre(tile % across), centre(tile / across))).collect();
-        // A tile's half, the pixel beside it, and as boxes reach about as far as their texels, two of these.
+        // A tile's half, and the pixel beside it.
         let pixel_rad = (PI / height as f64).hypot(TAU / width as f64);
-        let reach = (0.5 * Self::PIXELS as f64 + 1.0) * pixel_rad + 2.0 * 2.0 / face_size as f64;
+        let reach = (0.5 * Self::PIXELS as f64 + 1.0) * pixel_rad;
         let is_lit = |cell: usize| {
             let (face, row, column) = (cell / count / count, cell / count % count, cell % count);
             let at = |along: f64, down: f64| {
@@ -284,18 +256,6 @@ impl LitCells {
         };
         self.are_lit.as_ref().is_none_or(cell)
     }
-}
-
-/// The extent in theta and phi of the box that has the second moments of the texel around the point `at` on the plane of
-/// a face, of which `sides` are the texel's.
-fn box_around(at: DVec3, sides: [DVec3; 2]) -> (f64, f64) {
-    let rho_squared = at.x * at.x + at.z * at.z;
-    let rho = rho_squared.sqrt();
-    // Derivatives of theta = atan2(rho, y) and phi = atan2(x, -z) along the sides.
-    let along_theta = |side: DVec3| (at.y * (at.x * side.x + at.z * side.z) / rho - rho * side.y) / at.length_squared();
-    let along_phi = |side: DVec3| (at.x * side.z - at.z * side.x) / rho_squared;
-    let both = |[a, b]: [f64; 2]| (a * a + b * b).sqrt();
-    (both(sides.map(along_theta)), both(sides.map(along_phi)).min(TAU))
 }
 
 /// The level of faces of `size` from the `finer` one of twice the size: means of four, weighed by solid angle.
@@ -407,7 +367,7 @@ mod tests {
             let map = environment(width, height, |x, y| [if (x, y) == (column, row) { 1e6 } else { 0.0 }; 3]);
             let pyramid = Pyramid::box_filtered(&map);
             let error = mean(&pyramid, 0).x / map.mean_radiance().x - 1.0;
-            assert!(error.abs() < 3e-3, "pixel ({column}, {row}): {error:e}");
+            assert!(error.abs() < 1e-3, "pixel ({column}, {row}): {error:e}");
         }
     }
 
@@ -445,6 +405,33 @@ mod tests {
             let error = (pyramid.lookup(direction.as_vec3(), 0.0).as_dvec3() - map.radiance(direction)).abs();
             // The means over texels of 0.06 rad, blurred once more by the lookup.
             assert!(error.max_element() < 0.015, "{direction}: {error}");
+        }
+    }
+
+    #[test]
+    fn texels_are_means_over_their_solid_angles() {
+        for (width, height, face_size) in [(96, 48, 16), (37, 11, 8), (16, 8, 32), (300, 3, 4), (2, 1, 1)] {
+            let lamp = |x: usize, y: usize| if (x * 7 + y * 13).is_multiple_of(29) { 100.0 } else { 0.0 };
+            let map = environment(width, height, |x, y| [lamp(x, y), (x % 5) as f32, (y % 3) as f32]);
+            let pyramid = Pyramid::box_filtered_to(&map, face_size, &()).unwrap();
+            assert_eq!(pyramid.levels.len(), face_size.ilog2() as usize + 1);
+            let points = 128 + 8 * width / face_size;
+            for texel in (0..pyramid.levels[0].len()).step_by(face_size.min(7)) {
+                let (face, row, column) =
+                    (texel / face_size / face_size, texel / face_size % face_size, texel % face_size);
+                let (mut sum, mut weight_sum) = (DVec3::ZERO, 0.0);
+                for point in 0..points * points {
+                    let at = |index: usize, point: usize| {
+                        (index as f64 + (point as f64 + 0.5) / points as f64) / face_size as f64
+                    };
+                    let point = cube::point_of(face, at(column, point % points), at(row, point / points));
+                    let weight = point.length_recip().powi(3);
+                    sum += weight * map.radiance(point);
+                    weight_sum += weight;
+                }
+                let error = (to_dvec3(&pyramid.levels[0][texel]) - sum / weight_sum) / DVec3::new(100.0, 4.0, 2.0);
+                assert!(error.abs().max_element() < 0.0005, "{width}x{height}: {face} {row} {column}: {error}");
+            }
         }
     }
 

@@ -16,7 +16,7 @@ use crate::file_format;
 use crate::output::write_whole;
 
 /// Version of the file format and of the maps in it: to be raised when the same environment gets others.
-pub const FORMAT_VERSION: u32 = 4;
+pub const FORMAT_VERSION: u32 = 5;
 
 const MAGIC: &[u8; 8] = b"VMFMAPS\0";
 
