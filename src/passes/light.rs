@@ -2,7 +2,7 @@
 use super::background::check_map_size;
 use super::cube_borders::{WayAround, draw_with_cube_map};
 use crate::Result;
-use crate::environment::{Environment, LightMap, Pyramid};
+use crate::environment::{Alias, Environment, LightMap, Pyramid};
 use crate::light::{BlurredLight, Light, PrefilteredLight, finest_level};
 use crate::method::Method;
 use crate::vulkan::{self, Bound, Buffer, Device, ImageKind, ImageShape, Sampler, SamplerKind};
@@ -22,6 +22,25 @@ pub struct DeviceLight {
     pub(super) finest_level: f32,
 }
 
+/// Whether `method` can draw by the light of an `environment` on this device, if it does so.
+///
+/// # Errors
+/// The environment has more pixels than shaders of the device see of a buffer.
+pub fn check_aliases(device: &Device, method: Method, environment: &Environment) -> Result<()> {
+    let most = device.limits().max_storage_buffer_range as usize / size_of::<Alias>();
+    if method.lookups().aliases { check_pixels(most, environment) } else { Ok(()) }
+}
+
+fn check_pixels(most: usize, environment: &Environment) -> Result<()> {
+    let &Environment { width, height, .. } = environment;
+    if width * height <= most {
+        return Ok(());
+    }
+    let problem =
+        format!("is {width} x {height} pixels; on this device samples are drawn by the light of {most} at most");
+    Err(crate::Error::input(&environment.name, problem, "scale it down, or use --method filtered"))
+}
+
 /// A pyramid on the device.
 pub(super) struct DevicePyramid {
     pub(super) image: vulkan::Image,
@@ -35,7 +54,7 @@ impl DeviceLight {
     /// Uploads what `method` looks up of `environment`, whose filtered forms are `light`; cube maps by `way_around`.
     ///
     /// # Errors
-    /// No device memory left, or a map wider or higher than the device's images can be.
+    /// No device memory left, a map wider or higher than the device's images can be, or [`check_aliases`].
     pub fn new(
         device: &Arc<Device>,
         method: Method,
@@ -44,6 +63,7 @@ impl DeviceLight {
         way_around: Option<WayAround>,
     ) -> Result<Self> {
         let lookups = method.lookups();
+        check_aliases(device, method, environment)?;
         let mut on_device = Self::default();
         if let Some(blurred) = &light.blurred {
             on_device.add_blurred(device, environment, blurred, way_around)?;
@@ -165,5 +185,19 @@ impl DevicePyramid {
             None => {}
         }
         Ok(Self { image, sampler, face_size, scale })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::environment::RepairCounts;
+
+    #[test]
+    fn light_of_more_pixels_than_a_buffer_can_list_is_refused_by_name() {
+        let map = Environment::new("big.exr".into(), 3, 2, vec![[1.0; 3]; 6], RepairCounts::default());
+        assert!(check_pixels(6, &map).is_ok());
+        let error = check_pixels(5, &map).unwrap_err().to_string();
+        assert!(error.starts_with("big.exr: is 3 x 2 pixels") && error.contains("5 at most"), "{error}");
     }
 }

@@ -17,6 +17,7 @@ use crate::environment::{Environment, RepairCounts};
 use crate::error::{Error, Result};
 use crate::memo::{Held, Key, Keyed, Memo};
 use crate::method::Method;
+use crate::passes::check_aliases;
 use crate::pipeline::{DeviceScene, Wanted};
 use crate::prepare::prepare;
 use crate::progress::Observer;
@@ -128,7 +129,7 @@ pub fn run(
     Ok(())
 }
 
-/// What becomes of a case by `method`; none where its light cannot be made bright, or the method refuses the material.
+/// What becomes of a case by `method`; none where its light cannot be made bright, or has more pixels than the method can draw by on the device.
 fn stress(
     device: &Arc<Device>,
     memo: &Memo,
@@ -146,6 +147,9 @@ fn stress(
     let light = case.light.as_ref().map_or_else(|| (*prepared.environment).clone(), |light| light());
     let light = if bright { brightened(&light) } else { Some(light) };
     let Some(light) = light else { return Ok(None) };
+    if check_aliases(device, method, &light).is_err() {
+        return Ok(None);
+    }
     prepared.environment = Keyed::new(Key::of_digest(light.fingerprint()), light);
     let wanted = Wanted { radiance: true, display: true, geometry: true };
     let rendering = DeviceScene::new(device, &prepared, &round)?.render(wanted, 1)?;
