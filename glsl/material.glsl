@@ -23,6 +23,7 @@ struct Material {
     float flank;       // flank_rad in src/brdf/lobe.rs
     vec2 clear;        // that of its threads: src/threads/fitted/giving_way.rs
     float lobe_radius; // lobe_radius_rad there
+    float dark_from;   // that of the lobe: src/brdf/lobe.rs
 };
 
 layout(set = 0, binding = 5, std430) readonly buffer Materials {

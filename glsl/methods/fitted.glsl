@@ -21,7 +21,6 @@ struct Lobe {
     vec3 mirror;  // the mirrored view, in the environment's coordinates
     float width;  // lobe_width of what is seen from w_o
     float radius; // and its lobe_radius
-    float foot;   // where flanks end: sin theta_h
 };
 
 bool is_isotropic(Material material) {
@@ -74,9 +73,6 @@ const float WIDTHS_ON_THE_WAY = 4.2;
 // nothing.
 const float STEEP = 0.7;
 
-// Where f falls below this, in 1/sr, were all light reflected, it is dark under any lamp.
-const float DARK = 1.5e-4;
-
 // Of a source that is wider, in radians, the shape matters.
 const float WIDEST_WHOLE_RAD = 0.1;
 
@@ -101,7 +97,7 @@ bool opens(Source source, Lobe lobe, Surface surface, Material material, float l
     bool is_on_flank = false;
     if (material.flank > 0.0) {
         vec2 at = half_angles(lobe, surface, material, source.direction.xyz);
-        is_on_flank = at.x * width > STEEP * material.flank * material.flank * at.y && at.x < lobe.foot;
+        is_on_flank = at.x * width > STEEP * material.flank * material.flank * at.y && at.x < material.dark_from;
     }
     return width > least_width && (is_near || is_on_flank || width > WIDEST_WHOLE_RAD);
 }
@@ -141,9 +137,7 @@ Lobe lobe_of(Surface surface, Material material) {
     vec3 w_o = view_direction(surface);
     float narrower = max(w_o.z, 0.05);
     vec3 mirror = surface.frame * vec3(-w_o.x, -w_o.y, w_o.z);
-    // Such a lobe has its peak at 1 / (4 pi flank^2); 1e-8 is far below any flank squared.
-    float foot = material.flank * sqrt(-log(4.0 * radians(180.0) * DARK * max(material.flank * material.flank, 1e-8)));
-    return Lobe(w_o, mirror, narrower * material.lobe_width, narrower * material.lobe_radius, foot);
+    return Lobe(w_o, mirror, narrower * material.lobe_width, narrower * material.lobe_radius);
 }
 
 // Up to this deviation of their normals, in radians, sub-pixels are one surface to any lobe that is not narrower: src/threads/fitted/sets.rs.

@@ -73,7 +73,19 @@ impl LobeShape {
         let is_cusp = width_rad < CUSP_RAD && holds_little(brdf);
         Self { is_isotropic, width_rad, narrowness, long_axis, radius_rad, flank_rad, is_cusp }
     }
+
+    /// The sine of the half vector's angle from which flanks are dark; 0 if there are none.
+    pub fn dark_from(&self) -> f64 {
+        // A Gaussian that reflects all light has its peak at 1 / (4 pi flank^2).
+        match self.flank_rad {
+            0.0 => 0.0,
+            flank => flank * (-(4.0 * PI * DARK * flank * flank).ln()).sqrt(),
+        }
+    }
 }
+
+/// Where f of a lobe that reflects all light is below this, in 1/sr, it is dark under any lamp.
+const DARK: f64 = 1.5e-4;
 
 /// What spaces azimuths of the half vector: a ring crosses a long lobe within few degrees of its long axis.
 ///

@@ -52,8 +52,8 @@ pub struct MaterialRecord {
     pub clear: [f32; 2],
     /// [`GivingWay::lobe_radius_rad`](crate::threads::GivingWay::lobe_radius_rad) of its threads.
     pub lobe_radius: f32,
-    /// The size of a structure in the buffer is a multiple of 16 bytes.
-    pub padding: u32,
+    /// [`LobeShape::dark_from`].
+    pub dark_from: f32,
 }
 
 impl MaterialRecord {
@@ -72,7 +72,7 @@ impl MaterialRecord {
             flank: lobe.flank_rad as f32,
             clear: [0.0; 2],
             lobe_radius: 0.0,
-            padding: 0,
+            dark_from: lobe.dark_from() as f32,
         }
     }
 

@@ -4,7 +4,7 @@ use std::f32::consts::{FRAC_PI_2, PI};
 use glam::{DVec3, IVec2, Mat3, Vec2, Vec3};
 
 use super::{CpuShader, Point, Surface, smoothstep, turned};
-use crate::brdf::MIN_COS_THETA_D;
+use crate::brdf::{MIN_COS_THETA_D, MaterialRecord};
 use crate::environment::sources::clearance;
 use crate::environment::{LightMap, SourceRecord};
 use crate::light::{BlurredLight, finest_level};
@@ -62,7 +62,6 @@ const VERY_FAR: f32 = 40.0;
 const OPENED_WITHIN: f32 = 12.0;
 const WIDTHS_ON_THE_WAY: f32 = 4.2;
 const STEEP: f32 = 0.7;
-const DARK: f32 = 1.5e-4;
 const WIDEST_WHOLE_RAD: f32 = 0.1;
 const LOW_COSINE: f32 = 0.3;
 const LOW_DEVIATIONS: f32 = 20.0;
@@ -75,7 +74,6 @@ struct Lobe<'a> {
     mirror: Vec3,
     width: f32,
     radius: f32,
-    foot: f32,
 }
 
 impl<'a> Lobe<'a> {
@@ -90,7 +88,6 @@ impl<'a> Lobe<'a> {
             mirror,
             width: narrower * record.lobe_width,
             radius: narrower * record.lobe_radius,
-            foot: record.flank * (-(4.0 * PI * DARK * record.flank.powi(2).max(1e-8)).ln()).sqrt(),
         }
     }
 
@@ -134,8 +131,8 @@ impl<'a> Lobe<'a> {
         let away = self.away(source.direction.truncate());
         let is_near = away + WIDTHS_ON_THE_WAY * self.width < OPENED_WITHIN * width;
         let [sin_theta_h, cos_theta_d] = self.half_angles(source.direction.truncate());
-        let flank = self.point.record().flank;
-        let is_on_flank = sin_theta_h * width > STEEP * flank * flank * cos_theta_d && sin_theta_h < self.foot;
+        let &MaterialRecord { flank, dark_from, .. } = self.point.record();
+        let is_on_flank = sin_theta_h * width > STEEP * flank * flank * cos_theta_d && sin_theta_h < dark_from;
         width > least_width && (is_near || is_on_flank || width > WIDEST_WHOLE_RAD)
     }
 
