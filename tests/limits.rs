@@ -3,9 +3,9 @@
 //! `cargo test --release --test limits -- --ignored --nocapture`
 mod common;
 
-use common::{Validated, model, sphere};
+use common::{Validated, map, model, sphere};
 use glam::{DVec3, dvec3};
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::PI;
 use threadlight::low_level::evaluate::reference::ReferenceSettings;
 use threadlight::low_level::evaluate::sweep::{self, Measured};
 use threadlight::low_level::evaluate::{Cases, Shard, Sweep, reference_picture};
@@ -16,16 +16,6 @@ use threadlight::low_level::scene::{Camera, EnvironmentSource, MeshSource, Scene
 use threadlight::{CustomEnvironment, CustomMesh};
 
 const MAP: [usize; 2] = [512, 256];
-
-/// A grey map of what is seen in each direction.
-fn map([width, height]: [usize; 2], radiance: impl Fn(DVec3) -> f64) -> EnvironmentSource {
-    let pixel = |i: usize| {
-        let phi = TAU * ((i % width) as f64 + 0.5) / width as f64;
-        let theta = PI * ((i / width) as f64 + 0.5) / height as f64;
-        [radiance(dvec3(theta.sin() * phi.sin(), theta.cos(), -theta.sin() * phi.cos())) as f32; 3]
-    };
-    CustomEnvironment::new("map", width, height, (0..width * height).map(pixel).collect()).unwrap().into()
-}
 
 /// So many squares of these pixels and radiance all around, in a dusk of 0.1.
 fn lamps(count: usize, side: usize, radiance: f32) -> EnvironmentSource {

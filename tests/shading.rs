@@ -1,12 +1,10 @@
 //! Pass 2 against its CPU twin, and against closed forms.
 mod common;
 
-use common::{EVERYTHING, Validated, analytic_materials, model, pixels, ready, sphere, texels_of};
+use common::{EVERYTHING, Validated, analytic_materials, map, model, pixels, ready, sphere, texels_of};
 use glam::{DVec3, UVec2, Vec3, Vec4};
 use rayon::prelude::*;
-use std::f32::consts::PI;
 use std::sync::Arc;
-use threadlight::Method;
 use threadlight::low_level::brdf::{Brdf, Custom, CustomBrdf};
 use threadlight::low_level::evaluate::reference::{ReferenceSettings, reference};
 use threadlight::low_level::evaluate::{Comparable, Display, compare};
@@ -16,11 +14,12 @@ use threadlight::low_level::passes::Counters;
 use threadlight::low_level::pipeline::{Rendering, Wanted};
 use threadlight::low_level::prepare::Prepared;
 use threadlight::low_level::scene::{
-    Background, Camera, MaterialSettings, MaterialSource, ObjectSettings, Scene, Source,
+    Background, Camera, EnvironmentSource, MaterialSettings, MaterialSource, ObjectSettings, Scene, Source,
 };
 use threadlight::low_level::shading;
 use threadlight::low_level::steps::LoadMaterial;
 use threadlight::low_level::threads::SplitSum;
+use threadlight::{CustomEnvironment, CustomMesh, Method};
 
 /// A rough metal by a program's own function.
 fn custom_metal() -> MaterialSource {
@@ -459,28 +458,33 @@ fn a_narrow_lobe_shows_a_lamp_with_dim_edges_as_the_reference_does() {
     gpu.finish();
 }
 
+/// A wall of a metal of Beckmann, 80 x 60 pixels, whose corners have these normals, or its own.
+fn wall(
+    metal: &str,
+    environment: EnvironmentSource,
+    normals: Option<Vec<[f32; 3]>>,
+    eye: DVec3,
+    fov_y_deg: f64,
+) -> Scene {
+    let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]].map(|[x, y]| [x, y, 0.0]);
+    let mesh = CustomMesh::new("wall", corners.into(), vec![[0, 1, 2], [0, 2, 3]], normals, None).unwrap();
+    let metal = model(&format!("model = 'conductor'\ndistribution = 'beckmann'\n{metal}"));
+    let mut scene = sphere(metal, "white", 16, (80, 60)).with_environment(environment).with_mesh(mesh);
+    scene.image.background = Background::None;
+    scene.camera = Some(Camera { eye, target: DVec3::ZERO, up: DVec3::Y, fov_y_deg });
+    scene
+}
+
 #[test]
 fn a_wide_lobe_with_steep_flanks_shows_a_lamp_beside_the_horizon_as_the_reference_does() {
     let gpu = Validated::new();
-    let folder = tempfile::tempdir().unwrap();
-    let [map, wall] = ["lamp.exr", "wall.obj"].map(|name| folder.path().join(name));
     // As an umbrella before a flash, to the left: in the light of its edge the wall is seen at a slant.
-    let texel = |(x, y): (u32, u32)| {
-        let (phi, theta) = (PI * (x as f32 + 0.5) / 128.0, PI * (y as f32 + 0.5) / 128.0);
-        let direction = Vec3::new(theta.sin() * phi.sin(), theta.cos(), -theta.sin() * phi.cos());
-        let away_deg = direction.angle_between(Vec3::new(-0.95, 0.1, 0.15)).to_degrees();
-        [if away_deg < 22.0 { 4.0 + 60.0 * (-(away_deg / 7.0).powi(2)).exp() } else { 0.02 }; 4]
-    };
-    let texels: Vec<_> = (0..128).flat_map(|y| (0..256).map(move |x| texel((x, y)))).collect();
-    threadlight::low_level::output::write_exr(&map, 256, 128, &texels, false, &Default::default()).unwrap();
-    let corners = "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nvn -1 -1 3\nvn 1 -1 3\nvn 1 1 3\nvn -1 1 3\n";
-    std::fs::write(&wall, format!("{corners}f 1//1 2//2 3//3 4//4\n")).unwrap();
-    let metal = model("model = 'conductor'\ndistribution = 'beckmann'\nalpha = 0.2\nmetal = 'Au'");
-    let mut scene = sphere(metal, "white", 16, (80, 60));
-    scene.objects[0].mesh = Source::File(wall);
-    scene.environment.source = Source::File(map);
-    scene.image.background = Background::None;
-    scene.camera = Some(Camera { eye: DVec3::new(2.2, 0.5, 1.6), target: DVec3::ZERO, up: DVec3::Y, fov_y_deg: 45.0 });
+    let umbrella = map([256, 128], |direction| {
+        let away_deg = direction.angle_between(DVec3::new(-0.95, 0.1, 0.15)).to_degrees();
+        if away_deg < 22.0 { 4.0 + 60.0 * (-(away_deg / 7.0).powi(2)).exp() } else { 0.02 }
+    });
+    let normals = vec![[-1.0, -1.0, 3.0], [1.0, -1.0, 3.0], [1.0, 1.0, 3.0], [-1.0, 1.0, 3.0]];
+    let scene = wall("alpha = 0.2\nmetal = 'Au'", umbrella, Some(normals), DVec3::new(2.2, 0.5, 1.6), 45.0);
     // 0.006 where flanks are as wide as they are seen along the normal, or four points lean to one side.
     let rms = rms_beside_reference(&gpu, &scene);
     println!("RMS {rms:.4}");
@@ -491,18 +495,10 @@ fn a_wide_lobe_with_steep_flanks_shows_a_lamp_beside_the_horizon_as_the_referenc
 #[test]
 fn a_flat_near_mirror_shows_all_that_a_pixel_sees_of_it() {
     let gpu = Validated::new();
-    let folder = tempfile::tempdir().unwrap();
-    let [map, wall] = ["checks.exr", "wall.obj"].map(|name| folder.path().join(name));
-    let texel = |(x, y): (u32, u32)| if (x / 16 + y / 16) % 2 == 0 { [1.0; 4] } else { [0.2, 0.1, 0.05, 1.0] };
-    let texels: Vec<_> = (0..256).flat_map(|y| (0..512).map(move |x| texel((x, y)))).collect();
-    threadlight::low_level::output::write_exr(&map, 512, 256, &texels, false, &Default::default()).unwrap();
-    std::fs::write(&wall, "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nf 1 2 3 4\n").unwrap();
-    let metal = model("model = 'conductor'\ndistribution = 'beckmann'\nalpha = 0.003\nmetal = 'Al'");
-    let mut scene = sphere(metal, "white", 16, (80, 60));
-    scene.objects[0].mesh = Source::File(wall);
-    scene.environment.source = Source::File(map);
-    scene.image.background = Background::None;
-    scene.camera = Some(Camera { eye: DVec3::new(0.3, 0.2, 2.2), target: DVec3::ZERO, up: DVec3::Y, fov_y_deg: 50.0 });
+    let texel = |(x, y): (u32, u32)| if (x / 16 + y / 16) % 2 == 0 { [1.0; 3] } else { [0.2, 0.1, 0.05] };
+    let texels = (0..256).flat_map(|y| (0..512).map(move |x| texel((x, y)))).collect();
+    let checks = CustomEnvironment::new("checks", 512, 256, texels).unwrap();
+    let scene = wall("alpha = 0.003\nmetal = 'Al'", checks.into(), None, DVec3::new(0.3, 0.2, 2.2), 50.0);
     // 0.013 where a pixel is one direction.
     let rms = rms_beside_reference(&gpu, &scene);
     println!("RMS {rms:.4}");

@@ -1,13 +1,15 @@
 //! What the tests that render have in common.
 #![allow(dead_code)]
-use glam::UVec2;
+use glam::{DVec3, UVec2, dvec3};
+use std::f64::consts::{PI, TAU};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
+use threadlight::CustomEnvironment;
 use threadlight::low_level::memo::{Memo, Round};
 use threadlight::low_level::pipeline::{DeviceScene, Rendering, Wanted};
 use threadlight::low_level::prepare::{Prepared, prepare};
-use threadlight::low_level::scene::{MaterialSettings, MaterialSource, Scene, Source};
+use threadlight::low_level::scene::{EnvironmentSource, MaterialSettings, MaterialSource, Scene, Source};
 use threadlight::low_level::shading::texels_of_pixel;
 use threadlight::low_level::vulkan::{Device, DeviceKind, Instance, Messages};
 
@@ -97,6 +99,16 @@ pub fn sphere(material: MaterialSource, environment: &str, threads: u32, (width,
     scene.shading.threads = Some(threads);
     (scene.image.width, scene.image.height) = (width, height);
     scene
+}
+
+/// A grey map of what is seen in each direction.
+pub fn map([width, height]: [usize; 2], radiance: impl Fn(DVec3) -> f64) -> EnvironmentSource {
+    let pixel = |i: usize| {
+        let phi = TAU * ((i % width) as f64 + 0.5) / width as f64;
+        let theta = PI * ((i / width) as f64 + 0.5) / height as f64;
+        [radiance(dvec3(theta.sin() * phi.sin(), theta.cos(), -theta.sin() * phi.cos())) as f32; 3]
+    };
+    CustomEnvironment::new("map", width, height, (0..width * height).map(pixel).collect()).unwrap().into()
 }
 
 pub fn ready(scene: &Scene) -> Prepared {
