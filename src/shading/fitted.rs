@@ -82,13 +82,7 @@ impl<'a> Lobe<'a> {
         let w_o = point.surface.view_direction();
         let mirror = point.surface.frame * Vec3::new(-w_o.x, -w_o.y, w_o.z);
         let (record, narrower) = (point.record(), w_o.z.max(MIN_COS_THETA_D as f32));
-        Self {
-            point,
-            w_o,
-            mirror,
-            width: narrower * record.lobe_width,
-            radius: narrower * record.lobe_radius,
-        }
+        Self { point, w_o, mirror, width: narrower * record.lobe_width, radius: narrower * record.lobe_radius }
     }
 
     /// Twin of `is_isotropic`.
