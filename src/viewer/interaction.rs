@@ -9,6 +9,7 @@ use super::keyboard;
 use super::latency::{Latency, Record};
 use super::latest_job::LatestJob;
 use super::loaded::Loaded;
+use super::making::Made;
 use super::measured::Measured;
 use super::orbit::{Bounds, Orbit, environment_turn_deg};
 use super::plots::Plotter;
@@ -68,7 +69,7 @@ pub struct Viewer {
     /// Where the cursor is in the window, in pixels; none while it is elsewhere.
     pub cursor: Option<[f64; 2]>,
     pub(super) loaded: Option<Loaded>,
-    pub(super) loading: LatestJob<Loaded>,
+    pub(super) loading: LatestJob<Made>,
     /// Makes what drafts need before there is one.
     pub(super) getting_ready: LatestJob<DeviceScene>,
     /// Keeps that for them.

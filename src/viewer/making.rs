@@ -1,10 +1,10 @@
 //! What the session asks for, made in the background: by drafts first where a parameter is dragged.
 use super::change::Change;
 use super::interaction::Viewer;
-use super::latest_job::Progress;
+use super::latest_job::{Progress, Task};
 use super::loaded::Loaded;
 use super::session::Edit;
-use crate::memo::{Memo, Round};
+use crate::memo::Round;
 use crate::pipeline::{DeviceScene, Wanted};
 use crate::prepare::{Prepared, can_draft, key_of, may_be_drafted, prepare, prepare_draft};
 #[cfg(feature = "hot-reload")]
@@ -18,9 +18,11 @@ const DRAFT_PATIENCE: Duration = Duration::from_millis(100);
 /// Threads are finished when nobody has asked for others for so long: what is dragged moves more often.
 const BEFORE_FINISHING: Duration = Duration::from_millis(100);
 
-/// Whether all files and names that `edit` brings in can be loaded. What could be is known by then.
-fn can_be_loaded(edit: &Edit, memo: &Memo) -> bool {
-    let round = memo.round(&());
+/// What was asked for; else why it cannot be, and those of the edits that were not shown yet which cannot be loaded.
+pub(super) type Made = Result<Loaded, (Error, Vec<Edit>)>;
+
+/// Whether all files and names that `edit` brings in can be loaded.
+fn can_be_loaded(edit: &Edit, round: &Round) -> bool {
     let environment = |source| round.ask(&LoadEnvironment(source)).is_ok();
     let material = |source| round.ask(&LoadMaterial(source)).is_ok();
     let mesh = |source| round.ask(&LoadMesh(source)).is_ok();
@@ -89,17 +91,32 @@ impl Viewer {
         self.getting_ready.cancel();
         let (device, memo) = (self.device.clone(), self.memo.clone());
         let (longest_side, change) = (self.longest_side, self.changes);
-        self.loading.request(move |task| {
+        self.load(move |task| {
             let loaded = |prepared, round: &Round| Loaded::new(&device, prepared, longest_side, round, key, change);
             if let Some(before) = before {
                 let round = memo.round(task);
                 if let Some(draft) = prepare_draft(&scene, &before, &round)? {
-                    task.publish(loaded(draft, &round)?);
+                    task.publish(Ok(loaded(draft, &round)?));
                     task.rest(BEFORE_FINISHING)?;
                 }
             }
             let round = memo.round(task);
             loaded(prepare(&scene, &round)?, &round)
+        });
+    }
+
+    /// Has `make` done in the background. Where that fails, so is finding out which edits are at fault: it may read large files again.
+    fn load(&self, make: impl FnOnce(&Task<Made>) -> Result<Loaded> + Send + 'static) {
+        let (memo, mut edits) = (self.memo.clone(), self.session.pending());
+        self.loading.request(move |task| {
+            Ok(make(task).map_err(|error| {
+                // One that is alone is taken back whatever is at fault.
+                if edits.len() > 1 {
+                    let round = memo.round(task);
+                    edits.retain(|edit| !can_be_loaded(edit, &round));
+                }
+                (error, edits)
+            }))
         });
     }
 
@@ -110,7 +127,7 @@ impl Viewer {
         let (key, change) = (key_of(&scene, &self.memo).ok(), self.changes);
         (self.requested, self.drafting_since) = (key, None);
         let (device, memo, longest_side) = (self.device.clone(), self.memo.clone(), self.longest_side);
-        self.loading.request(move |task| {
+        self.load(move |task| {
             Observer::begin(task, "shaders");
             let round = memo.round(task);
             let prepared = prepare(&scene, &round)?;
@@ -156,7 +173,7 @@ impl Viewer {
         while let Some(result) = self.loading.take() {
             is_new = true;
             let was_drafting = self.drafting_since.take().is_some();
-            match result {
+            match result.unwrap_or_else(|error| Err((error, Vec::new()))) {
                 Ok(loaded) => {
                     self.session.loaded(loaded.prepared.scene.clone(), loaded.change);
                     self.forget_errors(loaded.change);
@@ -169,25 +186,28 @@ impl Viewer {
                         self.save_finished(true);
                     }
                 }
-                Err(Error::Cancelled) => {}
-                Err(error) => {
-                    let memo = self.memo.clone();
-                    let taken_back = self.session.failed(|edit| !can_be_loaded(edit, &memo));
-                    if self.loaded.is_none() && taken_back.is_empty() {
-                        return Err(error);
-                    }
-                    self.history.forget(&taken_back);
-                    self.latency.failed();
-                    // Else what failed is what is wanted still, and would fail again.
-                    if !taken_back.is_empty() {
-                        self.go_back();
-                    }
-                    self.save_finished(!taken_back.is_empty());
-                    self.tell_error(&error);
-                }
+                Err((Error::Cancelled, _)) => {}
+                Err((error, cannot_be)) => self.take_back(error, &cannot_be)?,
             }
         }
         Ok(is_new)
+    }
+
+    /// What was asked for failed with `error`: the edits that `cannot_be` are taken back, or all if there are none of these.
+    fn take_back(&mut self, error: Error, cannot_be: &[Edit]) -> Result<()> {
+        let taken_back = self.session.failed(cannot_be);
+        if self.loaded.is_none() && taken_back.is_empty() {
+            return Err(error);
+        }
+        self.history.forget(&taken_back);
+        self.latency.failed();
+        // Else what failed is what is wanted still, and would fail again.
+        if !taken_back.is_empty() {
+            self.go_back();
+        }
+        self.save_finished(!taken_back.is_empty());
+        self.tell_error(&error);
+        Ok(())
     }
 
     /// Asks for what is left to be loaded after something was taken back.
@@ -218,6 +238,7 @@ impl Drop for Viewer {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::memo::Memo;
     use crate::scene::{MaterialSource, Scene, Source};
     use crate::vulkan::{Device, Instance};
     use std::sync::Arc;
@@ -259,6 +280,32 @@ mod tests {
         assert!(viewer.is_moving(false) && viewer.next_frame().is_some());
         std::thread::sleep(Duration::from_millis(200));
         assert!(!viewer.is_moving(false) && viewer.next_frame().is_none());
+    }
+
+    #[test]
+    fn what_cannot_be_loaded_is_known_when_a_failure_is_taken_whatever_becomes_of_the_files() {
+        let mut viewer = viewer(MaterialSource::Builtin("gold".to_owned()));
+        let folder = tempfile::tempdir().unwrap();
+        let [mesh, material] = ["good.obj", "broken.toml"].map(|name| folder.path().join(name));
+        std::fs::write(&mesh, "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+        std::fs::write(&material, "model = 'lambert'\nreflectance = 7").unwrap();
+        let mesh = Source::File(mesh);
+        viewer.change(&Change::Mesh(mesh.clone())).unwrap();
+        viewer.change(&Change::Material(MaterialSource::File(material))).unwrap();
+        let start = Instant::now();
+        let made = loop {
+            if let Some(made) = viewer.loading.take() {
+                break made.unwrap();
+            }
+            assert!(start.elapsed() < Duration::from_secs(60), "it has not failed");
+            std::thread::sleep(Duration::from_millis(1));
+        };
+        drop(folder);
+        let Err((error, cannot_be)) = made else { panic!("it was loaded") };
+        viewer.take_back(error, &cannot_be).unwrap();
+        let wanted = viewer.session.wanted();
+        assert_eq!((&wanted.objects[0].mesh, wanted.materials[0].name.as_str()), (&mesh, "gold"));
+        assert!(viewer.failures.len() == 1 && viewer.failures[0].contains("broken.toml"), "{:?}", viewer.failures);
     }
 
     #[test]

@@ -42,6 +42,11 @@ impl Session {
         &self.shown
     }
 
+    /// What was asked for and is not shown yet.
+    pub fn pending(&self) -> Vec<Edit> {
+        self.pending.iter().map(|(_, edit)| edit.clone()).collect()
+    }
+
     /// Whether something that is not shown yet names the file at `path`.
     pub fn asks_for(&self, path: &Path) -> bool {
         self.pending.iter().any(|(_, edit)| match edit {
@@ -101,9 +106,9 @@ impl Session {
 
     /// What was wanted cannot be: what is seen is wanted again, with the changes but those that `cannot_be`, or without any if none of them is
     /// at fault. The numbers of those that were taken back.
-    pub fn failed(&mut self, cannot_be: impl Fn(&Edit) -> bool) -> Vec<u64> {
+    pub fn failed(&mut self, cannot_be: &[Edit]) -> Vec<u64> {
         let before: Vec<_> = self.pending.iter().map(|(number, _)| *number).collect();
-        self.pending.retain(|(_, edit)| !cannot_be(edit));
+        self.pending.retain(|(_, edit)| !cannot_be.contains(edit));
         if self.pending.len() == before.len() {
             self.pending.clear();
         }
@@ -159,28 +164,22 @@ mod tests {
         assert_eq!(session.shown(), session.wanted());
     }
 
-    /// Whether it names a file that is broken.
-    fn is_broken(edit: &Edit) -> bool {
-        let name = |scene: &Scene| scene.objects[0].mesh.to_string();
-        match edit {
-            Edit::Change(Change::Mesh(mesh)) => mesh.to_string().contains("broken"),
-            Edit::Change(_) => false,
-            Edit::Scene(scene) => name(scene).contains("broken"),
-        }
+    fn broken_mesh() -> Change {
+        Change::Mesh(Source::File("broken.obj".into()))
     }
 
     #[test]
     fn what_cannot_be_loaded_changes_nothing() {
         let mut session = Session::new(Scene::default());
-        session.change(&Change::Mesh(Source::File("broken.obj".into())), 1).unwrap();
+        session.change(&broken_mesh(), 1).unwrap();
         session.change(&Change::Gamma(1.5), 2).unwrap();
-        assert_eq!(session.failed(is_broken), [1]);
+        assert_eq!(session.failed(&[Edit::Change(broken_mesh())]), [1]);
         let mut expected = Scene::default();
         expected.image.gamma = 1.5;
         assert_eq!((session.shown(), session.wanted()), (&expected, &expected));
         assert!(session.change(&Change::Exposure(f64::NAN), 3).is_err());
         assert_eq!((session.shown(), session.wanted()), (&expected, &expected));
-        assert!(session.failed(is_broken).is_empty(), "there is nothing to take back");
+        assert!(session.failed(&[Edit::Change(broken_mesh())]).is_empty(), "there is nothing to take back");
     }
 
     #[test]
@@ -189,19 +188,19 @@ mod tests {
         session.change(&material("copper"), 1).unwrap();
         session.change(&Change::Environment(Source::Builtin("sky".into())), 2).unwrap();
         let mut expected = session.wanted().clone();
-        session.change(&Change::Mesh(Source::File("broken.obj".into())), 3).unwrap();
+        session.change(&broken_mesh(), 3).unwrap();
         session.change(&Change::Method(Method::Paper), 4).unwrap();
         expected.shading.method = Method::Paper;
-        assert_eq!(session.failed(is_broken), [3]);
+        assert_eq!(session.failed(&[Edit::Change(broken_mesh())]), [3]);
         assert_eq!(session.wanted(), &expected);
         // Nor those before another scene, which is broken.
         let mut broken = Scene::default();
         broken.objects[0].mesh = Source::File("broken.obj".into());
-        session.replace(broken, 5);
-        assert_eq!(session.failed(is_broken), [5]);
+        session.replace(broken.clone(), 5);
+        assert_eq!(session.failed(&[Edit::Scene(Box::new(broken))]), [5]);
         assert_eq!(session.wanted(), &expected);
         // Where none of them is at fault, what is shown is wanted.
-        assert_eq!(session.failed(|_| false), [1, 2, 4]);
+        assert_eq!(session.failed(&[]), [1, 2, 4]);
         assert_eq!(session.wanted(), session.shown());
     }
 }
