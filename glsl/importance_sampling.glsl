@@ -7,8 +7,8 @@
 #include "circle.glsl"
 #include "pi.glsl"
 
-const uint SLICE_ROWS = 90;     // theta_o = row 90 deg / SLICE_ROWS
-const uint AZIMUTH_ROWS = 45;   // the same of each azimuth of an anisotropic BRDF
+const uint SLICE_ROWS = 91;     // theta_o = row 90 deg / (SLICE_ROWS - 1)
+const uint AZIMUTH_ROWS = 46;   // the same of each azimuth of an anisotropic BRDF
 const uint SLICE_RINGS = 96;    // theta_h = 90 deg x^2, x in steps of 1 / SLICE_RINGS
 const uint SLICE_AZIMUTHS = 64; // phi_h from -180 deg, against the view, or of an anisotropic BRDF against the tangent
 const uint AZIMUTHS_START = SLICE_RINGS + 1;
@@ -40,7 +40,7 @@ SliceRows slice_rows(Surface surface, Material material, vec3 w_o) {
     uint azimuths = material.threads.azimuth_count;
     bool is_anisotropic = HAS_TANGENTS != 0 && azimuths > 1;
     uint row_count = is_anisotropic ? AZIMUTH_ROWS : SLICE_ROWS;
-    float row = min(acute_angle(w_o.x, w_o.z, 1.0) * (float(row_count) / radians(90.0)), float(row_count - 1));
+    float row = min(acute_angle(w_o.x, w_o.z, 1.0) * (float(row_count - 1) / radians(90.0)), float(row_count - 1));
     uint below = uint(row);
     uint above = min(below + 1, row_count - 1);
     SliceRows rows = SliceRows(material.first_slice + below * SLICE_SIZE, material.first_slice + above * SLICE_SIZE,

@@ -294,9 +294,9 @@ struct Rows {
     float added_variance; // of the kernels, by the pixel's normals
 };
 
-// Rows stand at multiples of 90 degrees / row_count; beyond the last one it holds.
+// Rows stand evenly from 0 to 90 degrees.
 Rows rows_at(Surface surface, ThreadTable table) {
-    float row = min(surface.theta_o * (float(table.row_count) / radians(90.0)), float(table.row_count - 1));
+    float row = min(surface.theta_o * (float(table.row_count - 1) / radians(90.0)), float(table.row_count - 1));
     uint below = table.first + uint(row);
     uint above = below + uint(uint(row) + 1 < table.row_count);
     float t = fract(row);

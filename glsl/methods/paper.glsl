@@ -53,37 +53,30 @@ vec3 weighted_mean(WeightedSum sum) {
     return mix(sum.radiance / sum.weight, vec3(0.0), lessThanEqual(sum.weight, vec3(0.0)));
 }
 
-// Where a view lies among the rows, which stand at multiples of 90 degrees / row_count. Beyond the last one the view is held there.
+// Where a view lies among the rows, which stand evenly from 0 to 90 degrees.
 struct Rows {
     uint below;
     uint above;
     float t;
-    vec3 w_o; // of the view, in its shading frame
 };
 
-// No sine or cosine where there is another way: devices may err by 5e-4 there, and a narrow lobe tells.
 Rows rows_at(Surface surface, Material material) {
     float last = float(material.threads.row_count - 1);
-    float row = surface.theta_o * (float(material.threads.row_count) / radians(90.0));
-    vec3 w_o = view_direction(surface);
-    if (row > last) {
-        float theta_o = last * (radians(90.0) / float(material.threads.row_count));
-        w_o = vec3(sin(theta_o), 0.0, cos(theta_o));
-        row = last;
-    }
+    float row = min(surface.theta_o * (last / radians(90.0)), last);
     uint below = uint(row);
-    return Rows(below, min(below + 1, material.threads.row_count - 1), row - float(below), w_o);
+    return Rows(below, min(below + 1, material.threads.row_count - 1), row - float(below));
 }
 
 // The threads as published: row and frame follow the view.
 vec3 threads_following_view(Surface surface, Material material, Rows rows, Partition share) {
     uint below = row_start(material, rows.below);
     uint above = row_start(material, rows.above);
+    vec3 w_o = view_direction(surface);
     WeightedSum sum = WeightedSum(vec3(0.0), vec3(0.0));
     for (uint k = share.first; k < material.threads.count; k += share.stride) {
         vec4 between = mix(unpack_thread(below, k), unpack_thread(above, k), rows.t);
         float solid_angle_sr = lookup_solid_angle(surface, material, share, between.w);
-        add_term(sum, surface, material, surface.frame, normalize(between.xyz), rows.w_o, between.w, solid_angle_sr);
+        add_term(sum, surface, material, surface.frame, normalize(between.xyz), w_o, between.w, solid_angle_sr);
     }
     return weighted_mean(sum);
 }

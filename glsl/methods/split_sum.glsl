@@ -10,7 +10,7 @@ layout(set = 0, binding = 12, std430) readonly buffer SplitSums {
 
 #include "shared_sum.glsl"
 
-const uint SPLIT_SUM_ROWS = 90u;
+const uint SPLIT_SUM_ROWS = 91u;
 const float FINEST_ALPHA = 1.0 / 64.0;
 const float COARSEST_LEVEL = 6.0;
 
@@ -27,7 +27,7 @@ vec3 split_sum_albedo(uint first) {
 }
 
 vec3 estimate(Surface surface, Material material, uint first, uint stride) {
-    float row = min(surface.theta_o * (float(SPLIT_SUM_ROWS) / radians(90.0)), float(SPLIT_SUM_ROWS - 1));
+    float row = min(surface.theta_o * (float(SPLIT_SUM_ROWS - 1) / radians(90.0)), float(SPLIT_SUM_ROWS - 1));
     uint below = material.first_slice + 1 + 6 * uint(row);
     uint above = material.first_slice + 1 + 6 * min(uint(row) + 1, SPLIT_SUM_ROWS - 1);
     vec3 diffuse = mix(split_sum_albedo(below), split_sum_albedo(above), fract(row));

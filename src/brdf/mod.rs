@@ -90,6 +90,9 @@ pub trait Model: Sized {
     fn hash_content(&self, hasher: &mut blake3::Hasher);
 }
 
+/// The largest view angle: at 90 degrees f is 0. A renderer only meets it where an interpolated normal turns from the eye.
+pub const MAX_THETA_O_DEG: f64 = 89.99;
+
 /// Makes the modules, the enum and its dispatch from the table in models.rs.
 macro_rules! brdf_models {
     ($($name:ident => $Model:ident,)+) => {

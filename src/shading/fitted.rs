@@ -304,7 +304,7 @@ struct Rows {
 impl Rows {
     /// Twin of `rows_at`.
     fn at(surface: &Surface, threads: &FittedTable) -> Self {
-        let row = (surface.theta_o * (threads.rows as f32 / FRAC_PI_2)).min((threads.rows - 1) as f32);
+        let row = (surface.theta_o * ((threads.rows - 1) as f32 / FRAC_PI_2)).min((threads.rows - 1) as f32);
         let (below, t) = (row as usize, row.fract());
         let above = (below + 1).min(threads.rows - 1);
         if threads.azimuths == 1 {

@@ -74,7 +74,7 @@ impl<'a> SliceRows<'a> {
     /// Twin of `slice_rows`.
     pub(super) fn new(table: &'a SliceTable, w_o: Vec3, phi_o: Vec2) -> Self {
         let count = table.rows;
-        let position = (w_o.x.atan2(w_o.z) * (count as f32 / FRAC_PI_2)).min((count - 1) as f32);
+        let position = (w_o.x.atan2(w_o.z) * ((count - 1) as f32 / FRAC_PI_2)).min((count - 1) as f32);
         let below = position as usize;
         let rows = |azimuth: usize| {
             let rows = [below, (below + 1).min(count - 1)].map(|row| azimuth * count + row);

@@ -35,7 +35,6 @@ struct Rows {
     below: usize,
     above: usize,
     t: f32,
-    w_o: Vec3,
 }
 
 /// The point with the threads of its material.
@@ -57,14 +56,9 @@ impl Paper<'_> {
     fn rows_at(&self, surface: &Surface) -> Rows {
         let count = self.threads.rows;
         let last = (count - 1) as f32;
-        let mut row = surface.theta_o * (count as f32 / FRAC_PI_2);
-        let mut w_o = surface.view_direction();
-        if row > last {
-            let (sin, cos) = (last * (FRAC_PI_2 / count as f32)).sin_cos();
-            (row, w_o) = (last, Vec3::new(sin, 0.0, cos));
-        }
+        let row = (surface.theta_o * (last / FRAC_PI_2)).min(last);
         let below = row as usize;
-        Rows { below, above: (below + 1).min(count - 1), t: row - below as f32, w_o }
+        Rows { below, above: (below + 1).min(count - 1), t: row - below as f32 }
     }
 
     fn thread(&self, row: usize, k: usize) -> Vec4 {
@@ -91,10 +85,10 @@ impl Paper<'_> {
     }
 
     fn threads_following_view(&self, surface: &Surface, rows: &Rows) -> Vec3 {
-        let mut sum = WeightedSum::default();
+        let (mut sum, w_o) = (WeightedSum::default(), surface.view_direction());
         for k in self.partition() {
             let between = self.thread(rows.below, k).lerp(self.thread(rows.above, k), rows.t);
-            self.add_term(&mut sum, surface.frame, between.truncate().normalize(), rows.w_o, between.w);
+            self.add_term(&mut sum, surface.frame, between.truncate().normalize(), w_o, between.w);
         }
         sum.weighted_mean()
     }

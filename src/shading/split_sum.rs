@@ -12,7 +12,7 @@ pub(super) fn estimate(point: &Point) -> Vec3 {
     let surface = &point.surface;
     let split_sum = point.split_sum();
     let light = point.twin.light.prefiltered.as_ref().expect("the method looks prefiltered light up");
-    let row = (surface.theta_o * (ROWS as f32 / FRAC_PI_2)).min((ROWS - 1) as f32);
+    let row = (surface.theta_o * ((ROWS - 1) as f32 / FRAC_PI_2)).min((ROWS - 1) as f32);
     let [below, above] = [row as usize, (row as usize + 1).min(ROWS - 1)].map(|row| split_sum.albedos[row]);
     let [diffuse, specular] = [0, 1].map(|part| below[part].as_vec3().lerp(above[part].as_vec3(), row.fract()));
     let w_o = surface.view_direction();

@@ -11,7 +11,7 @@
 //! | ... | the rows, then the threads, see below |
 //! | 32 | BLAKE3 digest of everything before |
 //!
-//! Row r is for the view angle theta_o = r 90 deg / rows, in the frame whose z is the normal and in which w_o = (sin theta_o, 0,
+//! Row r is for the view angle theta_o = r 90 deg / (rows - 1), the last for 89.99 degrees, in the frame whose z is the normal and in which w_o = (sin theta_o, 0,
 //! cos theta_o). Colours are linear Rec. 709. Thread k of row r is the (r count + k)-th. Of an anisotropic BRDF there are as many rows for
 //! each of 19, 37 or 73 azimuths of w_o from the tangent, every 5 degrees; then those of the second azimuth follow those of the first. They
 //! are of the BRDF without its `rotation_deg`.
@@ -42,7 +42,7 @@ use crate::file_format;
 use crate::output::write_whole;
 
 /// Version of the file format and of the threads in it: to be raised when either changes, since caches depend on it.
-pub const FORMAT_VERSION: u32 = 24;
+pub const FORMAT_VERSION: u32 = 25;
 
 const MAGIC: &[u8; 8] = b"THREADS\0";
 const DIGEST_BYTES: usize = blake3::OUT_LEN;

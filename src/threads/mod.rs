@@ -16,7 +16,7 @@ use std::f64::consts::FRAC_PI_2;
 
 use glam::DVec3;
 
-use crate::brdf::{Brdf, LobeShape, MaterialRecord, luminance};
+use crate::brdf::{Brdf, LobeShape, MAX_THETA_O_DEG, MaterialRecord, luminance};
 use crate::error::{Error, Result};
 use crate::progress::Observer;
 
@@ -222,7 +222,7 @@ pub struct ThreadSettings {
 
 impl Default for ThreadSettings {
     fn default() -> Self {
-        Self { kind: ThreadKind::default(), count: ThreadKind::default().default_count(), rows: 90, seed: 0, sets: 1 }
+        Self { kind: ThreadKind::default(), count: ThreadKind::default().default_count(), rows: 91, seed: 0, sets: 1 }
     }
 }
 
@@ -245,13 +245,22 @@ impl ThreadSettings {
             return Err(Error::input("sets", problem, "use at least 1, and no more than threads"));
         }
         if self.rows == 0 {
-            return Err(Error::input("rows", "0 is not possible", "use at least 1; the paper uses 90"));
+            return Err(Error::input("rows", "0 is not possible", "use at least 1; 91 are a degree apart"));
         }
         Ok(())
     }
 }
 
-/// View angle of `row` of `rows` in radians.
+/// View angle of `row` of `rows` in radians: even steps from 0 to a right angle, where the last is
+/// [`MAX_THETA_O_DEG`], the largest there is.
 fn theta_o(row: usize, rows: usize) -> f64 {
-    row as f64 / rows as f64 * FRAC_PI_2
+    let right_angles = row as f64 / (rows - 1).max(1) as f64;
+    (right_angles * FRAC_PI_2).min(MAX_THETA_O_DEG.to_radians())
+}
+
+/// Where the view angle `theta_o` (radians) is among `rows`: the row below, the row above, and the part of the way between them.
+fn rows_around(theta_o: f64, rows: usize) -> (usize, usize, f64) {
+    let last = rows - 1;
+    let position = (theta_o / FRAC_PI_2 * last as f64).clamp(0.0, last as f64);
+    (position as usize, (position as usize + 1).min(last), position.fract())
 }

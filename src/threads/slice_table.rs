@@ -6,8 +6,8 @@ use super::azimuths::{View, azimuth_count};
 use super::slice::{Resolution, Slice};
 use crate::brdf::{Brdf, SeenBrdf};
 
-/// View angles of an isotropic BRDF: theta_o = row 90 deg / ROWS. `SLICE_ROWS` in glsl/importance_sampling.glsl.
-pub const ROWS: usize = 90;
+/// View angles of an isotropic BRDF: theta_o = row 90 deg / (ROWS - 1), the last 89.99 degrees. `SLICE_ROWS` in glsl/importance_sampling.glsl.
+pub const ROWS: usize = 91;
 /// Rings of the half vector: theta_h = 90 deg x^2, x in steps of 1 / RINGS. `SLICE_RINGS`.
 pub const RINGS: usize = Resolution::FULL.theta / MERGED;
 /// Azimuths of the half vector from -180 degrees. `SLICE_AZIMUTHS`.
@@ -22,7 +22,7 @@ const MERGED: usize = 2;
 const STEPS: f64 = (1 << 24) as f64;
 
 /// View angles of an anisotropic BRDF at each azimuth: fewer, since it needs 19 or more of these. `AZIMUTH_ROWS`.
-pub const AZIMUTH_ROWS: usize = 45;
+pub const AZIMUTH_ROWS: usize = 46;
 
 /// Row by row of the view angle: the CDF over rings, then ring by ring that over azimuths. All are multiples of 2^-24,
 /// as random numbers are, so a cell is drawn with exactly the probability that the numbers tell. 2.3 MB.

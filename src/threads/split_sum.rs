@@ -13,8 +13,8 @@ use super::slice::{Resolution, Slice};
 use super::theta_o;
 use crate::brdf::{Brdf, SeenBrdf, Tap, ggx_lobe};
 
-/// View angles: theta_o = row 90 deg / ROWS. `SPLIT_SUM_ROWS` in glsl/methods/split_sum.glsl.
-pub const ROWS: usize = 90;
+/// View angles: theta_o = row 90 deg / (ROWS - 1), the last 89.99 degrees. `SPLIT_SUM_ROWS` in glsl/methods/split_sum.glsl.
+pub const ROWS: usize = 91;
 
 /// View angles at which lights are answered.
 const FITTED_ROWS: [usize; 6] = [0, 20, 40, 55, 70, 80];
@@ -144,7 +144,7 @@ mod tests {
             let brdf = Brdf::from_parameters("plastic", parameters.parse().unwrap()).unwrap();
             let found = SplitSum::new(&brdf);
             assert!((0.6..1.5).contains(&(found.roughness_alpha / alpha)), "{alpha}: {}", found.roughness_alpha);
-            for row in [0, 45, 89] {
+            for row in [0, 45, 90] {
                 let [diffuse, specular] = found.albedos[row];
                 assert!((diffuse + specular).abs_diff_eq(brdf.albedo(theta_o(row, ROWS)), 1e-12));
                 assert!(diffuse.min_element() >= 0.0 && specular.min_element() >= 0.0, "{alpha} {row}");

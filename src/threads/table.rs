@@ -1,8 +1,9 @@
 //! The paper's threads as they are stored, uploaded and looked up. In shaders: glsl/threads/paper.glsl.
 use std::f32::consts::FRAC_PI_2 as FRAC_PI_2_F32;
-use std::f64::consts::FRAC_PI_2;
 
 use glam::{DVec3, Vec4, dvec3};
+
+use super::rows_around;
 
 /// One incident sample in the shading frame of its row.
 #[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
@@ -41,7 +42,7 @@ impl Sample {
     }
 }
 
-/// The threads of one material: `rows` x `count` samples. Row r is for theta_o = r 90 deg / rows.
+/// The threads of one material: `rows` x `count` samples. Row r is for theta_o = r 90 deg / (rows - 1), the last for 89.99 degrees.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ThreadTable {
     /// Number of view angles.
@@ -68,9 +69,7 @@ impl ThreadTable {
     /// phi would break where it wraps), pdfs by their logarithm: half-way between rows a white furnace is 2 to 3 times nearer
     /// to the albedo than with a linear blend (F4). Beyond the last row that row holds.
     pub fn interpolate(&self, theta_o: f64, thread: usize) -> (DVec3, f64) {
-        let position = (theta_o / FRAC_PI_2 * self.rows as f64).clamp(0.0, (self.rows - 1) as f64);
-        let (low, t) = (position as usize, position.fract());
-        let high = (low + 1).min(self.rows - 1);
+        let (low, high, t) = rows_around(theta_o, self.rows);
         interpolate(&self.row(low)[thread], &self.row(high)[thread], t)
     }
 

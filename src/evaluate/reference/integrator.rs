@@ -5,7 +5,7 @@ use super::cubature::Cubature;
 use super::light::{CellPlace, Light};
 use super::lobe::Lobe;
 use crate::Result;
-use crate::brdf::Brdf;
+use crate::brdf::{Brdf, MAX_THETA_O_DEG};
 use crate::environment::Environment;
 use crate::evaluate::metrics::Display;
 use crate::progress::Observer;
@@ -14,9 +14,6 @@ use crate::progress::Observer;
 const MOST_CELLS: usize = 1 << 18;
 /// After so many splits of a pixel's cells, well under a millisecond, the observer is asked: a pixel may take seconds.
 const SPLITS_A_LOOK: usize = 64;
-/// What the view angle is held below: at 90 degrees f is 0 and no slice is left. A renderer only meets it where an
-/// interpolated normal turns from the eye.
-pub const MAX_THETA_O_DEG: f64 = 89.99;
 /// What is left of a cell's error by splitting it: see the test that estimates are honest.
 const ERROR_LEFT: f64 = 0.5;
 /// Above display white, where display values no longer tell, linear radiance is held to 1/0.05 = 20 times the tolerance, relatively.

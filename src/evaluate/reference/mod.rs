@@ -38,7 +38,7 @@ mod step;
 mod tests;
 
 use integrator::rms;
-pub use integrator::{Integrator, MAX_THETA_O_DEG, PixelEstimate, Point};
+pub use integrator::{Integrator, PixelEstimate, Point};
 pub use progressive::{Estimate, Refinement, STAGES, progressive};
 pub use step::parse;
 

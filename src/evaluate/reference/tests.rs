@@ -4,7 +4,7 @@ use std::f64::consts::{FRAC_1_PI, PI, TAU};
 use glam::{DQuat, DVec2, DVec3, dvec3};
 
 use super::*;
-use crate::brdf::Brdf;
+use crate::brdf::{Brdf, MAX_THETA_O_DEG};
 use crate::environment::Environment;
 use crate::environment::tests::environment;
 

@@ -1,6 +1,5 @@
 //! Fitted threads as they are stored, uploaded and looked up: twelve bytes a thread and row, sixteen on the device. In shaders:
 //! glsl/threads/fitted.glsl.
-use std::f64::consts::FRAC_PI_2;
 
 use glam::{DVec3, Vec2, Vec3};
 use half::f16;
@@ -10,6 +9,7 @@ use crate::packing::{
     STEREOGRAPHIC_EXTENT, pack_snorm_2x16, stereographic_decode, stereographic_encode, unpack_snorm_2x16,
 };
 use crate::threads::azimuths::Azimuths;
+use crate::threads::{rows_around, theta_o};
 
 /// A kernel in three words: direction (its place on the stereographic map, 2 x 16 bits), level and red weight, green and blue weight (half floats).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
@@ -73,7 +73,8 @@ impl PackedKernel {
     }
 }
 
-/// The fitted threads of one material: `azimuths` x `rows` x `count` kernels. Row r of an azimuth is for theta_o = r 90 deg / rows.
+/// The fitted threads of one material: `azimuths` x `rows` x `count` kernels. Rows of an azimuth stand as
+/// those of a [`ThreadTable`](crate::threads::ThreadTable).
 #[derive(Clone, Debug, PartialEq)]
 pub struct FittedTable {
     /// Number of view angles.
@@ -124,9 +125,7 @@ impl FittedTable {
 
     /// The kernels for the view angle `theta_o` and its azimuth `phi_o` from the tangent (radians): between rows as shading has them.
     pub fn seen_from(&self, theta_o: f64, phi_o: f64) -> Vec<Kernel> {
-        let position = (theta_o / FRAC_PI_2 * self.rows as f64).clamp(0.0, (self.rows - 1) as f64);
-        let (low, t) = (position as usize, position.fract());
-        let high = (low + 1).min(self.rows - 1);
+        let (low, high, t) = rows_around(theta_o, self.rows);
         if self.azimuths == 1 {
             return all_between(&self.unpacked_row(low), &self.unpacked_row(high), t);
         }
@@ -143,7 +142,7 @@ impl FittedTable {
     /// Expected error relative to the radiance, RMS over rows as a sphere shows them: sin(theta_o) cos(theta_o) of its picture each.
     pub fn mean_relative_error(&self) -> f32 {
         let rows = self.relative_error.iter().enumerate().map(|(row, error)| {
-            let weight = (2.0 * crate::threads::theta_o(row % self.rows, self.rows)).sin() as f32;
+            let weight = (2.0 * theta_o(row % self.rows, self.rows)).sin() as f32;
             (weight, weight * error * error)
         });
         let (weights, squares) = rows.fold((0.0, 0.0), |(w, s), (weight, square)| (w + weight, s + square));
