@@ -53,9 +53,12 @@ pub struct LobeShape {
     pub long_axis: DVec2,
     /// The width, or where that is so small that it may be of a cusp, [`lobe_radius`] seen along the normal.
     pub radius_rad: f64,
-    /// The angle of the half vector to the normal, in radians, at which a Gaussian that falls to a thousandth where f does has fallen by e.
-    /// Across the long axis. 0 if flanks are not as steep as a Gaussian's, or have no foot.
+    /// The angle of the half vector to the normal, in radians, at which a Gaussian has fallen by e that falls as f does, as far as that is above
+    /// scattered light, to a thousandth or to as much as is scattered. Across the long axis. 0 if flanks are not as steep as a Gaussian's, or have no
+    /// foot.
     pub flank_rad: f64,
+    /// Whether such flanks end in the dark, not in scattered light.
+    pub is_dark_beyond: bool,
     /// Whether that width is but of a cusp on a wider lobe, as many measured tables have it: narrower than what kernels tell, and of little of
     /// what is reflected.
     pub is_cusp: bool,
@@ -68,10 +71,10 @@ impl LobeShape {
         let width = |azimuth| first_angle(|angle| is_off_peak(brdf, azimuth, angle));
         let width_rad = azimuths(is_isotropic).map(width).fold(FRAC_PI_2, f64::min);
         let (narrowness, long_axis) = if is_isotropic { (1.0, DVec2::X) } else { lobe_axes(brdf) };
-        let flank_rad = flank(brdf, long_axis.perp(), width_rad);
+        let (flank_rad, is_dark_beyond) = flank(brdf, long_axis.perp(), width_rad);
         let radius_rad = if width_rad < WIDEST_CUSP_RAD { lobe_radius(brdf, 0.0) } else { width_rad };
         let is_cusp = width_rad < CUSP_RAD && holds_little(brdf);
-        Self { is_isotropic, width_rad, narrowness, long_axis, radius_rad, flank_rad, is_cusp }
+        Self { is_isotropic, width_rad, narrowness, long_axis, radius_rad, flank_rad, is_dark_beyond, is_cusp }
     }
 
     /// The sine of the half vector's angle from which flanks are dark; 0 if there are none.
@@ -160,22 +163,37 @@ fn mass_within(brdf: &Brdf, theta_h: f64) -> f64 {
 /// Narrower lobes may be a cusp of little energy, as many measured tables have it, on the lobe itself.
 const WIDEST_CUSP_RAD: f64 = 0.004;
 
-/// Flanks end where f has fallen to this part of its peak.
+/// Flanks end where f has fallen to this part of its peak, or to as much as there is of scattered light.
 const FOOT: f64 = 1e-3;
 
-/// They are steep if they end within so many widths of the lobe. A Gaussian's do within 4.9, GGX's within 14.
-const STEEP_WITHIN: f64 = 8.0;
+/// Beside more scattered light, as a part of the peak, flanks are no matter.
+const MOST_SCATTERED: f64 = 0.05;
+
+/// f of scattered light changes by less than this part of it from one angle to the next, within this angle, in radians: beyond, diffuse bases have
+/// their horizon.
+const FLAT: f64 = 0.1;
+const WIDEST_FLAT_RAD: f64 = 0.35;
 
 /// Wider ones have no foot: f does not fall that far.
 const WIDEST_FLANK_RAD: f64 = 0.5;
 
-/// [`LobeShape::flank_rad`] of a lobe of this width, towards `azimuth`.
-fn flank(brdf: &Brdf, azimuth: DVec2, width_rad: f64) -> f64 {
-    let peak = profile(brdf, 0.0, azimuth, 0.0);
-    let foot = first_angle(|angle| profile(brdf, 0.0, azimuth, angle) < FOOT * peak);
-    // e^-(foot/flank)^2 = FOOT
-    let flank = foot / (-FOOT.ln()).sqrt();
-    if foot < STEEP_WITHIN * width_rad && flank < WIDEST_FLANK_RAD { flank } else { 0.0 }
+/// [`LobeShape::flank_rad`] of a lobe of this width, towards `azimuth`, and whether f falls to `FOOT` there.
+fn flank(brdf: &Brdf, azimuth: DVec2, width_rad: f64) -> (f64, bool) {
+    let profile = |angle: f64| profile(brdf, 0.0, azimuth, angle);
+    let change = |angle: f64| (profile(angle) / profile(STEP * angle) - 1.0).abs();
+    let beyond = angles().filter(|angle| (2.0 * width_rad..WIDEST_FLAT_RAD).contains(angle));
+    let flattest = beyond.min_by(|&a, &b| change(a).total_cmp(&change(b)));
+    let scattered = flattest.filter(|&angle| change(angle) < FLAT).map_or(0.0, profile);
+    let peak = profile(0.0);
+    let depth = FOOT.max(scattered / peak);
+    let foot = first_angle(|angle| profile(angle) - scattered < depth * peak);
+    // e^-(foot/flank)^2 = depth. Of GGX f falls to that at `slow` roughnesses.
+    let [fast, slow] = [(-depth.ln()).sqrt(), (1.0 / depth.sqrt() - 1.0).sqrt()];
+    let flank = foot / fast;
+    // Half way between both, in units of their widths: a Gaussian's is 0.536 of its flank, GGX's 0.393 of its roughness.
+    let is_steep = foot < (fast / 0.536 * slow / 0.393).sqrt() * width_rad;
+    let is_flank = is_steep && flank < WIDEST_FLANK_RAD && depth < MOST_SCATTERED;
+    (if is_flank { flank } else { 0.0 }, depth == FOOT)
 }
 
 /// Narrowness and long axis of an anisotropic lobe: exact for an ellipse, 1 / width^2 = A + B cos(2 (azimuth - that of the narrow axis)).
@@ -247,18 +265,24 @@ mod tests {
                 assert!((0.3..1.0).contains(&(width / alpha)), "{distribution} {alpha}: {width}");
             }
         }
-        // A Gaussian of slopes falls by e at its roughness; a wide one has no foot, GGX has no such flanks, and beside scattered light no lobe has.
-        for (parameters, expected) in [
-            ("distribution = 'beckmann'\nalpha = 0.02\neta = 0.2\nk = 3.9", 0.02),
-            ("distribution = 'beckmann'\nalpha_x = 0.3\nalpha_y = 0.01\neta = 0.2\nk = 3.9", 0.01),
-            ("distribution = 'beckmann'\nalpha = 0.2\neta = 0.2\nk = 3.9", 0.2),
-            ("distribution = 'beckmann'\nalpha = 0.5\neta = 0.2\nk = 3.9", 0.0),
-            ("distribution = 'ggx'\nalpha = 0.02\neta = 0.2\nk = 3.9", 0.0),
+        // A Gaussian of slopes falls by e at its roughness; a wide one has no foot, and GGX has no such flanks. cos^n falls by e at sqrt(2 / n).
+        let metal = "eta = 0.2\nk = 3.9";
+        for (model, parameters, expected, is_dark_beyond) in [
+            ("conductor", format!("distribution = 'beckmann'\nalpha = 0.02\n{metal}"), 0.02, true),
+            ("conductor", format!("distribution = 'beckmann'\nalpha_x = 0.3\nalpha_y = 0.01\n{metal}"), 0.01, true),
+            ("conductor", format!("distribution = 'beckmann'\nalpha = 0.2\n{metal}"), 0.2, true),
+            ("conductor", format!("distribution = 'beckmann'\nalpha = 0.5\n{metal}"), 0.0, true),
+            ("conductor", format!("distribution = 'ggx'\nalpha = 0.02\n{metal}"), 0.0, true),
+            ("ashikhmin_shirley", "exponent = 445\nspecular = 0.5\ndiffuse = 0".to_owned(), 0.067, true),
+            ("ashikhmin_shirley", "exponent = 445\nspecular = 0.5\ndiffuse = 0.2".to_owned(), 0.067, false),
+            ("ashikhmin_shirley", "exponent = 445\nspecular = 0.05\ndiffuse = 0.5".to_owned(), 0.0, false),
+            ("plastic", "distribution = 'ggx'\nalpha = 0.02\nior = 1.5\ndiffuse = 0.3".to_owned(), 0.0, false),
         ] {
-            let flank =
-                LobeShape::of(&Brdf::from_parameters("conductor", parameters.parse().unwrap()).unwrap()).flank_rad;
+            let lobe = LobeShape::of(&Brdf::from_parameters(model, parameters.parse().unwrap()).unwrap());
+            let flank = lobe.flank_rad;
             // One step of the angles that are tried.
             assert!((expected..=1.26 * expected).contains(&flank), "{parameters}: {flank}");
+            assert_eq!(lobe.is_dark_beyond, is_dark_beyond, "{parameters}");
         }
         // A lobe is found however much light is scattered beside it.
         let parameters = "distribution = 'ggx'\nalpha = 0.05\nior = 1.5\ndiffuse = 0.9";

@@ -19,7 +19,7 @@ const WIDE_UNDER_CUSP_RAD: f64 = 0.005;
 
 /// Earlier, rims of mirrored lamps are off in mirrors; later, lamps are in glossy plastics.
 const CLEAR: [f32; 2] = [1.25, 2.5];
-/// Steep flanks show the edges of lamps, which kernels know better than squares in the place of parts.
+/// Steep flanks that end in the dark show the edges of lamps, which kernels know better than squares in the place of parts.
 const CLEAR_OF_FLANKS: [f32; 2] = [2.5, 4.0];
 /// Wider ones are slight slopes to the parts of a lamp near the mirrored view: these are no wider than `WIDEST_WHOLE_RAD` in
 /// glsl/methods/fitted.glsl.
@@ -35,7 +35,8 @@ impl GivingWay {
     pub fn of(lobe: &LobeShape, table: &FittedTable) -> Self {
         let is_fitted = table.count >= MANY_KERNELS && lobe.radius_rad > WIDE_UNDER_CUSP_RAD;
         let sooner = (GOOD_ERROR / table.mean_relative_error()).sqrt().clamp(SOONEST, 1.0);
-        let clear = if lobe.flank_rad > 0.0 && lobe.flank_rad < WIDEST_STEEP_RAD { CLEAR_OF_FLANKS } else { CLEAR };
+        let is_steep = lobe.is_dark_beyond && lobe.flank_rad > 0.0 && lobe.flank_rad < WIDEST_STEEP_RAD;
+        let clear = if is_steep { CLEAR_OF_FLANKS } else { CLEAR };
         Self {
             lobe_radius_rad: if is_fitted { lobe.width_rad } else { lobe.radius_rad },
             clear: clear.map(|clearance| sooner * clearance),
@@ -81,7 +82,7 @@ mod tests {
         let steps = [0.0, 0.005, 0.01, 0.012, 0.015, 0.02, 0.5, f32::INFINITY].map(clear);
         assert!(steps.is_sorted_by(|a, b| a[0] >= b[0] && a[1] >= b[1]), "{steps:?}");
         assert_eq!([steps[0], steps[2]], [CLEAR; 2]);
-        let flanked = LobeShape { flank_rad: 0.01, ..lobe };
+        let flanked = LobeShape { flank_rad: 0.01, is_dark_beyond: true, ..lobe };
         let later = GivingWay::of(&flanked, &table(16, 0.0)).clear;
         assert!(later[0] > steps[0][0] && later[1] > steps[0][1], "beside steep flanks later: {later:?}");
         assert!(steps[4][1] < 2.1 && steps.iter().all(|clear| clear[0] >= 0.7 * CLEAR[0]), "{steps:?}");
