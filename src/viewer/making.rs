@@ -196,16 +196,17 @@ impl Viewer {
     /// What was asked for failed with `error`: the edits that `cannot_be` are taken back, or all if there are none of these.
     fn take_back(&mut self, error: Error, cannot_be: &[Edit]) -> Result<()> {
         let taken_back = self.session.failed(cannot_be);
-        if self.loaded.is_none() && taken_back.is_empty() {
+        // Else what failed is what is wanted still, and would fail again.
+        let is_another_wanted = !(taken_back.is_empty() && cannot_be.is_empty());
+        if self.loaded.is_none() && !is_another_wanted {
             return Err(error);
         }
         self.history.forget(&taken_back);
         self.latency.failed();
-        // Else what failed is what is wanted still, and would fail again.
-        if !taken_back.is_empty() {
+        if is_another_wanted {
             self.go_back();
         }
-        self.save_finished(!taken_back.is_empty());
+        self.save_finished(is_another_wanted);
         self.tell_error(&error);
         Ok(())
     }
@@ -306,6 +307,16 @@ mod tests {
         let wanted = viewer.session.wanted();
         assert_eq!((&wanted.objects[0].mesh, wanted.materials[0].name.as_str()), (&mesh, "gold"));
         assert!(viewer.failures.len() == 1 && viewer.failures[0].contains("broken.toml"), "{:?}", viewer.failures);
+    }
+
+    #[test]
+    fn what_has_taken_the_place_of_what_could_not_be_loaded_is_loaded() {
+        let mut viewer = viewer(MaterialSource::Builtin("gold".to_owned()));
+        let clay = MaterialSource::Builtin("clay".to_owned());
+        viewer.change(&Change::Material(clay)).unwrap();
+        let broken = Edit::Change(Change::Material(MaterialSource::File("broken.toml".into())));
+        viewer.take_back(Error::input("broken.toml", "is broken", "mend it"), &[broken]).unwrap();
+        assert_eq!(viewer.session.wanted().materials[0].name, "clay");
     }
 
     #[test]

@@ -104,12 +104,12 @@ impl Session {
         self.shown.environment.intensity = environment.intensity;
     }
 
-    /// What was wanted cannot be: what is seen is wanted again, with the changes but those that `cannot_be`, or without any if none of them is
-    /// at fault. The numbers of those that were taken back.
+    /// What was wanted cannot be: what is seen is wanted again, with the changes but those that `cannot_be`, or without any if there are none of
+    /// these. The numbers of those that were taken back: none where others have taken the place of what was at fault.
     pub fn failed(&mut self, cannot_be: &[Edit]) -> Vec<u64> {
         let before: Vec<_> = self.pending.iter().map(|(number, _)| *number).collect();
         self.pending.retain(|(_, edit)| !cannot_be.contains(edit));
-        if self.pending.len() == before.len() {
+        if cannot_be.is_empty() {
             self.pending.clear();
         }
         self.wanted = self.shown.clone();
@@ -199,8 +199,12 @@ mod tests {
         session.replace(broken.clone(), 5);
         assert_eq!(session.failed(&[Edit::Scene(Box::new(broken))]), [5]);
         assert_eq!(session.wanted(), &expected);
+        // One that has taken the place of what was at fault stays.
+        session.change(&material("gold"), 6).unwrap();
+        assert!(session.failed(&[Edit::Change(broken_mesh())]).is_empty());
+        assert_eq!(session.wanted().materials[0].name, "gold");
         // Where none of them is at fault, what is shown is wanted.
-        assert_eq!(session.failed(&[]), [1, 2, 4]);
+        assert_eq!(session.failed(&[]), [1, 2, 4, 6]);
         assert_eq!(session.wanted(), session.shown());
     }
 }
