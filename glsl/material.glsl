@@ -24,6 +24,7 @@ struct Material {
     vec2 clear;        // that of its threads: src/threads/fitted/giving_way.rs
     float lobe_radius; // lobe_radius_rad there
     float dark_from;   // that of the lobe: src/brdf/lobe.rs
+    vec4 narrowing;    // narrowing there
 };
 
 layout(set = 0, binding = 5, std430) readonly buffer Materials {

@@ -117,7 +117,9 @@ impl KernelNeeds {
         let mirrors = |(lobe, threads): &WithThreads| {
             let giving_way = threads.and_then(|threads| threads.giving_way(lobe));
             giving_way.is_some_and(|GivingWay { lobe_radius_rad, clear: [_, clear] }| {
-                let lobe_radius = (MIN_COS_THETA_D * lobe_radius_rad) as f32;
+                // At grazing views, where it is narrowest.
+                let narrower = MIN_COS_THETA_D * lobe.narrowing.iter().sum::<f64>().exp2();
+                let lobe_radius = (narrower * lobe_radius_rad) as f32;
                 sources.leaves().any(|source| clearance(0.0, source.width_rad() as f32, lobe_radius) < clear)
             })
         };

@@ -172,6 +172,10 @@ fn compare_with_twin(
     (interior, edge)
 }
 
+/// At grazing views it mirrors.
+const MATT_ALONG_ITS_NORMAL: &str =
+    "model = 'he_torrance'\ndiffuse = 0\nsigma_um = 0.3\ntau_um = 2.5\nspecular_alpha = 0.018\nmetal = 'Al'";
+
 #[test]
 fn lamps_of_many_sizes_are_shaded_as_by_the_cpu_twin() {
     let gpu = Validated::new();
@@ -195,6 +199,7 @@ fn lamps_of_many_sizes_are_shaded_as_by_the_cpu_twin() {
         ("narrow", "model = 'conductor'\ndistribution = 'beckmann'\nalpha = 0.005\nmetal = 'Cr'"),
         ("wide", "model = 'conductor'\ndistribution = 'ggx'\nalpha = 0.2\nmetal = 'Au'"),
         ("steep", "model = 'conductor'\ndistribution = 'beckmann'\nalpha = 0.05\nmetal = 'Al'"),
+        ("matt along its normal", MATT_ALONG_ITS_NORMAL),
     ] {
         // A lamp beside this lobe is seen by its foot, which falls by e with each part in 10^5 of the half vector's cosine.
         if name == "narrow" && !gpu.has_exact_functions() {
@@ -489,6 +494,23 @@ fn a_wide_lobe_with_steep_flanks_shows_a_lamp_beside_the_horizon_as_the_referenc
     let rms = rms_beside_reference(&gpu, &scene);
     println!("RMS {rms:.4}");
     assert!(rms < 0.002, "{rms}");
+    gpu.finish();
+}
+
+#[test]
+fn a_lobe_that_is_narrow_at_grazing_views_alone_shows_a_lamp_there_as_the_reference_does() {
+    let gpu = Validated::new();
+    // A lamp behind the sphere.
+    let lamp = map([256, 128], |direction| {
+        let away_deg = direction.angle_between(DVec3::new(-0.5, 0.2, -1.0)).to_degrees();
+        if away_deg < 16.0 { 10.0 } else { 0.1 }
+    });
+    let mut scene = sphere(model(MATT_ALONG_ITS_NORMAL), "white", 64, (80, 60)).with_environment(lamp);
+    scene.image.background = Background::None;
+    // 0.021 where its lobe is as wide there as along the normal.
+    let rms = rms_beside_reference(&gpu, &scene);
+    println!("RMS {rms:.4}");
+    assert!(rms < 0.004, "{rms}");
     gpu.finish();
 }
 

@@ -34,7 +34,7 @@ pub use base::{base_files, base_files_of, change_base_files, resolve_base_files}
 pub use coat::Coat;
 pub use custom::CustomBrdf;
 pub use ggx_lobe::{Tap, ggx_lobe};
-pub use lobe::{Ellipse, LobeShape, MIN_COS_THETA_D, half_vector_width, lobe_radius};
+pub use lobe::{Ellipse, LobeShape, MIN_COS_THETA_D, NARROWING_COSINES, half_vector_width, lobe_radius};
 pub use made_table::{MADE_TABLE_SIZE, MadeTable};
 pub use merl_export::merl_bytes;
 pub use microfacet::{Distribution, fresnel_conductor, fresnel_dielectric};

@@ -54,6 +54,8 @@ pub struct MaterialRecord {
     pub lobe_radius: f32,
     /// [`LobeShape::dark_from`].
     pub dark_from: f32,
+    /// [`LobeShape::narrowing`].
+    pub narrowing: [f32; 4],
 }
 
 impl MaterialRecord {
@@ -73,6 +75,7 @@ impl MaterialRecord {
             clear: [0.0; 2],
             lobe_radius: 0.0,
             dark_from: lobe.dark_from() as f32,
+            narrowing: lobe.narrowing.map(|step| step as f32),
         }
     }
 

@@ -1,10 +1,10 @@
 //! Fitted threads. Twin of glsl/methods/fitted.glsl, by functions of the same names.
 use std::f32::consts::{FRAC_PI_2, PI};
 
-use glam::{DVec3, IVec2, Mat3, Vec2, Vec3};
+use glam::{DVec3, IVec2, Mat3, Vec2, Vec3, Vec4};
 
 use super::{CpuShader, Point, Surface, smoothstep, turned};
-use crate::brdf::{MIN_COS_THETA_D, MaterialRecord};
+use crate::brdf::{MIN_COS_THETA_D, MaterialRecord, NARROWING_COSINES};
 use crate::environment::sources::clearance;
 use crate::environment::{LightMap, SourceRecord};
 use crate::light::{BlurredLight, finest_level};
@@ -81,7 +81,11 @@ impl<'a> Lobe<'a> {
     fn of(point: &'a Point) -> Self {
         let w_o = point.surface.view_direction();
         let mirror = point.surface.frame * Vec3::new(-w_o.x, -w_o.y, w_o.z);
-        let (record, narrower) = (point.record(), w_o.z.max(MIN_COS_THETA_D as f32));
+        let record = point.record();
+        let [a, b, c, d, e] = NARROWING_COSINES.map(|cosine| cosine as f32);
+        let (from, to) = (Vec4::new(a, b, c, d), Vec4::new(b, c, d, e));
+        let way = ((from - w_o.z) / (from - to)).clamp(Vec4::ZERO, Vec4::ONE);
+        let narrower = w_o.z.max(MIN_COS_THETA_D as f32) * Vec4::from(record.narrowing).dot(way).exp2();
         Self { point, w_o, mirror, width: narrower * record.lobe_width, radius: narrower * record.lobe_radius }
     }
 
