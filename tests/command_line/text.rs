@@ -50,7 +50,7 @@ fn threads_are_written_and_read_back_the_same() {
         }
         assert!(bytes(&folder, "a.threads") == bytes(&folder, "b.threads"), "{method}");
         let threads = threadlight::low_level::threads::read(&folder.path().join("a.threads")).unwrap();
-        assert_eq!((threads.kind().name(), threads.size()), (method, [90, 4]));
+        assert_eq!((threads.kind().name(), threads.size()), (method, [91, 4]));
         match threads {
             Threads::Fitted(table) | Threads::Gaussian(table) => assert_eq!(table.material, "gold"),
             Threads::Paper(table) => assert_eq!((table.material.as_str(), table.seed), ("gold", 3)),
