@@ -463,9 +463,9 @@ fn a_narrow_lobe_shows_a_lamp_with_dim_edges_as_the_reference_does() {
     gpu.finish();
 }
 
-/// A wall of a metal of Beckmann, 80 x 60 pixels, whose corners have these normals, or its own.
+/// A wall, 80 x 60 pixels, whose corners have these normals, or its own.
 fn wall(
-    metal: &str,
+    material: &str,
     environment: EnvironmentSource,
     normals: Option<Vec<[f32; 3]>>,
     eye: DVec3,
@@ -473,8 +473,7 @@ fn wall(
 ) -> Scene {
     let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]].map(|[x, y]| [x, y, 0.0]);
     let mesh = CustomMesh::new("wall", corners.into(), vec![[0, 1, 2], [0, 2, 3]], normals, None).unwrap();
-    let metal = model(&format!("model = 'conductor'\ndistribution = 'beckmann'\n{metal}"));
-    let mut scene = sphere(metal, "white", 16, (80, 60)).with_environment(environment).with_mesh(mesh);
+    let mut scene = sphere(model(material), "white", 16, (80, 60)).with_environment(environment).with_mesh(mesh);
     scene.image.background = Background::None;
     scene.camera = Some(Camera { eye, target: DVec3::ZERO, up: DVec3::Y, fov_y_deg });
     scene
@@ -489,7 +488,8 @@ fn a_wide_lobe_with_steep_flanks_shows_a_lamp_beside_the_horizon_as_the_referenc
         if away_deg < 22.0 { 4.0 + 60.0 * (-(away_deg / 7.0).powi(2)).exp() } else { 0.02 }
     });
     let normals = vec![[-1.0, -1.0, 3.0], [1.0, -1.0, 3.0], [1.0, 1.0, 3.0], [-1.0, 1.0, 3.0]];
-    let scene = wall("alpha = 0.2\nmetal = 'Au'", umbrella, Some(normals), DVec3::new(2.2, 0.5, 1.6), 45.0);
+    let metal = "model = 'conductor'\ndistribution = 'beckmann'\nalpha = 0.2\nmetal = 'Au'";
+    let scene = wall(metal, umbrella, Some(normals), DVec3::new(2.2, 0.5, 1.6), 45.0);
     // 0.006 where flanks are as wide as they are seen along the normal, or four points lean to one side.
     let rms = rms_beside_reference(&gpu, &scene);
     println!("RMS {rms:.4}");
@@ -523,12 +523,10 @@ fn what_is_seen_up_to_the_horizon_and_what_turns_from_the_eye_is_shaded_as_the_r
         let (sin, cos) = theta_o_deg.to_radians().sin_cos();
         [sin * (1.0 - 0.5 * y * y).sqrt(), sin * 0.5_f32.sqrt() * y, cos]
     });
-    let mut scene =
-        wall("alpha = 0.05\nmetal = 'Al'", bright_above, Some(normals.into()), DVec3::new(0.0, 0.0, 60.0), 1.9);
+    let plastic = "model = 'plastic'\ndistribution = 'ggx'\nalpha = 0.05\nior = 1.5\ndiffuse = 0.6";
+    let mut scene = wall(plastic, bright_above, Some(normals.into()), DVec3::new(0.0, 0.0, 60.0), 1.9);
     scene.image.subpixels = 1;
     // 0.010 where views beyond 89 degrees are taken for that.
-    scene.materials[0].source =
-        model("model = 'plastic'\ndistribution = 'ggx'\nalpha = 0.05\nior = 1.5\ndiffuse = 0.6");
     let rms = rms_beside_reference(&gpu, &scene);
     println!("RMS {rms:.4}");
     assert!(rms < 0.005, "{rms}");
@@ -541,7 +539,8 @@ fn a_flat_near_mirror_shows_all_that_a_pixel_sees_of_it() {
     let texel = |(x, y): (u32, u32)| if (x / 16 + y / 16) % 2 == 0 { [1.0; 3] } else { [0.2, 0.1, 0.05] };
     let texels = (0..256).flat_map(|y| (0..512).map(move |x| texel((x, y)))).collect();
     let checks = CustomEnvironment::new("checks", 512, 256, texels).unwrap();
-    let scene = wall("alpha = 0.003\nmetal = 'Al'", checks.into(), None, DVec3::new(0.3, 0.2, 2.2), 50.0);
+    let metal = "model = 'conductor'\ndistribution = 'beckmann'\nalpha = 0.003\nmetal = 'Al'";
+    let scene = wall(metal, checks.into(), None, DVec3::new(0.3, 0.2, 2.2), 50.0);
     // 0.013 where a pixel is one direction.
     let rms = rms_beside_reference(&gpu, &scene);
     println!("RMS {rms:.4}");

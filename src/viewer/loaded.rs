@@ -1,5 +1,6 @@
 //! What frames are made of.
-use crate::Result;
+use super::session::Edit;
+use crate::error::{Error, Result};
 use crate::memo::{Key, Round};
 use crate::pipeline::DeviceScene;
 use crate::prepare::{Prepared, view_of};
@@ -7,6 +8,9 @@ use crate::scene::Scene;
 use crate::vulkan::Device;
 use std::path::PathBuf;
 use std::sync::Arc;
+
+/// What was asked for; else why it cannot be, and those of the edits that were not shown yet which cannot be loaded.
+pub type Made = Result<Loaded, (Error, Vec<Edit>)>;
 
 /// All that a scene needs, on the device.
 #[derive(Clone)]

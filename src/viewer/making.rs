@@ -2,7 +2,7 @@
 use super::change::Change;
 use super::interaction::Viewer;
 use super::latest_job::{Progress, Task};
-use super::loaded::Loaded;
+use super::loaded::{Loaded, Made};
 use super::session::Edit;
 use crate::memo::Round;
 use crate::pipeline::{DeviceScene, Wanted};
@@ -17,9 +17,6 @@ use std::time::{Duration, Instant};
 const DRAFT_PATIENCE: Duration = Duration::from_millis(100);
 /// Threads are finished when nobody has asked for others for so long: what is dragged moves more often.
 const BEFORE_FINISHING: Duration = Duration::from_millis(100);
-
-/// What was asked for; else why it cannot be, and those of the edits that were not shown yet which cannot be loaded.
-pub(super) type Made = Result<Loaded, (Error, Vec<Edit>)>;
 
 /// Whether all files and names that `edit` brings in can be loaded.
 fn can_be_loaded(edit: &Edit, round: &Round) -> bool {
