@@ -110,8 +110,6 @@ fn errors_are_those_of_the_chapter_on_limits() {
         "model = 'principled'\nbase_colour = 0\nmetallic = 0\nroughness = 0.5\nsheen = 1\nsheen_roughness = 0.1";
     let aluminium = metal("Al", "alpha_x = 0.02\nalpha_y = 0.3");
     let line = || map(MAP, |direction| if direction.y.abs() < 0.01 { 25.0 } else { 0.1 });
-    // 2 x 2 pixels of each, as on a chessboard.
-    let chequered = map([8, 4], |d| if d.x * d.y * d.z > 0.0 { 1.0 } else { 0.1 });
     let studio = || EnvironmentSource::Builtin("studio".to_owned());
     println!("{:34}{:>8}{:>8}{:>7}", "case", "threads", "RMS", "most");
     let measure =
@@ -132,7 +130,6 @@ fn errors_are_those_of_the_chapter_on_limits() {
     measure("window and 1/300 of it, gold", &gold, window(1.0, 20.0, 30.0, 0.1), ball(), &few_and_many(0.02, 0.006));
     measure("window, sheen", sheen, window(1.0, 20.0, 1.0, 0.0), ball(), &[(16, 0.06), (48, 0.01)]);
     measure("studio, long lobe", &aluminium, studio(), ball(), &few_and_many(0.03, 0.01));
-    measure("8 x 4 pixels, gold", &gold, chequered, ball(), &few_and_many(0.02, 0.01));
     measure("studio, cube of porcelain", &porcelain, studio(), cube(), &few_and_many(0.04, 0.04));
     gpu.finish();
 }

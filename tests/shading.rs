@@ -534,6 +534,23 @@ fn what_is_seen_up_to_the_horizon_and_what_turns_from_the_eye_is_shaded_as_the_r
 }
 
 #[test]
+fn a_map_of_few_pixels_shows_in_a_narrow_lobe_as_the_reference_has_it() {
+    let gpu = Validated::new();
+    let metal = |alpha| model(&format!("model = 'conductor'\ndistribution = 'ggx'\nalpha = {alpha}\nmetal = 'Al'"));
+    let chequered = map([8, 4], |w| if w.x * w.y * w.z > 0.0 { 1.0 } else { 0.1 });
+    let tube = map([64, 32], |w| if (w.y / w.length() - 0.55).abs() < 0.05 && w.x > 0.0 { 60.0 } else { 0.1 });
+    // 0.0062 and 0.0031 where blurs and parts of lamps are no finer than these pixels.
+    for (light, alpha) in [(chequered, 0.15), (tube, 0.02)] {
+        let mut scene = sphere(metal(alpha), "white", 64, (80, 60)).with_environment(light);
+        scene.image.background = Background::None;
+        let rms = rms_beside_reference(&gpu, &scene);
+        println!("RMS {rms:.4}");
+        assert!(rms < 0.002, "{rms}");
+    }
+    gpu.finish();
+}
+
+#[test]
 fn a_flat_near_mirror_shows_all_that_a_pixel_sees_of_it() {
     let gpu = Validated::new();
     let texel = |(x, y): (u32, u32)| if (x / 16 + y / 16) % 2 == 0 { [1.0; 3] } else { [0.2, 0.1, 0.05] };

@@ -31,6 +31,10 @@ pub use vmf_pyramid::{BlurKernel, BlurStep, VmfPyramid, width_rad_of};
 
 file_formats!(Environment: hdr_file, exr_file);
 
+/// Columns and rows of a map that filters and small sources do well with. Where a map has fewer, lobes may be narrower than its pixels, and then
+/// than the finest blur and the parts of sources.
+const FEWEST: [usize; 2] = [128, 64];
+
 /// How many pixels of a picture were no radiance, by the worst that was wrong with each.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RepairCounts {
@@ -106,6 +110,22 @@ impl Environment {
         let kept = |(texel, is_source): (&[f32; 3], &bool)| if *is_source == of_sources { *texel } else { [0.0; 3] };
         let texels = self.texels.iter().zip(pixels).map(kept).collect();
         Self::new(self.name.clone(), self.width, self.height, texels, self.repaired)
+    }
+
+    /// The same light in more pixels, if it has fewer than [`FEWEST`] both ways: an odd number for each along each axis. What is bilinear
+    /// between the old centres is so between the new ones, of which some are the old, so [`Self::radiance`] stays what it is.
+    pub fn in_fine_pixels(self) -> Self {
+        let size = [self.width, self.height];
+        let is_even = || self.texels.iter().all(|texel| texel == &self.texels[0]);
+        if size[0] >= FEWEST[0] || size[1] >= FEWEST[1] || is_even() {
+            return self;
+        }
+        let times: [usize; 2] = std::array::from_fn(|axis| FEWEST[axis].div_ceil(size[axis]) | 1);
+        let [width, height] = std::array::from_fn(|axis| times[axis] * size[axis]);
+        let centre = |pixel: usize, axis: usize| (pixel as f64 + 0.5) / times[axis] as f64 - 0.5;
+        let radiance = |pixel: usize| self.radiance_at(centre(pixel % width, 0), centre(pixel / width, 1));
+        let texels = (0..width * height).map(|pixel| radiance(pixel).as_vec3().to_array()).collect();
+        Self::new(self.name, width, height, texels, self.repaired)
     }
 
     /// The radiance that arrives from `direction` (any length but 0): bilinear between pixel centres, wrapped in u,
@@ -248,6 +268,27 @@ pub(crate) mod tests {
         assert!((wrapped - DVec3::new(3.0, 2.0, 1.0)).length() < 1e-12);
         let pole = map.radiance(map.direction(3.0, -0.4));
         assert!((pole - DVec3::new(3.0, 0.0, 1.0)).length() < 1e-9);
+    }
+
+    #[test]
+    fn a_small_map_has_the_same_light_in_more_pixels() {
+        for (width, height) in [(1, 2), (3, 2), (7, 5), (64, 32), (127, 63), (1, 63)] {
+            let texel = |column: usize, row: usize| [0.1 + (column * 7 + row * 3) as f32 % 5.0, column as f32, 1e6];
+            let map = environment(width, height, texel);
+            let fine = map.clone().in_fine_pixels();
+            assert!(fine.width >= 128 && fine.height >= 64 && fine.texels.len() < 80_000, "{width} x {height}");
+            for i in 0..5000 {
+                let (column, row) = (f64::from(i) * 0.618 % 1.0, f64::from(i) / 5000.0);
+                let direction = map.direction(column * width as f64 - 0.5, row * height as f64 - 0.5);
+                let [expected, found] = [&map, &fine].map(|map| map.radiance(direction));
+                let error = (found - expected).abs() / expected.max(DVec3::ONE);
+                assert!(error.max_element() < 1e-6, "{width} x {height}, {direction}: {found} {expected}");
+            }
+        }
+        for (width, height, texel) in [(128, 1, 1.0), (1, 64, 1.0), (300, 150, 1.0), (8, 4, 0.0)] {
+            let map = environment(width, height, |column, row| [texel * (column + row) as f32; 3]);
+            assert_eq!(map.clone().in_fine_pixels().fingerprint(), map.fingerprint());
+        }
     }
 
     #[test]

@@ -83,7 +83,7 @@ impl Step for LoadBrushedMesh<'_> {
     }
 }
 
-/// Loads or makes an environment, without its turn and intensity.
+/// Loads or makes an environment, without its turn and intensity, in pixels that are fine enough to filter.
 pub struct LoadEnvironment<'a>(pub &'a EnvironmentSource);
 
 impl Step for LoadEnvironment<'_> {
@@ -107,6 +107,7 @@ impl Step for LoadEnvironment<'_> {
             // They share the pixels.
             Source::Custom(custom) => Ok(custom.environment().clone()),
         }
+        .map(Environment::in_fine_pixels)
     }
 }
 
