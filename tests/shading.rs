@@ -425,15 +425,18 @@ fn a_wide_lobe_has_one_sum_where_a_surface_is_too_curved_for_that_of_a_narrow_on
     gpu.finish();
 }
 
-/// RMS of what `scene`, 80 x 60 without a background, shows beside the reference.
-fn rms_beside_reference(gpu: &Validated, scene: &Scene) -> f64 {
-    let prepared = ready(scene);
+/// That what `scene`, 80 x 60, shows without a background errs beside the reference by an RMS of less than `most`.
+fn assert_near_reference(gpu: &Validated, mut scene: Scene, most: f64) {
+    scene.image.background = Background::None;
+    let prepared = ready(&scene);
     let rendering = gpu.render(&prepared, EVERYTHING);
     let settings = ReferenceSettings { tolerance: 1e-3, ..Default::default() };
     let truth = reference(&prepared, &gpu.device, &settings, &gpu.round()).unwrap();
     let [found, expected] = [&rendering.radiance, &truth.radiance]
         .map(|radiance| Comparable::from_radiance(80, 60, radiance, true, Display::default()));
-    compare(&found, &expected, true).unwrap().rms
+    let rms = compare(&found, &expected, true).unwrap().rms;
+    println!("RMS {rms:.4}");
+    assert!(rms < most, "{rms}");
 }
 
 #[test]
@@ -455,10 +458,8 @@ fn a_narrow_lobe_shows_a_lamp_with_dim_edges_as_the_reference_does() {
     ] {
         let mut scene = sphere(model(parameters), "white", 16, (80, 60));
         scene.environment.source = Source::File(map.clone());
-        scene.image.background = Background::None;
-        let rms = rms_beside_reference(&gpu, &scene);
-        println!("{name}: RMS {rms:.4}");
-        assert!(rms < most, "{name}: {rms}");
+        println!("{name}");
+        assert_near_reference(&gpu, scene, most);
     }
     gpu.finish();
 }
@@ -474,7 +475,6 @@ fn wall(
     let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]].map(|[x, y]| [x, y, 0.0]);
     let mesh = CustomMesh::new("wall", corners.into(), vec![[0, 1, 2], [0, 2, 3]], normals, None).unwrap();
     let mut scene = sphere(model(material), "white", 16, (80, 60)).with_environment(environment).with_mesh(mesh);
-    scene.image.background = Background::None;
     scene.camera = Some(Camera { eye, target: DVec3::ZERO, up: DVec3::Y, fov_y_deg });
     scene
 }
@@ -491,9 +491,7 @@ fn a_wide_lobe_with_steep_flanks_shows_a_lamp_beside_the_horizon_as_the_referenc
     let metal = "model = 'conductor'\ndistribution = 'beckmann'\nalpha = 0.2\nmetal = 'Au'";
     let scene = wall(metal, umbrella, Some(normals), DVec3::new(2.2, 0.5, 1.6), 45.0);
     // 0.006 where flanks are as wide as they are seen along the normal, or four points lean to one side.
-    let rms = rms_beside_reference(&gpu, &scene);
-    println!("RMS {rms:.4}");
-    assert!(rms < 0.002, "{rms}");
+    assert_near_reference(&gpu, scene, 0.002);
     gpu.finish();
 }
 
@@ -505,12 +503,9 @@ fn a_lobe_that_is_narrow_at_grazing_views_alone_shows_a_lamp_there_as_the_refere
         let away_deg = direction.angle_between(DVec3::new(-0.5, 0.2, -1.0)).to_degrees();
         if away_deg < 16.0 { 10.0 } else { 0.1 }
     });
-    let mut scene = sphere(model(MATT_ALONG_ITS_NORMAL), "white", 64, (80, 60)).with_environment(lamp);
-    scene.image.background = Background::None;
+    let scene = sphere(model(MATT_ALONG_ITS_NORMAL), "white", 64, (80, 60)).with_environment(lamp);
     // 0.021 where its lobe is as wide there as along the normal.
-    let rms = rms_beside_reference(&gpu, &scene);
-    println!("RMS {rms:.4}");
-    assert!(rms < 0.004, "{rms}");
+    assert_near_reference(&gpu, scene, 0.004);
     gpu.finish();
 }
 
@@ -527,9 +522,7 @@ fn what_is_seen_up_to_the_horizon_and_what_turns_from_the_eye_is_shaded_as_the_r
     let mut scene = wall(plastic, bright_above, Some(normals.into()), DVec3::new(0.0, 0.0, 60.0), 1.9);
     scene.image.subpixels = 1;
     // 0.010 where views beyond 89 degrees are taken for that.
-    let rms = rms_beside_reference(&gpu, &scene);
-    println!("RMS {rms:.4}");
-    assert!(rms < 0.005, "{rms}");
+    assert_near_reference(&gpu, scene, 0.005);
     gpu.finish();
 }
 
@@ -541,11 +534,8 @@ fn a_map_of_few_pixels_shows_in_a_narrow_lobe_as_the_reference_has_it() {
     let tube = map([64, 32], |w| if (w.y / w.length() - 0.55).abs() < 0.05 && w.x > 0.0 { 60.0 } else { 0.1 });
     // 0.0062 and 0.0031 where blurs and parts of lamps are no finer than these pixels.
     for (light, alpha) in [(chequered, 0.15), (tube, 0.02)] {
-        let mut scene = sphere(metal(alpha), "white", 64, (80, 60)).with_environment(light);
-        scene.image.background = Background::None;
-        let rms = rms_beside_reference(&gpu, &scene);
-        println!("RMS {rms:.4}");
-        assert!(rms < 0.002, "{rms}");
+        let scene = sphere(metal(alpha), "white", 64, (80, 60)).with_environment(light);
+        assert_near_reference(&gpu, scene, 0.002);
     }
     gpu.finish();
 }
@@ -559,9 +549,7 @@ fn a_flat_near_mirror_shows_all_that_a_pixel_sees_of_it() {
     let metal = "model = 'conductor'\ndistribution = 'beckmann'\nalpha = 0.003\nmetal = 'Al'";
     let scene = wall(metal, checks.into(), None, DVec3::new(0.3, 0.2, 2.2), 50.0);
     // 0.013 where a pixel is one direction.
-    let rms = rms_beside_reference(&gpu, &scene);
-    println!("RMS {rms:.4}");
-    assert!(rms < 0.005, "{rms}");
+    assert_near_reference(&gpu, scene, 0.005);
     gpu.finish();
 }
 
