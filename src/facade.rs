@@ -5,7 +5,7 @@ use crate::evaluate::reference::{ReferenceSettings, reference};
 use crate::memo::Memo;
 use crate::method::Method;
 use crate::output::{self, ExrHeader, Format};
-use crate::pipeline::{DeviceScene, Rendering, Wanted, check_image};
+use crate::pipeline::{DeviceScene, Rendering, Wanted, check_picture};
 use crate::prepare::{prepare, threads_of};
 use crate::progress::Observer;
 use crate::scene::{Background, CustomMesh, EnvironmentSource, ImageSettings, MaterialSource, MeshSource, Scene, mesh};
@@ -82,7 +82,7 @@ impl Renderer {
     /// # Errors
     /// As for [`Self::render`]; [`Error::Cancelled`](crate::Error::Cancelled).
     pub fn render_watched(&mut self, scene: &Scene, observer: &dyn Observer) -> Result<Picture> {
-        check_image(&self.device, &scene.image)?;
+        check_picture(&self.device, scene)?;
         for path in scene.files() {
             self.memo.look_again(&path);
         }

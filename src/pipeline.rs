@@ -2,11 +2,12 @@
 use crate::graph::{BufferHandle, Executable, FrameGraph, ImageHandle};
 use crate::light::finest_level;
 use crate::memo::{Held, Keyed, Round};
+use crate::method::Method;
 use crate::output::ExrHeader;
 use crate::passes::*;
 use crate::prepare::Prepared;
 use crate::progress::Observer;
-use crate::scene::{ImageSettings, Mesh};
+use crate::scene::{ImageSettings, Mesh, Scene};
 use crate::specialise::{ShadersOfMaterials, classify_constants};
 use crate::steps::{
     CheckDevice, CompileCompute, CompileGeometryCache, UploadBackground, UploadLight, UploadMaterials, UploadMesh,
@@ -272,12 +273,20 @@ pub(crate) fn check_size(device: &Device, view: &View) -> Result<()> {
     check_cache_size(device, view.cache_size())
 }
 
-/// The same for a picture of which nothing has been prepared yet.
+/// The same for the picture of a `scene` that has not been prepared yet.
 ///
 /// # Errors
-/// More sub-pixels along a side than images of `device` can have.
-pub fn check_image(device: &Device, image: &ImageSettings) -> Result<()> {
-    check_cache_size(device, [image.width, image.height].map(|side| side.saturating_mul(image.subpixels)))
+/// More sub-pixels along a side than images of `device` can have, or more pixels than its shaders can list at 4 bytes each.
+pub fn check_picture(device: &Device, Scene { image, shading, .. }: &Scene) -> Result<()> {
+    let &ImageSettings { width, height, subpixels, .. } = image;
+    check_cache_size(device, [width, height].map(|side| side.saturating_mul(subpixels)))?;
+    let most = device.limits().max_storage_buffer_range / 4;
+    // The reference draws the geometry cache alone.
+    if u64::from(width) * u64::from(height) <= most.into() || shading.method == Method::Reference {
+        return Ok(());
+    }
+    let problem = format!("is {width} x {height}, and shaders of this device list at most {most} pixels");
+    Err(Error::input("image size", problem, "use a smaller --size"))
 }
 
 fn check_cache_size(device: &Device, [width, height]: [u32; 2]) -> Result<()> {

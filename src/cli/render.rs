@@ -13,7 +13,7 @@ use threadlight::low_level::evaluate::reference::{self, Processor, ReferenceSett
 use threadlight::low_level::memo::{Memo, Step};
 use threadlight::low_level::method::Method;
 use threadlight::low_level::output::{self, Format};
-use threadlight::low_level::pipeline::{DeviceScene, Rendering, Wanted, check_image};
+use threadlight::low_level::pipeline::{DeviceScene, Rendering, Wanted, check_picture};
 use threadlight::low_level::prepare::prepare;
 use threadlight::low_level::progress::Observer;
 use threadlight::low_level::scene::Scene;
@@ -72,7 +72,7 @@ impl Render {
         let format = self.output.as_deref().map(Format::of).transpose()?;
         let scene = self.checked_scene()?;
         let (device, messages) = self.machine.open()?;
-        check_image(&device, &scene.image)?;
+        check_picture(&device, &scene)?;
         let memo = Memo::new(self.machine.cache().as_deref());
         // Closing what was made and the device is part of what validation checks.
         let rendered = self.render(&scene, format, &device, &memo)?;

@@ -48,9 +48,11 @@ fn numbers_out_of_range_name_the_flag_and_the_range() {
     refuses(&folder, "render --threads 129 -o out/image.png", &["threads", "129", "128", "fitted"]);
     let many = "render --method uniform --threads 9000 --subpixels 4 -o out/image.png";
     refuses(&folder, many, &["threads", "9000", "4062", "sub-pixels"]);
-    // More sub-pixels than an image of the device holds, though each flag is within its range. It is said before a material is asked for.
-    let large = "render --material unobtainium --size 16384x1 --subpixels 4 -o out/image.png";
-    refuses(&folder, large, &["65536 x 4", "--size"]);
+    // More sub-pixels than an image of the device holds, or more pixels than its shaders list, though each flag is within its range. It is said
+    // before a material is asked for.
+    let large = |size: &str| format!("render --material unobtainium {size} -o out/image.png");
+    refuses(&folder, &large("--size 16384x1 --subpixels 4"), &["65536 x 4", "--size"]);
+    refuses(&folder, &large("--size 16384x16384 --subpixels 1"), &["16384 x 16384", "--size"]);
 }
 
 #[test]
