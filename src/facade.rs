@@ -4,11 +4,11 @@ use crate::environment::{self, CustomEnvironment};
 use crate::evaluate::reference::{ReferenceSettings, reference};
 use crate::memo::Memo;
 use crate::method::Method;
-use crate::output::{self, ExrHeader, Format};
+use crate::output::ExrHeader;
 use crate::pipeline::{DeviceScene, Rendering, Wanted, check_picture};
 use crate::prepare::{prepare, threads_of};
 use crate::progress::Observer;
-use crate::scene::{Background, CustomMesh, EnvironmentSource, ImageSettings, MaterialSource, MeshSource, Scene, mesh};
+use crate::scene::{CustomMesh, EnvironmentSource, ImageSettings, MaterialSource, MeshSource, Scene, mesh};
 use crate::threads::{ThreadSettings, Threads};
 use crate::vulkan::{Device, Instance};
 use std::path::Path;
@@ -96,15 +96,7 @@ impl Renderer {
             self.last.insert(on_device).render(wanted, 1)?
         };
         let header = rendering.exr_header(&prepared, self.device_name());
-        let Rendering { radiance, display, .. } = rendering;
-        Ok(Picture {
-            width: prepared.view.width,
-            height: prepared.view.height,
-            has_alpha: scene.image.background == Background::None,
-            header,
-            radiance,
-            display,
-        })
+        Ok(Picture { image: scene.image.clone(), header, rendering })
     }
 
     /// The threads that pictures of a material have by default: a built-in, a file, or a [`Custom`](crate::Custom) BRDF. They are
@@ -131,28 +123,25 @@ impl Renderer {
 /// A rendered picture.
 #[derive(Clone, Debug)]
 pub struct Picture {
-    width: u32,
-    height: u32,
-    has_alpha: bool,
+    image: ImageSettings,
     header: ExrHeader,
-    radiance: Vec<[f32; 4]>,
-    display: Vec<u8>,
+    rendering: Rendering,
 }
 
 impl Picture {
     /// Columns and rows.
     pub fn size(&self) -> [u32; 2] {
-        [self.width, self.height]
+        [self.image.width, self.image.height]
     }
 
     /// Linear radiance times coverage, Rec. 709, and coverage: row by row from the top left.
     pub fn radiance(&self) -> &[[f32; 4]] {
-        &self.radiance
+        &self.rendering.radiance
     }
 
     /// As a display shows it: clamp(exposure L, 0, 1)^(1/gamma), 8 bits each of red, green, blue and alpha.
     pub fn display(&self) -> &[u8] {
-        &self.display
+        &self.rendering.display
     }
 
     /// Writes it: display values to a `.png`, linear radiance to an `.exr`.
@@ -160,13 +149,7 @@ impl Picture {
     /// # Errors
     /// Another extension, or a place that cannot be written to.
     pub fn save(&self, path: impl AsRef<Path>) -> Result<()> {
-        let path = path.as_ref();
-        match Format::of(path)? {
-            Format::Png => output::write_png(path, self.width, self.height, &self.display, self.has_alpha),
-            Format::Exr => {
-                output::write_exr(path, self.width, self.height, &self.radiance, self.has_alpha, &self.header)
-            }
-        }
+        self.rendering.write(path.as_ref(), &self.image, &self.header)
     }
 }
 

@@ -3,7 +3,7 @@ use crate::graph::{BufferHandle, Executable, FrameGraph, ImageHandle};
 use crate::light::finest_level;
 use crate::memo::{Held, Keyed, Round};
 use crate::method::Method;
-use crate::output::ExrHeader;
+use crate::output::{self, ExrHeader, Format};
 use crate::passes::*;
 use crate::prepare::Prepared;
 use crate::progress::Observer;
@@ -15,6 +15,7 @@ use crate::steps::{
 };
 use crate::vulkan::{Device, Frames, PassTime, Shader, compiled};
 use crate::{Error, Result};
+use std::path::Path;
 use std::sync::Arc;
 
 /// Which results of a frame are wanted; what none of them needs is not computed.
@@ -231,6 +232,19 @@ impl Rendering {
             device: self.way_around.map_or(device.to_owned(), |way| format!("{device}, by {}", way.name())),
             seconds: self.frame_ms * 1e-3,
             ..ExrHeader::default()
+        }
+    }
+
+    /// Writes the picture that `image` says, in the format that its name at `path` asks for: display values to a `.png`, linear radiance to an
+    /// `.exr` with this header.
+    ///
+    /// # Errors
+    /// Another extension, or a place that cannot be written to.
+    pub fn write(&self, path: &Path, image: &ImageSettings, header: &ExrHeader) -> Result<()> {
+        let &ImageSettings { width, height, .. } = image;
+        match Format::of(path)? {
+            Format::Png => output::write_png(path, width, height, &self.display, image.has_alpha()),
+            Format::Exr => output::write_exr(path, width, height, &self.radiance, image.has_alpha(), header),
         }
     }
 

@@ -79,7 +79,7 @@ impl Render {
         drop(device);
 
         if let Some(path) = &self.output {
-            rendered.write(path, format)?;
+            rendered.write(path)?;
         }
         let messages = messages.all();
         if let Some(path) = &self.stats {

@@ -3,11 +3,9 @@ use std::path::Path;
 use threadlight::Result;
 use threadlight::low_level::evaluate::reference::ReferenceImage;
 use threadlight::low_level::memo::{Asked, Origin};
-use threadlight::low_level::output::{self, Format};
 use threadlight::low_level::passes::WayAround;
 use threadlight::low_level::pipeline::Rendering;
 use threadlight::low_level::prepare::Prepared;
-use threadlight::low_level::scene::Background;
 
 /// All that a rendering leaves.
 pub struct Rendered {
@@ -24,19 +22,14 @@ pub struct Rendered {
 
 impl Rendered {
     /// Writes the picture.
-    pub fn write(&self, path: &Path, format: Option<Format>) -> Result<()> {
+    pub fn write(&self, path: &Path) -> Result<()> {
         let Self { prepared, rendering, .. } = self;
-        let (width, height) = (prepared.view.width, prepared.view.height);
-        let transparent = prepared.scene.image.background == Background::None;
-        if format != Some(Format::Exr) {
-            return output::write_png(path, width, height, &rendering.display, transparent);
-        }
         let mut header = rendering.exr_header(prepared, &self.device);
         if let Some(reference) = &self.reference {
             header.more.extend(reference.header());
         }
         header.more.extend(self.expected_rms.map(|rms| ("expected_rms".to_owned(), rms.to_string())));
-        output::write_exr(path, width, height, &rendering.radiance, transparent, &header)
+        rendering.write(path, &prepared.scene.image, &header)
     }
 }
 

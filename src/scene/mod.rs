@@ -367,6 +367,11 @@ impl ImageSettings {
     pub fn aspect(&self) -> f64 {
         f64::from(self.width) / f64::from(self.height)
     }
+
+    /// Whether files of the picture have an alpha channel: nothing is behind the objects.
+    pub fn has_alpha(&self) -> bool {
+        self.background == Background::None
+    }
 }
 
 impl Default for EnvironmentSettings {

@@ -10,7 +10,7 @@ use crate::output::{self, Format};
 use crate::passes::{Area, View};
 use crate::pipeline::{Wanted, check_size};
 use crate::prepare::view_of;
-use crate::scene::{Background, Scene};
+use crate::scene::Scene;
 use crate::vulkan::UiFrame;
 use crate::{Error, Result};
 use egui::TexturesDelta;
@@ -240,15 +240,8 @@ impl Viewer {
         check_size(&self.device, &renderer.view)?;
         let wanted = Wanted { radiance: format == Format::Exr, display: format == Format::Png, geometry: false };
         let rendering = renderer.render(wanted, 1)?;
-        let (width, height) = (renderer.view.width, renderer.view.height);
-        let alpha = scene.image.background == Background::None;
-        match format {
-            Format::Png => output::write_png(path, width, height, &rendering.display, alpha)?,
-            Format::Exr => {
-                let header = rendering.exr_header(&loaded.prepared, &self.device.description().name);
-                output::write_exr(path, width, height, &rendering.radiance, alpha, &header)?;
-            }
-        }
+        let header = rendering.exr_header(&loaded.prepared, &self.device.description().name);
+        rendering.write(path, &scene.image, &header)?;
         self.tell_saved(path);
         Ok(())
     }
