@@ -149,7 +149,8 @@ fn what_was_made_for_a_file_is_found_again_for_the_same_numbers_and_not_for_othe
 #[test]
 fn renderers_share_the_pixels_that_a_program_gave() {
     // Of a map that needs no more pixels.
-    let light = CustomEnvironment::new("light", 128, 64, vec![[1.0, 0.5, 0.2]; 128 * 64]).unwrap();
+    let pixels = (0..128 * 64).map(|i| [i as f32, 0.5, 0.2]).collect();
+    let light = CustomEnvironment::new("light", 128, 64, pixels).unwrap();
     let scene = scene(light.into(), mesh());
     let [first, second] = [&scene, &scene.clone()].map(|scene| ready(scene).environment);
     assert!(Arc::ptr_eq(&first.texels, &second.texels));
