@@ -14,16 +14,16 @@ struct Material {
     BrdfParameters parameters;
     uint model;        // position in src/brdf/models.rs
     uint first_slice;  // where its CDFs or its split sum start in the buffer of these
-    float lobe_width;  // half_vector_width in src/brdf/lobe.rs, in radians
+    float lobe_width;  // half_vector_width in src/brdf/lobe/mod.rs, in radians
     float narrowness;  // the lobe's width across its long axis over the one along it: 1 of an isotropic BRDF
     vec2 long_axis;    // of the lobe, from the tangent; across it the lobe has lobe_width
     ThreadTable threads;          // of a pixel whose sub-pixels share one sum
     ThreadTable subpixel_threads; // of each sub-pixel of another pixel
     float shared_deviation; // of normals, up to which sub-pixels share one sum where the view is along them: src/threads/fitted/sets.rs
-    float flank;       // flank_rad in src/brdf/lobe.rs
+    float flank;       // flank_rad in src/brdf/lobe/mod.rs
     vec2 clear;        // that of its threads: src/threads/fitted/giving_way.rs
     float lobe_radius; // lobe_radius_rad there
-    float dark_from;   // that of the lobe: src/brdf/lobe.rs
+    float dark_from;   // that of the lobe: src/brdf/lobe/mod.rs
     vec4 narrowing;    // narrowing there
 };
 

@@ -131,12 +131,12 @@ float least_clearance(Lobe lobe, Surface surface, Material material, float least
     return least;
 }
 
-// Twin: NARROWING_COSINES in src/brdf/lobe.rs.
+// Twin: NARROWING_COSINES in src/brdf/lobe/narrowing.rs.
 const vec4 NARROWING_FROM = vec4(1.0, 0.6, 0.4, 0.25);
 const vec4 NARROWING_TO = vec4(0.6, 0.4, 0.25, 0.1);
 
 // The lobe of what is seen: across the plane of incidence it is narrower by the cosine, and it may be another one at grazing views. Twin of the
-// bound: MIN_COS_THETA_D in src/brdf/lobe.rs.
+// bound: MIN_COS_THETA_D in src/brdf/lobe/mod.rs.
 Lobe lobe_of(Surface surface, Material material) {
     vec3 w_o = view_direction(surface);
     vec4 way = clamp((NARROWING_FROM - w_o.z) / (NARROWING_FROM - NARROWING_TO), 0.0, 1.0);

@@ -112,7 +112,7 @@ impl Environment {
         Self::new(self.name.clone(), self.width, self.height, texels, self.repaired)
     }
 
-    /// The same light in more pixels, if it has fewer than [`FEWEST`] are together: an odd number for each along an axis that has fewer. What is
+    /// The same light in more pixels, if it has fewer than `FEWEST` together: an odd number for each along an axis that has fewer. What is
     /// bilinear between the old centres is so between the new ones, of which some are the old, so [`Self::radiance`] stays what it is.
     pub fn in_fine_pixels(self) -> Self {
         let size = [self.width, self.height];
