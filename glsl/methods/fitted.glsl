@@ -27,27 +27,38 @@ bool is_isotropic(Material material) {
     return HAS_TANGENTS == 0 || material.threads.azimuth_count == 1;
 }
 
-// sin theta_h and cos theta_d of light from `direction`: of a long lobe theta_h is measured across it, with what is along it shortened by as
-// much as the lobe is long (F34).
-vec2 half_angles(Lobe lobe, Surface surface, Material material, vec3 direction) {
+// The length of x and y of a vector in the shading frame: of a long lobe what is along it is shortened by as much as it is long (F34).
+float across_lobe(vec2 w, Surface surface, Material material) {
+    if (is_isotropic(material)) {
+        return length(w);
+    }
+    w = turned(vec3(w, 0.0), surface.phi_o).xy;
+    vec2 axis = material.long_axis;
+    return length(vec2(dot(w, axis) * material.narrowness, dot(w, vec2(-axis.y, axis.x))));
+}
+
+// The half vector of light from `direction`, as far as it is in the tangent plane, and 2 cos theta_d.
+vec3 half_vector(Lobe lobe, Surface surface, vec3 direction) {
     vec3 h = direction * surface.frame + lobe.w_o;
     // Opposite directions have no half vector; 1e-6 is far below any other sum of two above the horizon.
     float twice_cos_theta_d = max(length(h), 1e-6);
-    vec2 sin_theta_h = h.xy / twice_cos_theta_d;
-    if (!is_isotropic(material)) {
-        sin_theta_h = turned(vec3(sin_theta_h, 0.0), surface.phi_o).xy;
-        vec2 axis = material.long_axis;
-        sin_theta_h = vec2(dot(sin_theta_h, axis) * material.narrowness, dot(sin_theta_h, vec2(-axis.y, axis.x)));
-    }
-    return vec2(length(sin_theta_h), 0.5 * twice_cos_theta_d);
+    return vec3(h.xy / twice_cos_theta_d, twice_cos_theta_d);
 }
 
-// How far `direction` is from the middle of the lobe, in radians; reflection doubles angles.
+// sin theta_h, across the lobe, and cos theta_d of light from `direction`.
+vec2 half_angles(Lobe lobe, Surface surface, Material material, vec3 direction) {
+    vec3 h = half_vector(lobe, surface, direction);
+    return vec2(across_lobe(h.xy, surface, material), 0.5 * h.z);
+}
+
+// How far `direction` is from the middle of the lobe, in radians. Reflection doubles angles, but across the plane of incidence, along y, light
+// moves by cos theta_o of that.
 float away_from(Lobe lobe, Surface surface, Material material, vec3 direction) {
     if (is_isotropic(material)) {
         return distance(direction, lobe.mirror);
     }
-    return 2.0 * half_angles(lobe, surface, material, direction).x;
+    vec3 h = half_vector(lobe, surface, direction);
+    return 2.0 * across_lobe(vec2(h.x, lobe.w_o.z * h.y), surface, material);
 }
 
 // How far a source is from where the BRDF cannot be taken at a few points of it, because it is mirrored towards the eye and wider than

@@ -94,18 +94,28 @@ impl<'a> Lobe<'a> {
         self.point.fitted_threads().is_some_and(|table| table.azimuths == 1)
     }
 
+    /// Twin of `across_lobe`.
+    fn across(&self, w: Vec2) -> f32 {
+        if self.is_isotropic() {
+            return w.length();
+        }
+        let record = self.point.record();
+        let w = turned(w.extend(0.0), self.point.surface.phi_o).truncate();
+        let axis = Vec2::from(record.long_axis);
+        Vec2::new(w.dot(axis) * record.narrowness, w.dot(axis.perp())).length()
+    }
+
+    /// Twin of `half_vector`.
+    fn half_vector(&self, direction: Vec3) -> (Vec2, f32) {
+        let h = self.point.surface.frame.transpose() * direction + self.w_o;
+        let twice_cos_theta_d = h.length().max(1e-6);
+        (h.truncate() / twice_cos_theta_d, twice_cos_theta_d)
+    }
+
     /// Twin of `half_angles`.
     fn half_angles(&self, direction: Vec3) -> [f32; 2] {
-        let (surface, record) = (&self.point.surface, self.point.record());
-        let h = surface.frame.transpose() * direction + self.w_o;
-        let twice_cos_theta_d = h.length().max(1e-6);
-        let mut sin_theta_h = h.truncate() / twice_cos_theta_d;
-        if !self.is_isotropic() {
-            sin_theta_h = turned(sin_theta_h.extend(0.0), surface.phi_o).truncate();
-            let axis = Vec2::from(record.long_axis);
-            sin_theta_h = Vec2::new(sin_theta_h.dot(axis) * record.narrowness, sin_theta_h.dot(axis.perp()));
-        }
-        [sin_theta_h.length(), 0.5 * twice_cos_theta_d]
+        let (h, twice_cos_theta_d) = self.half_vector(direction);
+        [self.across(h), 0.5 * twice_cos_theta_d]
     }
 
     /// Twin of `away_from`.
@@ -113,8 +123,8 @@ impl<'a> Lobe<'a> {
         if self.is_isotropic() {
             return direction.distance(self.mirror);
         }
-        let [sin_theta_h, _] = self.half_angles(direction);
-        2.0 * sin_theta_h
+        let (h, _) = self.half_vector(direction);
+        2.0 * self.across(Vec2::new(h.x, self.w_o.z * h.y))
     }
 
     /// Twin of `clearance_of`.
