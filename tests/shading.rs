@@ -509,10 +509,15 @@ fn a_lobe_that_is_narrow_at_grazing_views_alone_shows_a_lamp_there_as_the_refere
     gpu.finish();
 }
 
-/// The normal of a wall that faces the eye, so many degrees from it, with this part of it up.
-fn normal_beside_the_eye((theta_o_deg, y): (f32, f32)) -> [f32; 3] {
-    let (sin, cos) = theta_o_deg.to_radians().sin_cos();
-    [sin * (1.0 - 0.5 * y * y).sqrt(), sin * 0.5_f32.sqrt() * y, cos]
+/// A wall that faces the eye, with normals of its corners so many degrees from it, and this part of each up.
+fn wall_beside_the_eye(material: &str, environment: EnvironmentSource, corners: [(f32, f32); 4]) -> Scene {
+    let normals = corners.map(|(theta_o_deg, y)| {
+        let (sin, cos) = theta_o_deg.to_radians().sin_cos();
+        [sin * (1.0 - 0.5 * y * y).sqrt(), sin * 0.5_f32.sqrt() * y, cos]
+    });
+    let mut scene = wall(material, environment, Some(normals.into()), DVec3::new(0.0, 0.0, 60.0), 1.9);
+    scene.image.subpixels = 1;
+    scene
 }
 
 #[test]
@@ -520,10 +525,9 @@ fn what_is_seen_up_to_the_horizon_and_what_turns_from_the_eye_is_shaded_as_the_r
     let gpu = Validated::new();
     let bright_above = map([64, 32], |direction| (1.5 * direction.y).exp() + 0.3 * direction.x);
     // As interpolated normals of a coarse mesh: 87 to 97 degrees from the eye.
-    let normals = [(87.0, -1.0), (97.0, -0.6), (97.0, 0.6), (87.0, 1.0)].map(normal_beside_the_eye);
+    let corners = [(87.0, -1.0), (97.0, -0.6), (97.0, 0.6), (87.0, 1.0)];
     let plastic = "model = 'plastic'\ndistribution = 'ggx'\nalpha = 0.05\nior = 1.5\ndiffuse = 0.6";
-    let mut scene = wall(plastic, bright_above, Some(normals.into()), DVec3::new(0.0, 0.0, 60.0), 1.9);
-    scene.image.subpixels = 1;
+    let scene = wall_beside_the_eye(plastic, bright_above, corners);
     // 0.010 where views beyond 89 degrees are taken for that.
     assert_near_reference(&gpu, scene, 0.005);
     gpu.finish();
@@ -537,10 +541,9 @@ fn a_brushed_metal_shows_a_lamp_at_grazing_views_as_the_reference_does() {
         let away_deg = direction.angle_between(DVec3::new(0.17, 0.05, -0.98)).to_degrees();
         if away_deg < 5.0 { 60.0 } else { 0.1 }
     });
-    let normals = [(78.0, -1.0), (89.5, -0.6), (89.5, 0.6), (78.0, 1.0)].map(normal_beside_the_eye);
+    let corners = [(78.0, -1.0), (89.5, -0.6), (89.5, 0.6), (78.0, 1.0)];
     let metal = "model = 'conductor'\ndistribution = 'ggx'\nalpha_x = 0.28\nalpha_y = 0.06\nmetal = 'Al'";
-    let mut scene = wall(metal, lamp, Some(normals.into()), DVec3::new(0.0, 0.0, 60.0), 1.9);
-    scene.image.subpixels = 1;
+    let scene = wall_beside_the_eye(metal, lamp, corners);
     // 0.076 where the lamp is as far from a lobe across the plane of incidence as along it.
     assert_near_reference(&gpu, scene, 0.04);
     gpu.finish();
