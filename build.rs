@@ -11,7 +11,7 @@ use std::{env, fs};
 macro_rules! brdf_models {
     ($($name:ident => $model:ident),* $(,)?) => { const BRDF_MODELS: &[&str] = &[$(stringify!($name)),*]; };
 }
-include!("src/brdf/models.rs");
+include!("src/brdf/models/table.rs");
 
 #[cfg(not(feature = "shaderc-from-source"))]
 #[path = "src/vulkan/glslc.rs"]
@@ -19,7 +19,7 @@ mod glslc;
 
 fn main() {
     println!("cargo:rerun-if-changed=glsl");
-    println!("cargo:rerun-if-changed=src/brdf/models.rs");
+    println!("cargo:rerun-if-changed=src/brdf/models/table.rs");
     println!("cargo:rerun-if-env-changed=GLSLC");
     let out = PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets OUT_DIR"));
     let glsl = Path::new("glsl");
@@ -91,7 +91,7 @@ fn recipe(recipes: &mut String, source: &Path, name: &str, includes: &[&Path]) {
 
 /// GLSL that includes every model and picks one by its id; models that no material of a scene uses are compiled out.
 fn brdf_switch() -> String {
-    let mut glsl = String::from("// Generated from src/brdf/models.rs.\n");
+    let mut glsl = String::from("// Generated from src/brdf/models/table.rs.\n");
     for name in BRDF_MODELS.iter().filter(|name| has_twin(name)) {
         let _ = writeln!(glsl, "#include \"brdf/{name}.glsl\"");
     }

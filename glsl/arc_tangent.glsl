@@ -7,7 +7,7 @@
 const float HALF_PI = 1.57079633;
 
 // The angle in [0, 90 degrees] of tangent y / x, neither negative, in a triangle of this hypotenuse; 0 if all are 0. Twin of that name in
-// src/brdf/merl.rs. An arc tangent, since cosines have no digits left near 0.
+// src/brdf/models/merl.rs. An arc tangent, since cosines have no digits left near 0.
 float acute_angle(float y, float x, float hypotenuse) {
     // tan(a / 2) = sin a / (1 + cos a): at most tan(22.5 degrees). The smallest normal number stands in for 0, to divide by.
     float tangent = min(y, x) / max(max(y, x) + hypotenuse, 1.2e-38);

@@ -12,7 +12,7 @@ struct ThreadTable {
 
 struct Material {
     BrdfParameters parameters;
-    uint model;        // position in src/brdf/models.rs
+    uint model;        // position in src/brdf/models/table.rs
     uint first_slice;  // where its CDFs or its split sum start in the buffer of these
     float lobe_width;  // half_vector_width in src/brdf/lobe/mod.rs, in radians
     float narrowness;  // the lobe's width across its long axis over the one along it: 1 of an isotropic BRDF

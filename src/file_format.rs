@@ -21,9 +21,9 @@ pub struct FileFormat<T: 'static> {
 
 /// Declares the modules of formats, and `FORMATS`, the list of them: an entry each.
 macro_rules! file_formats {
-    ($T:ty: $($module:ident),+ $(,)?) => {
+    ($visibility:vis $T:ty: $($module:ident),+ $(,)?) => {
         $(mod $module;)+
-        const FORMATS: &[crate::file_format::FileFormat<$T>] = &[$($module::FORMAT),+];
+        $visibility const FORMATS: &[crate::file_format::FileFormat<$T>] = &[$($module::FORMAT),+];
     };
 }
 pub(crate) use file_formats;

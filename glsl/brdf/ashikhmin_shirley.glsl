@@ -1,4 +1,4 @@
-// Ashikhmin and Shirley's anisotropic Phong. Twin of src/brdf/ashikhmin_shirley.rs.
+// Ashikhmin and Shirley's anisotropic Phong. Twin of src/brdf/models/ashikhmin_shirley.rs.
 // a.rgb: 28 / (23 pi) diffuse (1 - specular), a.w: exponent along x; b.rgb: specular, b.w: exponent along y;
 // c.x: sqrt((n_x + 1) (n_y + 1)) / (8 pi).
 #include "parameters.glsl"

@@ -1,4 +1,4 @@
-// Blinn-Phong, f = diffuse / pi + specular c_n (n . h)^n. Twin of src/brdf/blinn_phong.rs.
+// Blinn-Phong, f = diffuse / pi + specular c_n (n . h)^n. Twin of src/brdf/models/blinn_phong.rs.
 // a.rgb: diffuse, a.w: exponent n; b.rgb: specular, b.w: normalisation c_n.
 #include "log_one_minus.glsl"
 #include "parameters.glsl"

@@ -1,4 +1,4 @@
-// Rough metal: f = F D G / (4 cos_theta_i cos_theta_o). Twin of src/brdf/conductor.rs.
+// Rough metal: f = F D G / (4 cos_theta_i cos_theta_o). Twin of src/brdf/models/conductor.rs.
 // a.rgb: eta; b.rgb: k, b.w: distribution (0 GGX, 1 Beckmann);
 // c.x, c.y: roughness_alpha along x, the tangent, and along y.
 #include "parameters.glsl"

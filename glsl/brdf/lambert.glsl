@@ -1,4 +1,4 @@
-// Lambert: f = reflectance / pi. Twin of src/brdf/lambert.rs. a.rgb: reflectance.
+// Lambert: f = reflectance / pi. Twin of src/brdf/models/lambert.rs. a.rgb: reflectance.
 #include "parameters.glsl"
 #include "pi.glsl"
 

@@ -1,4 +1,4 @@
-// MERL: a measured table over half and difference angles. Twin of src/brdf/merl.rs.
+// MERL: a measured table over half and difference angles. Twin of src/brdf/models/merl.rs.
 // a.x, a.y: y and z offset of this table in the atlas of all tables, in texels; a.z: what a texel of 1 stands for.
 //
 // The including shader defines `vec4 brdf_table_texel(vec3 texel_coordinate)`: a trilinear fetch from the atlas at a position

@@ -1,4 +1,4 @@
-// Microfacet distributions, shadowing and Fresnel reflectance. Twin of src/brdf/microfacet.rs, which cites the equations.
+// Microfacet distributions, shadowing and Fresnel reflectance. Twin of src/brdf/microfacet/mod.rs, which cites the equations.
 #ifndef MICROFACET_GLSL
 #define MICROFACET_GLSL
 #include "pi.glsl"

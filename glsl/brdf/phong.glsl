@@ -1,4 +1,4 @@
-// Phong, f = diffuse / pi + specular (n + 2) / (2 pi) (r . w_o)^n. Twin of src/brdf/phong.rs.
+// Phong, f = diffuse / pi + specular (n + 2) / (2 pi) (r . w_o)^n. Twin of src/brdf/models/phong.rs.
 // a.rgb: diffuse, a.w: exponent n; b.rgb: specular, b.w: (n + 2) / (2 pi).
 #include "log_one_minus.glsl"
 #include "parameters.glsl"

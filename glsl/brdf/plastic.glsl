@@ -1,4 +1,4 @@
-// Plastic: a rough dielectric coat on a diffuse base. Twin of src/brdf/plastic.rs, which says why this base.
+// Plastic: a rough dielectric coat on a diffuse base. Twin of src/brdf/models/plastic.rs, which says why this base.
 // a.rgb: diffuse / (1 - mean F); b.x: ior, b.y: distribution (0 GGX, 1 Beckmann);
 // c.x, c.y: roughness_alpha along x, the tangent, and along y.
 #include "parameters.glsl"

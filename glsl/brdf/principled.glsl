@@ -1,4 +1,4 @@
-// glTF's metallic-roughness under a clear coat. Twin of src/brdf/principled.rs without sheen.
+// glTF's metallic-roughness under a clear coat. Twin of src/brdf/models/principled.rs without sheen.
 // a.rgb: base colour, a.w: metallic; b.x: f0 of dielectrics; b.y: weight of the coat, b.z: its roughness_alpha, b.w: its f0;
 // c.x, c.y: roughness_alpha along x, the tangent, and along y.
 #include "parameters.glsl"

@@ -1,4 +1,4 @@
-// A table over tan(theta_h / 2), tan(theta_d / 2) and |cos phi_d|. Twin of src/brdf/tabulated.rs, which says why these.
+// A table over tan(theta_h / 2), tan(theta_d / 2) and |cos phi_d|. Twin of src/brdf/models/tabulated.rs, which says why these.
 // a.x: nodes along |cos phi_d|, less 1; a.y, a.z: nodes per doubling of 1 - tan(theta_d / 2) and of tan(theta_h / 2); a.w: twice what a texel of 1 stands for;
 // b.x, b.y: reciprocals of the two knees; b.z, b.w: y and z offset of the table in the atlas, in texels;
 // c.x: 0, or if f is not reciprocal, how far behind the table that for light nearer to the normal than the view lies, in texels.

@@ -1,4 +1,4 @@
-// A table over half and difference vectors. Twin of src/brdf/tabulated_anisotropic.rs, which says why these.
+// A table over half and difference vectors. Twin of src/brdf/models/tabulated_anisotropic.rs, which says why these.
 // a.xy: long axis of the lobe, from the tangent; a.z, a.w: nodes per doubling of h_x and h_y; b.x, b.y: reciprocals of their knees;
 // b.z, b.w: y and z offset of the table in the atlas, in texels;
 // c.x: 0, or if f is not reciprocal, how far behind the table that for negative d_y lies, in texels;

@@ -1,4 +1,7 @@
-//! BRDFs: one file per model (the CPU form, in double precision, is the truth; its GLSL twin is glsl/brdf/).
+//! BRDFs. The CPU form, in double precision, is the truth; where shaders have it too, its GLSL twin is in glsl/brdf.
+//!
+//! A model is a file of `models`, a format of material files one of `files`. What a fit and shaders ask of any BRDF is here: how narrow its
+//! lobe is (`lobe`), which symmetries it has, its table on the device, its record.
 //!
 //! Shading frame (conventions of the whole project): z is the normal, `w_i` points to the light, `w_o` to the eye, both
 //! unit. `f` is in 1/sr, without the cosine, and 0 where either cosine is not positive. x is the tangent: an anisotropic BRDF depends on
@@ -9,150 +12,38 @@ use std::path::Path;
 use glam::{DVec2, DVec3, dvec3};
 
 use crate::error::{Error, Result};
-use crate::file_format::{self, FileKind, file_formats};
+use crate::file_format::{self, FileKind};
 
-mod base;
 mod builtin;
-mod coat;
-mod ggx_lobe;
-mod interreflection;
+mod files;
 mod lobe;
 mod made_table;
-mod merl_export;
-mod metals;
 mod microfacet;
+#[macro_use]
+mod models;
 mod parameters;
 mod record;
-mod roughness;
 mod seen;
-mod spectrum;
 mod symmetry;
 mod tabulate;
-mod tensor_file;
 
-pub use base::{base_files, base_files_of, change_base_files, resolve_base_files};
-pub use coat::Coat;
-pub use custom::CustomBrdf;
-pub use ggx_lobe::{Tap, ggx_lobe};
+pub(crate) use files::has_model;
+pub use files::merl_bytes;
 pub use lobe::{Ellipse, LobeShape, MIN_COS_THETA_D, NARROWING_COSINES, half_vector_width, lobe_radius};
 pub use made_table::{MADE_TABLE_SIZE, MadeTable};
-pub use merl_export::merl_bytes;
-pub use microfacet::{Distribution, fresnel_conductor, fresnel_dielectric};
+pub use microfacet::{Axes, Distribution, Roughness, Tap, fresnel_conductor, fresnel_dielectric, ggx_lobe};
+pub use models::custom::CustomBrdf;
+pub use models::layered::{Coat, base_files, base_files_of, change_base_files, resolve_base_files};
+pub use models::*;
 pub use parameters::{Domain, Parameter, Parameters, Spacing, as_number, channels, parameter, set_parameter};
 pub use record::{MaterialRecord, ThreadTableRecord};
-pub use roughness::{Axes, Roughness};
 pub use seen::SeenBrdf;
 pub use symmetry::Symmetry;
 pub use tabulate::tabulate;
 
-file_formats!(Brdf: merl_file, rgl_file, mit_file, utia_file, toml_file);
-pub(crate) use toml_file::has_model;
-
-/// What every model offers; [`Brdf`] dispatches to it.
-pub trait Model: Sized {
-    /// Whether material and scene files can have its parameters.
-    const HAS_PARAMETERS: bool = true;
-
-    /// f(w_i, w_o) in 1/sr, linear Rec. 709, for unit vectors with both z positive.
-    fn evaluate(&self, w_i: DVec3, w_o: DVec3) -> DVec3;
-
-    /// [`Self::evaluate`] for several `w_i`: faster where their memory accesses can overlap.
-    fn evaluate_all(&self, w_i: &[DVec3], w_o: DVec3) -> Vec<DVec3> {
-        w_i.iter().map(|&w_i| self.evaluate(w_i, w_o)).collect()
-    }
-
-    /// Whether f stays what it is when light and view change places. Measurements are reciprocal only approximately.
-    fn is_reciprocal(&self) -> bool {
-        true
-    }
-
-    /// Reads the model's parameters from a table; unknown keys are reported by the caller.
-    fn from_parameters(parameters: &mut Parameters) -> Result<Self>;
-
-    /// The model's parameters as its GLSL twin expects them: `BrdfParameters { vec4 a, b, c }`, without those of [`Self::without_rotation`]. None
-    /// of a model that has no twin.
-    fn gpu_parameters(&self) -> [f32; 12] {
-        [0.0; 12]
-    }
-
-    /// Whether shaders have to look it up in a table although its model has a GLSL twin: where the twin leaves out what its parameters ask for.
-    fn needs_table(&self) -> bool {
-        false
-    }
-
-    /// The same in its own axes, and by how many degrees these are turned from the tangent, counter-clockwise seen from outside: none of a
-    /// model that has no such parameter, or where it is 0.
-    fn without_rotation(&self) -> Option<(Self, f64)> {
-        None
-    }
-
-    /// Adds everything that `evaluate` depends on to `hasher`.
-    fn hash_content(&self, hasher: &mut blake3::Hasher);
-}
-
 /// The largest view angle: at 90 degrees f is 0. A renderer only meets it where an interpolated normal turns from the eye.
 pub const MAX_THETA_O_DEG: f64 = 89.99;
 
-/// Makes the modules, the enum and its dispatch from the table in models.rs.
-macro_rules! brdf_models {
-    ($($name:ident => $Model:ident,)+) => {
-        $(#[allow(missing_docs)] pub mod $name; pub use $name::$Model;)+
-
-        /// A BRDF of any model.
-        #[derive(Clone, Debug)]
-        pub enum Brdf {
-            $(#[doc = concat!("Model `", stringify!($name), "`.")] $Model($Model),)+
-        }
-
-        impl Brdf {
-            /// Names of all models; a model's position is its id in shaders.
-            pub const MODELS: &[&str] = &[$(stringify!($name)),+];
-
-            /// Names of the models whose parameters material and scene files can have.
-            pub fn models_with_parameters() -> Vec<&'static str> {
-                let models = [$((stringify!($name), $Model::HAS_PARAMETERS)),+];
-                models.into_iter().filter_map(|(name, has_parameters)| has_parameters.then_some(name)).collect()
-            }
-
-            /// Whether f stays what it is when light and view change places.
-            pub fn is_reciprocal(&self) -> bool {
-                match self { $(Brdf::$Model(model) => model.is_reciprocal(),)+ }
-            }
-
-            /// Name of this BRDF's model: one of [`Brdf::MODELS`].
-            pub fn model(&self) -> &'static str {
-                match self { $(Brdf::$Model(_) => stringify!($name),)+ }
-            }
-
-            /// The BRDF in its own axes, and by how many degrees these are turned from the tangent, counter-clockwise seen from outside: what
-            /// it is on a surface whose tangent is turned by as much. None if it is in its own axes.
-            ///
-            /// So one set of threads serves all rotations, and mirror planes of the BRDF are those of its frame.
-            pub fn without_rotation(&self) -> Option<(Brdf, f64)> {
-                match self {
-                    $(Brdf::$Model(model) => model.without_rotation().map(|(own, deg)| (Brdf::$Model(own), deg)),)+
-                }
-            }
-
-            fn read_model(model: &str, parameters: &mut Parameters) -> Result<Brdf> {
-                match model {
-                    $(stringify!($name) => Ok(Brdf::$Model($Model::from_parameters(parameters)?)),)+
-                    _ => Err(Error::input(
-                        format!("model `{model}`"), "is not known", format!("use one of {}", Brdf::models_with_parameters().join(", ")),
-                    )),
-                }
-            }
-        }
-
-        /// Calls a method of the model inside a [`Brdf`].
-        macro_rules! dispatch {
-            ($brdf:expr, $model:ident => $call:expr) => {
-                match $brdf { $(Brdf::$Model($model) => $call,)+ }
-            };
-        }
-    };
-}
-include!("models.rs");
 include!(concat!(env!("OUT_DIR"), "/brdf_twins.rs"));
 
 impl Brdf {
@@ -174,7 +65,7 @@ impl Brdf {
 
     /// The formats of material files.
     pub const FILES: FileKind<Brdf> =
-        FileKind { what: "material", formats: FORMATS, builtin_names: || Brdf::builtin_names().collect() };
+        FileKind { what: "material", formats: files::FORMATS, builtin_names: || Brdf::builtin_names().collect() };
 
     /// Reads a material file: see [`Self::FILES`].
     ///
@@ -215,12 +106,12 @@ impl Brdf {
 
     /// Whether `path` is called as a file of a model and its parameters is, so that [`Self::load_model`] may read it.
     pub fn is_model_file(path: &Path) -> bool {
-        path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case(toml_file::FORMAT.extension))
+        files::is_model_file(path)
     }
 
     /// The model that a material file (`.toml`) names, and its parameters, not yet checked.
     pub fn load_model(path: &Path) -> Result<(String, toml::Table)> {
-        toml_file::parse_model(path, &file_format::read(path)?)
+        files::parse_model(path, &file_format::read(path)?)
     }
 
     /// The model of the built-in material `name`, and its parameters.
@@ -358,17 +249,5 @@ fn hash_numbers(hasher: &mut blake3::Hasher, numbers: impl IntoIterator<Item = f
     }
 }
 
-#[cfg(test)]
-mod anisotropy_tests;
-#[cfg(test)]
-mod closed_form_tests;
-#[cfg(test)]
-mod fit_tests;
-#[cfg(test)]
-mod model_tests;
-#[cfg(test)]
-mod rgl_tests;
-#[cfg(test)]
-mod samples;
 #[cfg(test)]
 mod tests;

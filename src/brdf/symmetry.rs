@@ -97,7 +97,8 @@ fn pairs() -> impl Iterator<Item = [DVec3; 2]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::brdf::{CustomBrdf, samples, tests::noisy_table};
+    use crate::brdf::CustomBrdf;
+    use crate::brdf::tests::{noisy_table, samples};
 
     const ALL: Symmetry = Symmetry { isotropic: true, half_turn: true, mirror_x: true, mirror_y: true };
 

@@ -1,0 +1,117 @@
+//! Reads measured materials from `.bin` files of the UTIA BRDF database.
+//!
+//! Filip and Vávra, "Template-Based Sampling of Anisotropic BRDFs" (2014). The file is 3 planes of 288 x 288 f64, little-endian, for red, green
+//! and blue: rows over light, columns over view, each of index phi + 48 theta with phi in steps of 7.5 degrees and theta in steps of 15
+//! degrees, from 0 to 75. (The database's own reader, as jdupuy/dj_brdf and asztr/UTIA-brdf restate it.)
+//!
+//! At nodes f is what the database's reader finds; values below 0 count as 0. Between them that reader is linear in the azimuth of the
+//! view where `goniometric.rs` is linear in the azimuth between light and view, and beyond 75 degrees it goes on in a straight line where
+//! f stays as it is at 75 here. Of GGX with alpha 0.1 x 0.4, 0.2 x 0.5 and 0.3, tabulated like that, it errs by 27, 9 and 5.5 % of the
+//! light, and this by 24, 8 and 4.5. Reading takes no more memory than the file.
+use std::path::Path;
+
+use glam::Vec3;
+
+use crate::brdf::Brdf;
+use crate::brdf::goniometric::{Axes, Goniometric, Nodes};
+use crate::error::{Error, Result};
+use crate::file_format::FileFormat;
+
+pub(super) const FORMAT: FileFormat<Brdf> = FileFormat {
+    extension: "bin",
+    name: "a UTIA .bin",
+    is_of_format: |_| true,
+    parse: |path, bytes, _| parse(path, bytes),
+};
+
+/// Angles to the normal, and azimuths.
+const THETAS: usize = 6;
+const PHIS: usize = 48;
+/// Directions of light, and of view.
+const SIDE: usize = THETAS * PHIS;
+const FILE_BYTES: usize = 3 * 8 * SIDE * SIDE;
+
+fn parse(path: &Path, bytes: &[u8]) -> Result<Brdf> {
+    table(bytes).map(Brdf::Goniometric).map_err(|problem| {
+        Error::in_file(path, problem, "fetch the file again; a UTIA BRDF is three planes of 288 x 288 numbers")
+    })
+}
+
+fn table(bytes: &[u8]) -> Result<Goniometric, String> {
+    if bytes.len() != FILE_BYTES {
+        return Err(format!("has {} bytes instead of {FILE_BYTES}", bytes.len()));
+    }
+    let (values, _) = bytes.as_chunks::<8>();
+    if let Some(place) = values.iter().position(|&value| !(f64::from_le_bytes(value) as f32).is_finite()) {
+        let (plane, row, column) = (place / (SIDE * SIDE), place / SIDE % SIDE, place % SIDE);
+        let value = f64::from_le_bytes(values[place]);
+        return Err(format!("holds {value:e} in plane {plane}, row {row}, column {column}"));
+    }
+    let phis = Nodes { count: PHIS, first: 0.0, step: 7.5f64.to_radians(), is_circle: true };
+    let thetas = Nodes { count: THETAS, first: 0.0, step: 15f64.to_radians(), is_circle: false };
+    Goniometric::of(Axes { thetas, azimuths: phis, turns: phis }, |[theta_i, theta_o, azimuth, phi_i]| {
+        let (row, column) = (phi_i + PHIS * theta_i, (phi_i + azimuth) % PHIS + PHIS * theta_o);
+        let value = |plane: usize| f64::from_le_bytes(values[column + SIDE * (row + SIDE * plane)]) as f32;
+        Some(Vec3::new(value(0), value(1), value(2)))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::{DVec3, dvec3};
+
+    /// The bytes of a file with `value` of plane, theta_i, phi_i, theta_v and phi_v, these in steps.
+    fn made(value: impl Fn(usize, usize, usize, usize, usize) -> f64) -> Vec<u8> {
+        let cells = (0..3 * SIDE * SIDE).map(|index| {
+            let (plane, row, column) = (index / SIDE / SIDE, index / SIDE % SIDE, index % SIDE);
+            value(plane, row / PHIS, row % PHIS, column / PHIS, column % PHIS)
+        });
+        cells.flat_map(f64::to_le_bytes).collect()
+    }
+
+    fn direction(theta_deg: f64, phi_deg: f64) -> DVec3 {
+        let ((sin_theta, cos_theta), (sin_phi, cos_phi)) =
+            (theta_deg.to_radians().sin_cos(), phi_deg.to_radians().sin_cos());
+        dvec3(sin_theta * cos_phi, sin_theta * sin_phi, cos_theta)
+    }
+
+    #[test]
+    fn nodes_are_where_the_database_has_them() {
+        let bytes = made(|plane, theta_i, phi_i, theta_v, phi_v| match plane {
+            0 => (10 * theta_i + theta_v) as f64,
+            1 => phi_i as f64,
+            _ => phi_v as f64,
+        });
+        let brdf = parse(Path::new("x.bin"), &bytes).unwrap();
+        for (theta_i, phi_i, theta_o, phi_o) in
+            [(0.0, 0.0, 0.0, 0.0), (15.0, 7.5, 60.0, 352.5), (22.5, 180.0, 75.0, 90.0), (80.0, 240.0, 7.5, 150.0)]
+        {
+            let found = brdf.evaluate(direction(theta_i, phi_i), direction(theta_o, phi_o));
+            let steps = |theta: f64| theta.min(75.0) / 15.0;
+            let expected = dvec3(10.0 * steps(theta_i) + steps(theta_o), phi_i / 7.5, phi_o / 7.5);
+            assert!((found - expected).abs().max_element() < 1e-4, "{theta_i} {phi_i} {theta_o} {phi_o}: {found}");
+        }
+        // From the last azimuth to the first, which is the next, both turning together.
+        let found = brdf.evaluate(direction(30.0, 356.25), direction(30.0, 356.25 - 90.0));
+        assert!((found - dvec3(22.0, 23.5, 35.5)).abs().max_element() < 1e-4, "{found}");
+    }
+
+    #[test]
+    fn files_that_are_none_are_refused_with_a_reason() {
+        let good = made(|_, _, _, _, _| 0.3);
+        let mut nan = good.clone();
+        nan[8 * (SIDE + 2)..][..8].copy_from_slice(&f64::NAN.to_le_bytes());
+        for (bytes, reason) in [
+            (&good[..good.len() - 1], "bytes instead of 1990656"),
+            (&[][..], "has 0 bytes"),
+            (&nan, "NaN in plane 0, row 1, column 2"),
+            (&made(|_, _, _, _, _| 0.0), "nothing but zero"),
+            (&made(|_, _, _, _, _| -1.0), "nothing but zero"),
+            (&made(|_, _, _, _, _| 1e300), "1e300 in plane 0"),
+        ] {
+            let error = parse(Path::new("x.bin"), bytes).unwrap_err().to_string();
+            assert!(error.starts_with("x.bin: ") && error.contains(reason), "{reason}: {error}");
+        }
+    }
+}

@@ -1,0 +1,65 @@
+//! Blinn-Phong with a normalised lobe: f = diffuse / pi + specular c_n (n . h)^n. Twin: glsl/brdf/blinn_phong.glsl.
+use std::f64::consts::{FRAC_1_PI, PI};
+
+use glam::DVec3;
+
+use crate::brdf::{Model, Parameters, Spacing, hash_numbers, warn_of_excess};
+use crate::error::Result;
+
+/// Blinn's half-vector form of the Phong model.
+///
+/// c_n = (n + 2)(n + 4) / (8 pi (2^(-n/2) + n)) is the exact normalisation at normal incidence: there the lobe's albedo is
+/// `specular`, and it is no greater at any other angle. So diffuse + specular <= 1 conserves energy.
+#[derive(Clone, Copy, Debug)]
+pub struct BlinnPhong {
+    /// Albedo of the diffuse part per channel, 0 to 1.
+    pub diffuse: DVec3,
+    /// Albedo of the lobe at normal incidence per channel, 0 to 1.
+    pub specular: DVec3,
+    /// Exponent n of the lobe, 0 to 100,000.
+    pub exponent: f64,
+}
+
+impl BlinnPhong {
+    /// c_n in 1/sr.
+    fn normalisation(&self) -> f64 {
+        let n = self.exponent;
+        (n + 2.0) * (n + 4.0) / (8.0 * PI * ((-0.5 * n).exp2() + n))
+    }
+}
+
+impl Model for BlinnPhong {
+    fn evaluate(&self, w_i: DVec3, w_o: DVec3) -> DVec3 {
+        let h = (w_i + w_o).normalize();
+        self.diffuse * FRAC_1_PI + self.specular * (self.normalisation() * h.z.powf(self.exponent))
+    }
+
+    fn from_parameters(parameters: &mut Parameters) -> Result<Self> {
+        let help = "Exponent of the lobe: the larger, the narrower.";
+        let model = Self {
+            diffuse: parameters.colour("diffuse", 0.0..=1.0, "Albedo of the diffuse part, linear Rec. 709.")?,
+            specular: parameters.colour(
+                "specular",
+                0.0..=1.0,
+                "Albedo of the lobe seen along the normal, linear Rec. 709.",
+            )?,
+            exponent: parameters.number("exponent", 0.0..=1e5, Spacing::Logarithmic, help)?,
+        };
+        warn_of_excess("blinn_phong: diffuse + specular", model.diffuse + model.specular);
+        Ok(model)
+    }
+
+    fn gpu_parameters(&self) -> [f32; 12] {
+        let (diffuse, specular) = (self.diffuse.as_vec3(), self.specular.as_vec3());
+        let mut packed = [0.0; 12];
+        packed[0..4].copy_from_slice(&diffuse.extend(self.exponent as f32).to_array());
+        packed[4..8].copy_from_slice(&specular.extend(self.normalisation() as f32).to_array());
+        packed
+    }
+
+    fn hash_content(&self, hasher: &mut blake3::Hasher) {
+        hash_numbers(hasher, self.diffuse.to_array());
+        hash_numbers(hasher, self.specular.to_array());
+        hash_numbers(hasher, [self.exponent]);
+    }
+}

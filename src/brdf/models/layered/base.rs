@@ -1,0 +1,103 @@
+//! What lies under a coat: a built-in material, a file, or a model with its parameters in a table of its own.
+use std::path::{Path, PathBuf};
+
+use toml::{Table, Value};
+
+use crate::brdf::{Brdf, Domain, Parameters};
+use crate::error::{Error, Result};
+
+const KEY: &str = "base";
+
+/// Layers of files, one under the other: more are a file that lies under itself.
+const MAX_LAYERS: usize = 8;
+
+/// Reads the key `base`. A name with an extension is a file's.
+pub(super) fn read(parameters: &mut Parameters) -> Result<Brdf> {
+    let what = "the name of a built-in material, a file, or { model = \"...\", ... }";
+    if parameters.is_table(KEY) {
+        return parameters.table(KEY, what, |inner| Brdf::read_model(&inner.model()?, inner));
+    }
+    let names = Domain::Choice(Brdf::builtin_names().map(str::to_owned).collect());
+    let value = parameters.take(KEY, what, names, "What is under the coat.")?;
+    match value.as_str() {
+        Some(text) if is_file(text) => load_file(Path::new(text)).map_err(|error| error.within(KEY)),
+        Some(name) => Brdf::builtin(name).ok_or_else(|| {
+            let remedy = format!("give {}", Brdf::FILES.files_or_builtins());
+            Error::input(KEY, format!("\"{name}\" is neither built in nor a file"), remedy)
+        }),
+        None => Err(Error::input(KEY, format!("is {value}"), format!("give {what}"))),
+    }
+}
+
+fn load_file(path: &Path) -> Result<Brdf> {
+    if base_files_of(path).len() >= MAX_LAYERS {
+        let problem = format!("lies over {MAX_LAYERS} files or more, or over itself");
+        return Err(Error::in_file(path, problem, "name a base that is no coat"));
+    }
+    Brdf::load(path)
+}
+
+fn is_file(text: &str) -> bool {
+    Path::new(text).extension().is_some()
+}
+
+/// Calls `change` with the path of each file that the parameters name as a base, also below other bases.
+///
+/// # Errors
+/// Those of `change`.
+pub fn change_base_files(parameters: &mut Table, change: &dyn Fn(&Path) -> Result<Value>) -> Result<()> {
+    match parameters.get_mut(KEY) {
+        Some(Value::Table(inner)) => change_base_files(inner, change),
+        Some(Value::String(text)) if is_file(text) => {
+            let changed = change(Path::new(text))?;
+            parameters.insert(KEY.into(), changed);
+            Ok(())
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Takes files that are named as bases to be in `folder`, unless their paths are absolute.
+///
+/// # Errors
+/// A folder whose name is not UTF-8.
+pub fn resolve_base_files(parameters: &mut Table, folder: &Path) -> Result<()> {
+    change_base_files(parameters, &|path| {
+        let path = folder.join(path);
+        let text = path.to_str().map(Value::from);
+        text.ok_or_else(|| Error::in_file(&path, "has a name that is not UTF-8", "rename its folder"))
+    })
+}
+
+/// The files that the parameters name as bases, and those that these name in turn, as far as they can be read.
+pub fn base_files(parameters: &Table) -> Vec<PathBuf> {
+    let mut files = Vec::new();
+    add_files(parameters, MAX_LAYERS, &mut files);
+    files
+}
+
+fn add_files(parameters: &Table, layers: usize, files: &mut Vec<PathBuf>) {
+    match parameters.get(KEY) {
+        Some(Value::Table(inner)) => add_files(inner, layers, files),
+        Some(Value::String(text)) if is_file(text) => {
+            files.push(text.into());
+            add_files_below(Path::new(text), layers, files);
+        }
+        _ => {}
+    }
+}
+
+fn add_files_below(path: &Path, layers: usize, files: &mut Vec<PathBuf>) {
+    let is_model = Brdf::is_model_file(path);
+    // What cannot be read has none; whoever loads it will say why.
+    if let (true, Some(layers), Ok((_, parameters))) = (is_model, layers.checked_sub(1), Brdf::load_model(path)) {
+        add_files(&parameters, layers, files);
+    }
+}
+
+/// The files that a material's file names as bases, and those that these name in turn: none of a measured one.
+pub fn base_files_of(path: &Path) -> Vec<PathBuf> {
+    let mut files = Vec::new();
+    add_files_below(path, MAX_LAYERS, &mut files);
+    files
+}

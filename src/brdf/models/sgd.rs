@@ -1,0 +1,103 @@
+//! Shifted-gamma microfacets: f = (diffuse + specular F D G1(theta_i) G1(theta_o) / (cos theta_i cos theta_o)) / pi.
+//!
+//! Bagher, Soler and Holzschuch, "Accurate Fitting of Measured Reflectances Using a Shifted Gamma Micro-Facet Distribution" (2012). Every
+//! parameter is of each channel:
+//! - D = kappa e^(-a) / (pi a^p cos^4 theta_h), a = alpha + tan^2 theta_h / alpha; kappa is 1 / (alpha Gamma(1 - p, alpha)) where D is to
+//!   be normalised, and is given, since some published fits are not;
+//! - F = f0 - f1 cos theta_d + (1 - f0) (1 - cos theta_d)^5, which may leave [0, 1];
+//! - G1(theta) = 1 + lambda (1 - e^(c max(theta - theta_0, 0)^k)), cut to [0, 1]; angles in radians.
+//!
+//! The fits of the MERL materials have been published as tables (e.g. in dj_brdf by J. Dupuy): copy a row into a material file. Reciprocal.
+//! Energy is not bounded by the form; the fits have albedos below 1 at most angles, not at all. f is cut
+//! at 0.
+use std::f64::consts::FRAC_1_PI;
+
+use glam::DVec3;
+
+use crate::brdf::{Model, Parameters, hash_numbers};
+use crate::error::Result;
+
+/// The model of Bagher, Soler and Holzschuch; all per channel.
+#[derive(Clone, Copy, Debug)]
+pub struct Sgd {
+    /// The published rho_d, 0 to 1.
+    pub diffuse: DVec3,
+    /// The published rho_s, 0 to 100.
+    pub specular: DVec3,
+    /// Width of D, 1e-6 to 10.
+    pub alpha: DVec3,
+    /// Exponent of D, -10 to 10.
+    pub p: DVec3,
+    /// F at normal incidence is f0 - f1. -100 to 100.
+    pub f0: DVec3,
+    /// Slope of F, -100 to 100.
+    pub f1: DVec3,
+    /// Factor of D, 0 to 1e6.
+    pub kappa: DVec3,
+    /// Depth of the shadowing, 0 to 100.
+    pub lambda: DVec3,
+    /// Factor in its exponent, 0 to 1e12.
+    pub c: DVec3,
+    /// Power in its exponent, 0 to 1000.
+    pub k: DVec3,
+    /// Angle at which it starts, in radians, -10 to 10.
+    pub theta_0: DVec3,
+}
+
+impl Sgd {
+    fn channel(&self, channel: usize, w_i: DVec3, w_o: DVec3) -> f64 {
+        let h = (w_i + w_o).normalize();
+        let (cos2, sin2) = (h.z * h.z, h.x * h.x + h.y * h.y);
+        let a = self.alpha[channel] + sin2 / cos2 / self.alpha[channel];
+        let exponential = (-a).exp();
+        // Far out on the lobe, at grazing half vectors, 0 times infinity threatens.
+        let d = if exponential > 0.0 {
+            self.kappa[channel] * exponential * FRAC_1_PI / (a.powf(self.p[channel]) * cos2 * cos2)
+        } else {
+            0.0
+        };
+        let cos_theta_d = w_o.dot(h);
+        let (f0, f1) = (self.f0[channel], self.f1[channel]);
+        let fresnel = f0 - f1 * cos_theta_d + (1.0 - f0) * (1.0 - cos_theta_d).powi(5);
+        let shadowing = self.g1(channel, w_i) * self.g1(channel, w_o);
+        let lobe = if shadowing > 0.0 { d * fresnel * shadowing / (w_i.z * w_o.z) } else { 0.0 };
+        ((self.diffuse[channel] + self.specular[channel] * lobe) * FRAC_1_PI).max(0.0)
+    }
+
+    fn g1(&self, channel: usize, w: DVec3) -> f64 {
+        let theta = (w.x * w.x + w.y * w.y).sqrt().atan2(w.z);
+        let power = (theta - self.theta_0[channel]).max(0.0).powf(self.k[channel]);
+        // Beyond e^700 is no double; so deep a shadow is black whatever the rest.
+        let exponential = (self.c[channel] * power).min(700.0).exp_m1();
+        (1.0 - self.lambda[channel] * exponential).clamp(0.0, 1.0)
+    }
+}
+
+impl Model for Sgd {
+    fn evaluate(&self, w_i: DVec3, w_o: DVec3) -> DVec3 {
+        DVec3::from_array([0, 1, 2].map(|channel| self.channel(channel, w_i, w_o)))
+    }
+
+    fn from_parameters(parameters: &mut Parameters) -> Result<Self> {
+        Ok(Self {
+            diffuse: parameters.colour("diffuse", 0.0..=1.0, "Albedo of the diffuse part.")?,
+            specular: parameters.colour("specular", 0.0..=100.0, "Factor of the lobe.")?,
+            alpha: parameters.colour("alpha", 1e-6..=10.0, "Width of the lobe.")?,
+            p: parameters.colour("p", -10.0..=10.0, "Fall of the lobe: its power.")?,
+            f0: parameters.colour("f0", -100.0..=100.0, "Fresnel term: f0 - f1 at normal incidence.")?,
+            f1: parameters.colour("f1", -100.0..=100.0, "Fresnel term: its slope with the cosine.")?,
+            kappa: parameters.colour("kappa", 0.0..=1e6, "Factor of the distribution.")?,
+            lambda: parameters.colour("lambda", 0.0..=100.0, "Depth of the shadowing.")?,
+            c: parameters.colour("c", 0.0..=1e12, "Factor in the exponent of the shadowing.")?,
+            k: parameters.colour("k", 0.0..=1000.0, "Power in the exponent of the shadowing.")?,
+            theta_0: parameters.colour("theta_0", -10.0..=10.0, "Angle at which shadowing starts, in radians.")?,
+        })
+    }
+
+    fn hash_content(&self, hasher: &mut blake3::Hasher) {
+        let Self { diffuse, specular, alpha, p, f0, f1, kappa, lambda, c, k, theta_0 } = *self;
+        for colour in [diffuse, specular, alpha, p, f0, f1, kappa, lambda, c, k, theta_0] {
+            hash_numbers(hasher, colour.to_array());
+        }
+    }
+}
