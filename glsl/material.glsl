@@ -25,6 +25,7 @@ struct Material {
     float lobe_radius; // lobe_radius_rad there
     float dark_from;   // that of the lobe: src/brdf/lobe/mod.rs
     vec4 narrowing;    // narrowing there
+    float rim_power;   // that of its threads or its split sum: src/threads/rim.rs
 };
 
 layout(set = 0, binding = 5, std430) readonly buffer Materials {

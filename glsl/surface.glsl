@@ -53,7 +53,10 @@ mat3 fixed_frame(vec3 n, vec3 axis) {
 }
 
 // Towards the eye in the shading frame, (sin theta_o, 0, cos theta_o). Interpolated normals may face away; cos_theta_o is
-// held at 1e-4 or more (89.994 degrees), so that BRDFs stay defined.
+// held at that of 89.99 degrees or more, so that BRDFs stay defined: MAX_THETA_O_DEG in src/brdf/mod.rs.
+const float LEAST_COS_THETA_O = 1.7453e-4;
+
 vec3 view_direction(Surface surface) {
-    return normalize(vec3(dot(surface.frame[0], surface.w_o), 0.0, max(dot(surface.frame[2], surface.w_o), 1e-4)));
+    float cos_theta_o = max(dot(surface.frame[2], surface.w_o), LEAST_COS_THETA_O);
+    return normalize(vec3(dot(surface.frame[0], surface.w_o), 0.0, cos_theta_o));
 }

@@ -3,6 +3,7 @@ use crate::light::{BlurredLight, KernelNeeds};
 use crate::passes::{MAX_SHADERS, models_used};
 use crate::prepare::{Prepared, PreparedMaterial};
 use crate::scene::Pattern;
+use crate::threads::Threads;
 
 /// Specialisation constants by name.
 pub(crate) type Constants = Vec<(&'static str, u32)>;
@@ -81,7 +82,13 @@ fn shade_constants(prepared: &Prepared, materials: &[PreparedMaterial], needs: O
     if method.has_pattern() {
         constants.push(("FIXED_PATTERN", (sampling.pattern == Pattern::Fixed).into()));
     }
-    constants.extend(needs.into_iter().flat_map(KernelNeeds::constants));
+    if let Some(needs) = needs {
+        let is_uneven = |material: &PreparedMaterial| material.threads.as_deref().is_some_and(Threads::has_uneven_rim);
+        // Drafts have one shader.
+        let has_uneven_rim = prepared.is_draft || materials.iter().any(is_uneven);
+        constants.extend(needs.constants());
+        constants.push(("HAS_UNEVEN_RIM", has_uneven_rim.into()));
+    }
     constants
 }
 

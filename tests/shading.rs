@@ -534,6 +534,19 @@ fn what_is_seen_up_to_the_horizon_and_what_turns_from_the_eye_is_shaded_as_the_r
 }
 
 #[test]
+fn what_grows_without_bound_towards_the_horizon_does_so_as_the_reference_does() {
+    let gpu = Validated::new();
+    let bright_above = map([64, 32], |direction| (1.5 * direction.y).exp() + 0.3 * direction.x);
+    let corners = [(88.0, -1.0), (91.0, -0.6), (91.0, 0.6), (88.0, 1.0)];
+    let ward = "model = 'ward'\ndiffuse = [0.2, 0.1, 0.05]\nspecular = 0.02\nalpha = 0.2\nnormalisation = 'duer'";
+    let mut scene = wall_beside_the_eye(ward, bright_above, corners);
+    scene.image.exposure = 0.2;
+    // 0.22 where albedos go evenly from the last row but one to the last.
+    assert_near_reference(&gpu, scene, 0.006);
+    gpu.finish();
+}
+
+#[test]
 fn a_brushed_metal_shows_a_lamp_at_grazing_views_as_the_reference_does() {
     let gpu = Validated::new();
     // A lamp behind what is seen at 78 to 89 degrees.

@@ -6,12 +6,14 @@
 // Twin: src/shading/fitted.rs.
 #include "light_source.glsl"
 #include "threads/fitted.glsl"
+#include "threads/rim.glsl"
 #include "vmf_pyramid.glsl"
 
 // What no kernel and no light of the scene needs is compiled out.
 layout(constant_id = 2) const uint HAS_SOURCES = 1;          // 0: the environment has none
 layout(constant_id = 3) const uint HAS_MIRRORED_SOURCES = 1; // 0: no lobe mirrors them
 layout(constant_id = 4) const uint HAS_SHARP_KERNELS = 1;    // 0: no kernel is sharper than the pyramid
+layout(constant_id = 9) const uint HAS_UNEVEN_RIM = 1;       // 0: between the two last rows weights change evenly, as between all others
 
 #include "shared_sum.glsl"
 
@@ -306,18 +308,22 @@ struct Rows {
     uvec3 albedo;   // the buffer's elements with their albedos
     uint row_count; // of each azimuth
     vec3 share; // of each in what is between them, 1 together; the third has none of an isotropic BRDF
+    vec3 weight_share; // the same of weights and albedos, which need not change evenly between the two last rows
     float side; // 1, or -1 where the view is the mirror image of one that there are rows for
     float added_variance; // of the kernels, by the pixel's normals
 };
 
 // Rows stand evenly from 0 to 90 degrees.
-Rows rows_at(Surface surface, ThreadTable table) {
+Rows rows_at(Surface surface, Material material) {
+    ThreadTable table = material.threads;
     float row = min(surface.theta_o * (float(table.row_count - 1) / radians(90.0)), float(table.row_count - 1));
     uint below = table.first + uint(row);
     uint above = below + uint(uint(row) + 1 < table.row_count);
     float t = fract(row);
     uvec3 albedo = uvec3(below, above, below);
-    Rows rows = Rows(albedo, table.row_count, vec3(1.0 - t, t, 0.0), 1.0, variance_of_pixel(surface.normal_variance));
+    vec3 share = vec3(1.0 - t, t, 0.0);
+    Rows rows = Rows(albedo, table.row_count, share, share, 1.0, variance_of_pixel(surface.normal_variance));
+    bool is_second_above = true;
     if (HAS_TANGENTS != 0 && table.azimuth_count > 1) {
         vec2 folded = fold_azimuth(surface.phi_o, table.azimuth_count);
         uint before = min(uint(folded.x), table.azimuth_count - 2);
@@ -327,9 +333,17 @@ Rows rows_at(Surface surface, ThreadTable table) {
         float towards_next = folded.x - float(before);
         if (towards_next > t) {
             rows.albedo.y = rows.albedo.x + an_azimuth;
+            is_second_above = false;
         }
         rows.share = vec3(1.0 - max(t, towards_next), abs(t - towards_next), min(t, towards_next));
         rows.side = folded.y;
+    }
+    rows.weight_share = rows.share;
+    float towards = HAS_UNEVEN_RIM != 0 ? towards_row_above(row, table.row_count, material.rim_power) : t;
+    if (towards != t) {
+        // So many times as much of the row below, and of the one above. 1e-6 is below any step of t.
+        vec2 times = vec2(1.0 - towards, towards) / max(vec2(1.0 - t, t), 1e-6);
+        rows.weight_share *= vec3(times.x, is_second_above ? times.y : times.x, times.y);
     }
     return rows;
 }
@@ -342,13 +356,13 @@ Kernel kernel_at(Rows rows, uint k) {
     Kernel kernel = Kernel(
         share.x * a.place + share.y * b.place,
         share.x * a.level + share.y * b.level,
-        share.x * a.weight + share.y * b.weight
+        rows.weight_share.x * a.weight + rows.weight_share.y * b.weight
     );
     if (HAS_TANGENTS != 0) {
         Kernel c = unpack_kernel(rows.albedo.z, rows.row_count, k);
         kernel.place += rows.share.z * c.place;
         kernel.level += rows.share.z * c.level;
-        kernel.weight += rows.share.z * c.weight;
+        kernel.weight += rows.weight_share.z * c.weight;
         kernel.place.y *= rows.side;
     }
     // The normal of a sub-pixel has no variance.
@@ -364,9 +378,9 @@ vec3 looks_towards(Kernel kernel, Surface surface) {
 }
 
 vec3 albedo_at(Rows rows) {
-    vec3 albedo = rows.share.x * unpack_albedo(rows.albedo.x) + rows.share.y * unpack_albedo(rows.albedo.y);
+    vec3 albedo = rows.weight_share.x * unpack_albedo(rows.albedo.x) + rows.weight_share.y * unpack_albedo(rows.albedo.y);
     if (HAS_TANGENTS != 0) {
-        albedo += rows.share.z * unpack_albedo(rows.albedo.z);
+        albedo += rows.weight_share.z * unpack_albedo(rows.albedo.z);
     }
     return albedo;
 }
@@ -375,7 +389,7 @@ vec3 albedo_at(Rows rows) {
 // tests are at the ends of loops.
 vec3 estimate(Surface surface, Material material, uint first, uint stride) {
     ThreadTable table = material.threads;
-    Rows rows = rows_at(surface, table);
+    Rows rows = rows_at(surface, material);
     vec3 weights = vec3(0.0);
     vec3 sum = vec3(0.0);
     uint k = first + (table.sharp_count + stride - 1 - first) / stride * stride;

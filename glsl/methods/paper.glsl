@@ -5,6 +5,7 @@
 #include "environment_pyramid.glsl"
 #include "partition.glsl"
 #include "threads/paper.glsl"
+#include "threads/rim.glsl"
 
 // The threads of a partition: first, first + stride, ...
 struct Partition {
@@ -124,7 +125,8 @@ vec3 estimate(Surface surface, Material material, uint first, uint stride) {
     }
     vec3 of_below = unpack_albedo(row_start(material, rows.below));
     vec3 of_above = unpack_albedo(row_start(material, rows.above));
-    vec3 albedo = mix(of_below, of_above, rows.t);
+    float towards = towards_row_above(float(rows.below) + rows.t, material.threads.row_count, material.rim_power);
+    vec3 albedo = mix(of_below, of_above, towards);
     // The partition's part of all threads.
     float fraction = float((material.threads.count - first + stride - 1) / stride) / float(material.threads.count);
     return fraction * albedo * mean;

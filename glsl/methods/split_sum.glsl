@@ -9,6 +9,7 @@ layout(set = 0, binding = 12, std430) readonly buffer SplitSums {
 };
 
 #include "shared_sum.glsl"
+#include "threads/rim.glsl"
 
 const uint SPLIT_SUM_ROWS = 91u;
 const float FINEST_ALPHA = 1.0 / 64.0;
@@ -30,8 +31,9 @@ vec3 estimate(Surface surface, Material material, uint first, uint stride) {
     float row = min(surface.theta_o * (float(SPLIT_SUM_ROWS - 1) / radians(90.0)), float(SPLIT_SUM_ROWS - 1));
     uint below = material.first_slice + 1 + 6 * uint(row);
     uint above = material.first_slice + 1 + 6 * min(uint(row) + 1, SPLIT_SUM_ROWS - 1);
-    vec3 diffuse = mix(split_sum_albedo(below), split_sum_albedo(above), fract(row));
-    vec3 specular = mix(split_sum_albedo(below + 3), split_sum_albedo(above + 3), fract(row));
+    float towards = towards_row_above(row, SPLIT_SUM_ROWS, material.rim_power);
+    vec3 diffuse = mix(split_sum_albedo(below), split_sum_albedo(above), towards);
+    vec3 specular = mix(split_sum_albedo(below + 3), split_sum_albedo(above + 3), towards);
     vec3 w_o = view_direction(surface);
     vec3 mirror = surface.frame * vec3(-w_o.x, -w_o.y, w_o.z);
     float level = level_of_alpha(split_sums[material.first_slice]);

@@ -56,6 +56,10 @@ pub struct MaterialRecord {
     pub dark_from: f32,
     /// [`LobeShape::narrowing`].
     pub narrowing: [f32; 4],
+    /// [`rim_power`](crate::threads::rim::rim_power) of its threads or its split sum.
+    pub rim_power: f32,
+    /// None: shaders align records to 16 bytes.
+    pub padding: [u32; 3],
 }
 
 impl MaterialRecord {
@@ -76,6 +80,8 @@ impl MaterialRecord {
             lobe_radius: 0.0,
             dark_from: lobe.dark_from() as f32,
             narrowing: lobe.narrowing.map(|step| step as f32),
+            rim_power: 1.0,
+            padding: [0; 3],
         }
     }
 

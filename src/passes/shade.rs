@@ -93,7 +93,10 @@ impl DeviceMaterials {
                 record.threads.azimuth_count = table.azimuths as u32;
                 slices.extend(&table.cdfs);
             }
-            slices.extend(split_sum.into_iter().flat_map(SplitSum::device_floats));
+            if let Some(split_sum) = split_sum {
+                record.rim_power = split_sum.rim_power;
+                slices.extend(split_sum.device_floats());
+            }
             records.push(record);
         }
         let storage =

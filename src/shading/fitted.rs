@@ -12,6 +12,7 @@ use crate::packing::stereographic_decode;
 use crate::threads::azimuths::Azimuths;
 use crate::threads::fitted::kernel::{FINEST_WIDTH_RAD, level_of_variance, sharp_part, variance_of_level};
 use crate::threads::fitted::{FittedTable, NEARLY_FLAT_RAD, UnpackedKernel};
+use crate::threads::rim::towards_row_above;
 
 /// Twin of `variance_of_pixel` in glsl/vmf_pyramid.glsl.
 fn variance_of_pixel(normal_variance: f32) -> f32 {
@@ -312,6 +313,7 @@ fn at_sources(lobe: &Lobe, sources: &[SourceRecord]) -> AtSources {
 struct Rows {
     index: [usize; 3],
     share: Vec3,
+    weight_share: Vec3,
     side: f32,
 }
 
@@ -321,29 +323,42 @@ impl Rows {
         let row = (surface.theta_o * ((threads.rows - 1) as f32 / FRAC_PI_2)).min((threads.rows - 1) as f32);
         let (below, t) = (row as usize, row.fract());
         let above = (below + 1).min(threads.rows - 1);
+        let mut rows = Self::even(surface, threads, [below, above], t);
+        let towards = towards_row_above(row, threads.rows, threads.rim_power);
+        if towards != t {
+            let [of_below, of_above] = [(1.0 - towards) / (1.0 - t).max(1e-6), towards / t.max(1e-6)];
+            let is_above = |index: usize| index % threads.rows == above;
+            rows.weight_share *= Vec3::from(rows.index.map(|index| if is_above(index) { of_above } else { of_below }));
+        }
+        rows
+    }
+
+    /// With weights that change evenly.
+    fn even(surface: &Surface, threads: &FittedTable, [below, above]: [usize; 2], t: f32) -> Self {
+        let of = |index, share, side| Self { index, share, weight_share: share, side };
         if threads.azimuths == 1 {
-            return Self { index: [below, above, below], share: Vec3::new(1.0 - t, t, 0.0), side: 1.0 };
+            return of([below, above, below], Vec3::new(1.0 - t, t, 0.0), 1.0);
         }
         let azimuths = Azimuths::around(surface.phi_o.to_angle().into(), threads.azimuths);
         let (index, share) = azimuths.triangle([below, above], t.into(), threads.rows);
-        Self { index, share: DVec3::from(share).as_vec3(), side: azimuths.side() as f32 }
+        of(index, DVec3::from(share).as_vec3(), azimuths.side() as f32)
     }
 
     /// Twin of `kernel_at`, in the shading frame.
     fn kernel(&self, threads: &FittedTable, k: usize) -> UnpackedKernel {
         let [a, b, c] = self.index.map(|row| threads.row(row)[k].unpack());
-        let [p, q, r] = self.share.to_array();
+        let ([p, q, r], [x, y, z]) = (self.share.to_array(), self.weight_share.to_array());
         UnpackedKernel {
             place: Vec2::new(1.0, self.side) * (p * a.place + q * b.place + r * c.place),
             level: p * a.level + q * b.level + r * c.level,
-            weight: p * a.weight + q * b.weight + r * c.weight,
+            weight: x * a.weight + y * b.weight + z * c.weight,
         }
     }
 
     /// Twin of `albedo_at`.
     fn albedo(&self, threads: &FittedTable) -> Vec3 {
         let [a, b, c] = self.index.map(|row| Vec3::from(threads.albedo[row]));
-        Mat3::from_cols(a, b, c) * self.share
+        Mat3::from_cols(a, b, c) * self.weight_share
     }
 }
 

@@ -3,7 +3,7 @@
 //! It starts from the texels of the geometry cache, so that the two can be compared pixel by pixel. BRDFs are evaluated
 //! in double precision; everything else follows the shader line by line.
 use crate::Result;
-use crate::brdf::{Brdf, MaterialRecord};
+use crate::brdf::{Brdf, MAX_THETA_O_DEG, MaterialRecord};
 use crate::environment::{Alias, FractionBits, LightMap, SourceRecord};
 use crate::geometry_texel::GeometryTexel;
 use crate::light::Light;
@@ -79,9 +79,9 @@ impl Surface {
         self.phi_o = if along.length() > 1e-3 { along / along.length() } else { Vec2::X };
     }
 
-    /// Towards the eye in the shading frame, cos_theta_o at least 1e-4. Twin of `view_direction`.
+    /// Towards the eye in the shading frame, at most [`MAX_THETA_O_DEG`] from the normal. Twin of `view_direction`.
     pub fn view_direction(&self) -> Vec3 {
-        let cos_theta_o = self.frame.z_axis.dot(self.w_o).max(1e-4);
+        let cos_theta_o = self.frame.z_axis.dot(self.w_o).max(MAX_THETA_O_DEG.to_radians().cos() as f32);
         Vec3::new(self.frame.x_axis.dot(self.w_o), 0.0, cos_theta_o).normalize()
     }
 }

@@ -5,6 +5,7 @@ use glam::{Mat3, Vec2, Vec3, Vec4};
 
 use super::{Point, Surface, smoothstep, turned};
 use crate::tangent::tangent_along;
+use crate::threads::rim::towards_row_above;
 use crate::threads::{ThreadTable, Threads};
 
 /// A frame at `n` that does not turn with w_o. Twin of `fixed_frame` in glsl/surface.glsl.
@@ -121,6 +122,7 @@ impl Paper<'_> {
         }
         let [below, above] = [rows.below, rows.above].map(|row| Vec3::from(self.threads.albedo[row]));
         let share = self.partition().count() as f32 / self.threads.count as f32;
-        share * below.lerp(above, rows.t) * mean
+        let towards = towards_row_above(rows.below as f32 + rows.t, self.threads.rows, self.threads.rim_power);
+        share * below.lerp(above, towards) * mean
     }
 }

@@ -5,6 +5,7 @@ use glam::Vec3;
 
 use super::Point;
 use crate::environment::level_of_alpha;
+use crate::threads::rim::towards_row_above;
 use crate::threads::split_sum::ROWS;
 
 /// Twin of `estimate`.
@@ -14,7 +15,8 @@ pub(super) fn estimate(point: &Point) -> Vec3 {
     let light = point.twin.light.prefiltered.as_ref().expect("the method looks prefiltered light up");
     let row = (surface.theta_o * ((ROWS - 1) as f32 / FRAC_PI_2)).min((ROWS - 1) as f32);
     let [below, above] = [row as usize, (row as usize + 1).min(ROWS - 1)].map(|row| split_sum.albedos[row]);
-    let [diffuse, specular] = [0, 1].map(|part| below[part].as_vec3().lerp(above[part].as_vec3(), row.fract()));
+    let towards = towards_row_above(row, ROWS, split_sum.rim_power);
+    let [diffuse, specular] = [0, 1].map(|part| below[part].as_vec3().lerp(above[part].as_vec3(), towards));
     let w_o = surface.view_direction();
     let mirror = surface.frame * Vec3::new(-w_o.x, -w_o.y, w_o.z);
     let level = level_of_alpha(split_sum.roughness_alpha as f32);

@@ -7,7 +7,7 @@
 //! | 8 | magic `THREADS\0` |
 //! | 4 | u32 format version, [`FORMAT_VERSION`] |
 //! | 4 | u32 length H of the header |
-//! | H | header, JSON: `method` ("fitted", "paper" or "gaussian"), `material`, `count`, `rows`, `seed`, and `azimuths` and `sets` if there is more than one |
+//! | H | header, JSON: `method` ("fitted", "paper" or "gaussian"), `material`, `count`, `rows`, `seed`, `rim_power` if it is not 1, and `azimuths` and `sets` if there is more than one |
 //! | ... | the rows, then the threads, see below |
 //! | 32 | BLAKE3 digest of everything before |
 //!
@@ -15,6 +15,8 @@
 //! cos theta_o). Colours are linear Rec. 709. Thread k of row r is the (r count + k)-th. Of an anisotropic BRDF there are as many rows for
 //! each of 19, 37 or 73 azimuths of w_o from the tangent, every 5 degrees; then those of the second azimuth follow those of the first. They
 //! are of the BRDF without its `rotation_deg`.
+//!
+//! Between rows albedos are blended linearly in theta_o, but between the two last in (90 deg - theta_o)^`rim_power`.
 //!
 //! Fitted threads and Gaussians may be in several sets, of which thread k is of set k % sets. A sub-pixel with a sum of its own takes one set,
 //! with `sets` times the weights; a pixel whose sub-pixels share one sum takes all threads. If there are two tables, one after the other, the
@@ -36,13 +38,14 @@ use serde::{Deserialize, Serialize};
 
 use super::azimuths::is_azimuth_count;
 use super::fitted::FittedTable;
+use super::rim::{EVEN, is_rim_power};
 use super::{ThreadKind, ThreadTable, Threads};
 use crate::error::{Error, Result};
 use crate::file_format;
 use crate::output::write_whole;
 
 /// Version of the file format and of the threads in it: to be raised when either changes, since caches depend on it.
-pub const FORMAT_VERSION: u32 = 25;
+pub const FORMAT_VERSION: u32 = 26;
 
 const MAGIC: &[u8; 8] = b"THREADS\0";
 const DIGEST_BYTES: usize = blake3::OUT_LEN;
@@ -54,6 +57,8 @@ struct Header {
     count: usize,
     rows: usize,
     seed: u64,
+    #[serde(default = "even", skip_serializing_if = "is_even")]
+    rim_power: f32,
     #[serde(default = "one", skip_serializing_if = "is_one")]
     azimuths: usize,
     #[serde(default = "one", skip_serializing_if = "is_one")]
@@ -62,6 +67,14 @@ struct Header {
 
 fn one() -> usize {
     1
+}
+
+fn even() -> f32 {
+    EVEN
+}
+
+fn is_even(power: &f32) -> bool {
+    *power == EVEN
 }
 
 fn is_one(number: &usize) -> bool {
@@ -89,13 +102,13 @@ pub fn parse(path: &Path, bytes: &[u8]) -> Result<Threads> {
 fn encode(threads: &Threads) -> Vec<u8> {
     let [rows, count] = threads.size();
     let method = threads.kind().name().to_owned();
-    let (material, seed, azimuths, sets) = match threads {
+    let (material, seed, rim_power, azimuths, sets) = match threads {
         Threads::Fitted(table) | Threads::Gaussian(table) => {
-            (table.material.clone(), 0, table.azimuths, table.for_subpixels().sets)
+            (table.material.clone(), 0, table.rim_power, table.azimuths, table.for_subpixels().sets)
         }
-        Threads::Paper(table) => (table.material.clone(), table.seed, 1, 1),
+        Threads::Paper(table) => (table.material.clone(), table.seed, table.rim_power, 1, 1),
     };
-    let header = serde_json::to_vec(&Header { method, material, count, rows, seed, azimuths, sets });
+    let header = serde_json::to_vec(&Header { method, material, count, rows, seed, rim_power, azimuths, sets });
     let header = header.expect("a header of strings and numbers is always JSON");
     let mut bytes = MAGIC.to_vec();
     bytes.extend(FORMAT_VERSION.to_le_bytes());
@@ -126,7 +139,7 @@ fn decode(bytes: &[u8]) -> Result<Threads, String> {
     let (&length, rest) = rest.split_first_chunk().ok_or("is cut short")?;
     let (header, payload) = rest.split_at_checked(u32::from_le_bytes(length) as usize).ok_or("is cut short")?;
     let header: Header = serde_json::from_slice(header).map_err(|error| format!("has a bad header ({error})"))?;
-    let Header { method, material, count, rows, seed, azimuths, sets } = header;
+    let Header { method, material, count, rows, seed, rim_power, azimuths, sets } = header;
     let kind = ThreadKind::ALL.into_iter().find(|kind| kind.name() == method);
     let kind = kind.ok_or_else(|| format!("holds threads of the unknown method {method:?}"))?;
     let words_a_row = match kind {
@@ -140,6 +153,9 @@ fn decode(bytes: &[u8]) -> Result<Threads, String> {
     let expected = if are_two { Some(payload.len()) } else { expected };
     let is_possible =
         (azimuths, sets) == (1, 1) || kind.are_kernels() && is_azimuth_count(azimuths) && (1..=count).contains(&sets);
+    if !is_rim_power(rim_power) {
+        return Err("has a header with a `rim_power` out of range".into());
+    }
     if count == 0 || rows == 0 || !is_possible || expected != Some(payload.len()) {
         return Err("has a header that does not fit its content".into());
     }
@@ -150,7 +166,7 @@ fn decode(bytes: &[u8]) -> Result<Threads, String> {
             let table = |words: &[u32], sets| -> Result<_, String> {
                 let (of_rows, of_threads) = words.split_at(words_a_row * rows * azimuths);
                 let table = FittedTable::from_file_words(of_rows, of_threads)?;
-                Ok(FittedTable { rows, azimuths, count, sets, ..table })
+                Ok(FittedTable { rows, azimuths, count, sets, rim_power, ..table })
             };
             let of_subpixels = are_two.then(|| table(second, sets).map(Box::new)).transpose()?;
             let table = table(first, if are_two { 1 } else { sets })?;
@@ -160,7 +176,7 @@ fn decode(bytes: &[u8]) -> Result<Threads, String> {
         ThreadKind::Paper => {
             let (of_rows, of_threads) = first.split_at(words_a_row * rows * azimuths);
             let table = ThreadTable::from_file_words(of_rows, of_threads)?;
-            Threads::Paper(ThreadTable { rows, count, material, seed, ..table })
+            Threads::Paper(ThreadTable { rows, count, material, seed, rim_power, ..table })
         }
     })
 }
@@ -172,7 +188,15 @@ mod tests {
 
     fn table() -> ThreadTable {
         let samples = (0..6).map(|i| Sample { theta: 0.2 * i as f32, phi: i as f32 - 3.0, p: 0.5 }).collect();
-        ThreadTable { rows: 3, count: 2, seed: 9, material: "a \"name\"".into(), albedo: vec![[0.5; 3]; 3], samples }
+        ThreadTable {
+            rows: 3,
+            count: 2,
+            seed: 9,
+            material: "a \"name\"".into(),
+            rim_power: -0.7,
+            albedo: vec![[0.5; 3]; 3],
+            samples,
+        }
     }
 
     fn fitted() -> FittedTable {
@@ -182,6 +206,7 @@ mod tests {
             count: 1,
             sets: 1,
             material: "b".into(),
+            rim_power: 0.3,
             albedo: vec![[0.1, 0.2, 0.4]; 2],
             relative_error: vec![1e-3; 2],
             kernels: vec![PackedKernel([0x1234_5678, 0x3800_4000, 0x3400_3000]); 2],

@@ -4,6 +4,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
+use super::rim::rim_power;
 use super::slice::{Slice, fibonacci_lattice};
 use super::{MIN_COS, Sample, ThreadSettings, ThreadTable, theta_o};
 use super::{forces, peaks, smoothing};
@@ -67,7 +68,8 @@ pub fn generate(brdf: &Brdf, settings: &ThreadSettings, observer: &dyn Observer)
     let threads: Vec<Vec<Sample>> = threads.collect();
     let samples = (0..rows).flat_map(|row| threads.iter().map(move |thread| thread[row])).collect();
     let albedo = slices.iter().map(|(slice, _)| slice.albedo().as_vec3().to_array()).collect();
-    Ok(ThreadTable { rows, count, seed, material: brdf.model().to_string(), albedo, samples })
+    let rim_power = rim_power(rows, |theta_o| Slice::new(&seen, theta_o).albedo());
+    Ok(ThreadTable { rows, count, seed, material: brdf.model().to_string(), rim_power, albedo, samples })
 }
 
 /// Evenly spread points of the CDF's square, in the order of a Hilbert curve: every S-th of them is then evenly spread too,

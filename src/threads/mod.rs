@@ -28,6 +28,7 @@ pub mod forces;
 mod generate;
 pub mod peaks;
 mod plot;
+pub mod rim;
 pub mod slice;
 pub mod slice_table;
 pub mod smoothing;
@@ -135,9 +136,23 @@ impl Threads {
 
     /// The record of a BRDF of this lobe, with what shading by these threads goes by.
     pub fn in_record(&self, record: MaterialRecord, lobe: &LobeShape) -> MaterialRecord {
+        let record = MaterialRecord { rim_power: self.rim_power(), ..record };
         let Some(GivingWay { lobe_radius_rad, clear }) = self.giving_way(lobe) else { return record };
         let shared_deviation = self.shared_deviation(lobe) as f32;
         MaterialRecord { shared_deviation, lobe_radius: lobe_radius_rad as f32, clear, ..record }
+    }
+
+    /// Whether albedos do not go evenly from the last row but one to the last.
+    pub(crate) fn has_uneven_rim(&self) -> bool {
+        self.rim_power() != rim::EVEN
+    }
+
+    /// How albedos go from the last row but one to the last: [`rim::rim_power`].
+    fn rim_power(&self) -> f32 {
+        match self {
+            Self::Fitted(table) | Self::Gaussian(table) => table.rim_power,
+            Self::Paper(table) => table.rim_power,
+        }
     }
 
     /// These, if they are kernels: fitted, or Gaussians.

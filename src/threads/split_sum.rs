@@ -9,6 +9,7 @@ use rayon::prelude::*;
 
 use super::fitted::kernel::vmf_peak;
 use super::fitted::lights::{Quadrature, SCALES, TestLights, light_kappa};
+use super::rim::rim_power;
 use super::slice::{Resolution, Slice};
 use super::theta_o;
 use crate::brdf::{Brdf, SeenBrdf, Tap, ggx_lobe};
@@ -34,6 +35,8 @@ const REFINING_STEPS: usize = 6;
 pub struct SplitSum {
     /// How widely the light about the mirror direction is filtered: GGX's roughness as it is, not squared.
     pub roughness_alpha: f64,
+    /// How albedos go from the last row but one to the last: [`rim_power`].
+    pub rim_power: f32,
     /// Row by row, the albedo of Lambert's part and what is left of the BRDF's own.
     pub albedos: Vec<[DVec3; 2]>,
 }
@@ -56,14 +59,18 @@ impl SplitSum {
         }
         let roughness_alpha = (0.5 * (low + high)).exp();
         let (diffuse, _) = fit(&answers, roughness_alpha);
-        let row = |row: usize| {
-            let from = |phi_o: f64| brdf.albedo_from(theta_o(row, ROWS), phi_o);
+        let albedo = |theta_o: f64| {
+            let from = |phi_o: f64| brdf.albedo_from(theta_o, phi_o);
             // Along and across the tangent: of a long lobe the least and the most.
-            let albedo = if is_isotropic { from(0.0) } else { 0.5 * (from(0.0) + from(FRAC_PI_2)) };
+            if is_isotropic { from(0.0) } else { 0.5 * (from(0.0) + from(FRAC_PI_2)) }
+        };
+        let row = |row: usize| {
+            let albedo = albedo(theta_o(row, ROWS));
             let diffuse = diffuse.min(albedo);
             [diffuse, albedo - diffuse]
         };
-        Self { roughness_alpha, albedos: (0..ROWS).into_par_iter().map(row).collect() }
+        let rim_power = rim_power(ROWS, albedo);
+        Self { roughness_alpha, rim_power, albedos: (0..ROWS).into_par_iter().map(row).collect() }
     }
 
     /// The numbers of the shader's buffer: roughness_alpha, then the two albedos of each row.

@@ -3,6 +3,7 @@ use std::f32::consts::FRAC_PI_2 as FRAC_PI_2_F32;
 
 use glam::{DVec3, Vec4, dvec3};
 
+use super::rim::EVEN;
 use super::rows_around;
 
 /// One incident sample in the shading frame of its row.
@@ -53,6 +54,8 @@ pub struct ThreadTable {
     pub seed: u64,
     /// Name of the material, for people.
     pub material: String,
+    /// How the albedo goes from the last row but one to the last: [`rim_power`](super::rim::rim_power).
+    pub rim_power: f32,
     /// Directional albedo of each row, linear Rec. 709: the integral of f cos that equation (4) divides by.
     pub albedo: Vec<[f32; 3]>,
     /// Row by row: thread k of row r is `samples[r * count + k]`.
@@ -105,7 +108,7 @@ impl ThreadTable {
         if !albedo.as_flattened().iter().all(|value| (0.0..=f32::MAX).contains(value)) {
             return Err("holds an albedo that is none".into());
         }
-        Ok(Self { rows: 0, count: 0, seed: 0, material: String::new(), albedo, samples })
+        Ok(Self { rows: 0, count: 0, seed: 0, material: String::new(), rim_power: EVEN, albedo, samples })
     }
 }
 

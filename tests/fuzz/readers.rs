@@ -355,6 +355,7 @@ pub fn threads() -> Reader {
                 count: 2,
                 seed: 9,
                 material: material.clone(),
+                rim_power: 1.0,
                 albedo: vec![[0.5; 3]; 3],
                 samples,
             };
@@ -364,6 +365,7 @@ pub fn threads() -> Reader {
                 count: 2,
                 sets: 2,
                 material: material.clone(),
+                rim_power: -0.5,
                 albedo: vec![[0.1, 0.2, 0.4]; rows * azimuths],
                 relative_error: vec![1e-3; rows * azimuths],
                 kernels: vec![PackedKernel([0x1234_5678, 0x3800_4000, 0x3400_3000]); 2 * rows * azimuths],

@@ -48,7 +48,11 @@ impl<'a, G: Fn(&[DVec3]) -> Vec<DVec3>> Cubature<'a, G> {
         while let Some(cell) = waiting.pop() {
             cubature.squares -= cell.squares;
             for part in cubature.parts(cell) {
-                if must_split(part.place) { waiting.push(part) } else { cubature.keep(part, DVec3::ONE) }
+                if part.place.level < LAST_LEVEL && must_split(part.place) {
+                    waiting.push(part)
+                } else {
+                    cubature.keep(part, DVec3::ONE)
+                }
             }
         }
         cubature

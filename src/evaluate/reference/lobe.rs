@@ -3,13 +3,20 @@ use std::f64::consts::FRAC_PI_2;
 
 use glam::{DVec2, DVec3};
 
-use crate::brdf::{Brdf, LobeShape, MIN_COS_THETA_D, lobe_radius};
+use crate::brdf::{Brdf, LobeShape, MAX_THETA_O_DEG, lobe_radius};
 
 /// View angles at which lobes are looked for: some models have them at grazing views only.
-const VIEWS_DEG: [f64; 5] = [0.0, 30.0, 60.0, 75.0, 85.0];
+const VIEWS_DEG: [f64; 8] = [0.0, 30.0, 60.0, 75.0, 85.0, 88.0, 89.5, MAX_THETA_O_DEG];
 
-/// An anisotropic lobe is followed along its long axis for so many of its lengths: of GGX's, which has the longest tails, 0.2 % is beyond.
+/// A long lobe is followed along its arc for so many of its lengths: of GGX's, which has the longest tails, 0.2 % is beyond.
 const LENGTHS: f64 = 16.0;
+
+/// Below this cosine of the view, at 75 degrees and beyond, any lobe is a long one to directions: across the plane of incidence they move
+/// by cos theta_d of what they do within it.
+const GRAZING_COS: f64 = 0.26;
+
+/// The least cosine between light and half vector: half of that of the last view, where the light is on the horizon.
+const LEAST_COS_THETA_D: f64 = 8e-5;
 
 /// What is so many half edges from the middle of a cell counts as in it: a lobe beside a cell is in it in part.
 const NEARLY: f64 = 2.0;
@@ -18,44 +25,54 @@ const NEARLY: f64 = 2.0;
 pub struct Lobe {
     /// The radius at each of [`VIEWS_DEG`], in radians.
     radii: [f64; VIEWS_DEG.len()],
+    is_isotropic: bool,
     /// The width across the long axis over the one along it.
     narrowness: f64,
     /// In the tangent plane, a unit vector.
     long_axis: DVec2,
-    /// The tangent of the arc's angle to the normal where it ends: 0 of an isotropic BRDF.
-    most_slope: f64,
 }
 
 impl Lobe {
     pub fn of(brdf: &Brdf) -> Self {
         let LobeShape { is_isotropic, narrowness, long_axis, .. } = LobeShape::of(brdf);
         let radii = VIEWS_DEG.map(|theta_o_deg| lobe_radius(brdf, theta_o_deg.to_radians()));
-        let narrowest = radii.iter().copied().fold(FRAC_PI_2, f64::min);
-        let most_slope = if is_isotropic { 0.0 } else { LENGTHS * narrowest / narrowness };
-        Self { radii, narrowness, long_axis, most_slope }
+        Self { radii, is_isotropic, narrowness, long_axis }
     }
 
     /// It as seen from unit `w_o`, which is in the frame of the surface: with the least radius at the view angles beside that of `w_o`.
-    pub fn seen_from(&self, w_o: DVec3) -> SeenLobe<'_> {
+    pub fn seen_from(&self, w_o: DVec3) -> SeenLobe {
+        let Self { radii, is_isotropic, narrowness, long_axis } = *self;
         let theta_o_deg = w_o.truncate().length().atan2(w_o.z).to_degrees();
         let next = VIEWS_DEG.iter().position(|&view| view > theta_o_deg).unwrap_or(VIEWS_DEG.len() - 1);
-        SeenLobe { lobe: self, w_o, radius: self.radii[next].min(self.radii[next - 1]) }
+        let radius = radii[next].min(radii[next - 1]);
+        let narrowest = radii.iter().copied().fold(FRAC_PI_2, f64::min);
+        let (long_axis, most_slope) = match is_isotropic {
+            true if w_o.z > GRAZING_COS => (long_axis, 0.0),
+            // In the plane of incidence.
+            true => (w_o.truncate().normalize(), LENGTHS * radius),
+            false => (long_axis, LENGTHS * narrowest / narrowness),
+        };
+        SeenLobe { w_o, radius, is_isotropic, narrowness, long_axis, most_slope }
     }
 }
 
 /// A lobe as a view sees it: the directions that its half vectors mirror the view into.
-pub struct SeenLobe<'a> {
-    lobe: &'a Lobe,
+pub struct SeenLobe {
     w_o: DVec3,
     /// Of half vectors, in radians.
     radius: f64,
+    is_isotropic: bool,
+    narrowness: f64,
+    long_axis: DVec2,
+    /// The tangent of the arc's angle to the normal where it ends: 0 of a lobe that is not followed.
+    most_slope: f64,
 }
 
-impl SeenLobe<'_> {
+impl SeenLobe {
     /// Whether part of it may hide between the nodes of a cell: the cell is wider than the lobe, and holds part of it, or nearly so.
     /// `middle` is that of the cell, and `half_edges` go from there to the middles of two edges; all in the frame of the surface.
     pub fn may_hide(&self, middle: DVec3, half_edges: [DVec3; 2]) -> bool {
-        let Lobe { narrowness, long_axis, most_slope, .. } = *self.lobe;
+        let Self { is_isotropic, narrowness, long_axis, most_slope, .. } = *self;
         // Along the half vector. In the lobe it has nothing across the long axis, and not too much along it.
         let sum = middle + self.w_o;
         // How far a coordinate goes from the middle of the cell to its edges, with the curvature of the sphere.
@@ -73,12 +90,11 @@ impl SeenLobe<'_> {
         if !holds_it {
             return false;
         }
-        // Reflection doubles angles, but across the plane of incidence shrinks them by the cosine. Beyond its bound cells are small enough to
-        // find part of a lobe, and what is found is split like all else.
-        let cos_theta_d = (0.5 * sum.length()).max(MIN_COS_THETA_D);
-        // Tails of an anisotropic lobe widen as they fall: GGX's are as wide as contours of 1 + (h_x / alpha_x)^2 + (h_y / alpha_y)^2.
+        // Reflection doubles angles, but across the plane of incidence shrinks them by the cosine.
+        let cos_theta_d = (0.5 * sum.length()).max(LEAST_COS_THETA_D);
+        // Tails widen as they fall: GGX's are as wide as contours of 1 + (h_x / alpha_x)^2 + (h_y / alpha_y)^2.
         let radius = self.radius.max(narrowness * nearest / highest);
-        let widest = if most_slope > 0.0 { across_spread } else { across_spread.max(along_spread) };
+        let widest = if is_isotropic { across_spread.max(along_spread) } else { across_spread };
         widest > radius * cos_theta_d
     }
 }

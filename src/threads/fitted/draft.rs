@@ -64,7 +64,7 @@ pub fn draft(brdf: &Brdf, before: &FittedTable, observer: &dyn Observer) -> Resu
 /// The threads that `drafting` continues, but not those of their sub-pixels.
 fn continued(drafting: &Drafting, observer: &dyn Observer) -> Result<FittedTable> {
     let before = drafting.before;
-    let FittedTable { rows, azimuths, sets, .. } = *before;
+    let FittedTable { rows, azimuths, sets, rim_power, .. } = *before;
     let (mut places, columns) = (every(ROW_STEP, rows), every(AZIMUTH_STEP, azimuths));
     let before_rim = rows.saturating_sub(RIM_STEP + 1);
     if let (Err(place), 1) = (places.binary_search(&before_rim), azimuths) {
@@ -105,7 +105,7 @@ fn continued(drafting: &Drafting, observer: &dyn Observer) -> Result<FittedTable
         let sharpest = sharpest_level(&drafting.lobe, view(to).theta_o);
         with_rest(blend(&fitted, to), &blend(&edited_where_fitted, to), &edited[to], sharpest)
     };
-    Ok(FittedTable::pack(&(0..azimuths * rows).map(row).collect::<Vec<_>>(), azimuths, sets))
+    Ok(FittedTable::pack(&(0..azimuths * rows).map(row).collect::<Vec<_>>(), azimuths, sets, rim_power))
 }
 
 /// What rows are fitted by; what `share` is, [`Fit::in_sets`] says.

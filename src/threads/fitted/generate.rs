@@ -15,6 +15,7 @@ use crate::brdf::{Brdf, LobeShape, SeenBrdf, luminance};
 use crate::error::Result;
 use crate::progress::Observer;
 use crate::threads::azimuths::{View, azimuth_count};
+use crate::threads::rim::rim_power;
 use crate::threads::slice::{Resolution, Slice, reflect};
 use crate::threads::{ThreadKind, ThreadSettings};
 
@@ -69,6 +70,8 @@ struct Targets {
     rows: Vec<(TestLights, DVec3)>,
     /// Of the BRDF, seen along the normal.
     lobe: LobeShape,
+    /// Of its albedos, of an anisotropic BRDF those seen along its tangent.
+    rim_power: f32,
 }
 
 /// How many lights there are in a row for so many threads.
@@ -94,7 +97,11 @@ impl Targets {
             Ok((lights, slices[0].albedo()))
         };
         let rows = (0..azimuths * rows).into_par_iter().map(target).collect::<Result<_>>()?;
-        Ok(Self { azimuths, rows, lobe })
+        let albedo = |theta_o: f64| {
+            Slice::with_lobes_of_view(brdf, &lobe, View { theta_o, phi_o: 0.0 }, Resolution::FULL)[0].albedo()
+        };
+        let rim_power = rim_power(settings.rows, albedo);
+        Ok(Self { azimuths, rows, lobe, rim_power })
     }
 
     /// Whether the cosine kernel alone does in all rows.
@@ -199,7 +206,7 @@ fn fit_all(
         // Where kernels are is kept, for drafts to start from.
         fitted.iter_mut().for_each(|(kernels, ..)| *kernels = scaled(kernels, 0.0));
     }
-    Ok(FittedTable::pack(&fitted, targets.azimuths, settings.sets))
+    Ok(FittedTable::pack(&fitted, targets.azimuths, settings.sets, targets.rim_power))
 }
 
 /// f (n . w) of `brdf` for a view.

@@ -56,6 +56,7 @@ mod tests {
             count,
             sets: 1,
             material: String::new(),
+            rim_power: 1.0,
             albedo: vec![[0.0; 3]],
             relative_error: vec![error],
             kernels: Vec::new(),

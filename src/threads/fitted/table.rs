@@ -9,6 +9,7 @@ use crate::packing::{
     STEREOGRAPHIC_EXTENT, pack_snorm_2x16, stereographic_decode, stereographic_encode, unpack_snorm_2x16,
 };
 use crate::threads::azimuths::Azimuths;
+use crate::threads::rim::EVEN;
 use crate::threads::{rows_around, theta_o};
 
 /// A kernel in three words: direction (its place on the stereographic map, 2 x 16 bits), level and red weight, green and blue weight (half floats).
@@ -87,6 +88,8 @@ pub struct FittedTable {
     pub sets: usize,
     /// Name of the material, for people.
     pub material: String,
+    /// How albedos go from the last row but one to the last: [`rim_power`](crate::threads::rim::rim_power).
+    pub rim_power: f32,
     /// In each row, azimuth by azimuth. What the threads' weights leave of it is the cosine kernel's.
     pub albedo: Vec<[f32; 3]>,
     /// Expected error of each row, relative to the radiance under lights of all sizes.
@@ -201,6 +204,7 @@ impl FittedTable {
             count: 0,
             sets: 0,
             material: String::new(),
+            rim_power: EVEN,
             albedo,
             relative_error,
             kernels,
@@ -209,7 +213,7 @@ impl FittedTable {
     }
 
     /// Packs rows of kernels, with the albedo and the relative error of each; as many rows for each of `azimuths`.
-    pub(super) fn pack(rows: &[(Vec<Kernel>, DVec3, f64)], azimuths: usize, sets: usize) -> Self {
+    pub(super) fn pack(rows: &[(Vec<Kernel>, DVec3, f64)], azimuths: usize, sets: usize, rim_power: f32) -> Self {
         let kernels: Vec<_> = rows.iter().flat_map(|(kernels, ..)| kernels.iter().map(PackedKernel::new)).collect();
         Self {
             rows: rows.len() / azimuths,
@@ -217,6 +221,7 @@ impl FittedTable {
             count: rows.first().map_or(0, |(kernels, ..)| kernels.len()),
             sets,
             material: String::new(),
+            rim_power,
             albedo: rows.iter().map(|(_, albedo, _)| albedo.as_vec3().to_array()).collect(),
             relative_error: rows.iter().map(|&(.., error)| error as f32).collect(),
             kernels,
