@@ -135,7 +135,7 @@ impl Brdf {
         builtin::FAMILIES.iter().map(|(family, materials)| (*family, materials.iter().map(|(name, _)| *name).collect()))
     }
 
-    /// Id of the model by which shaders evaluate it, whose lobe this is: its position in models.rs, or that of a table if it has no twin.
+    /// Id of the model by which shaders evaluate it, whose lobe this is: its position in models/table.rs, or that of a table if it has no twin.
     pub fn model_index(&self, lobe: &LobeShape) -> u32 {
         let twin = match self.has_twin() {
             true => self.model(),

@@ -30,7 +30,7 @@ impl ThreadTableRecord {
 pub struct MaterialRecord {
     /// What the model's GLSL twin reads: [`super::Model::gpu_parameters`].
     pub parameters: [f32; 12],
-    /// Position of the model in models.rs.
+    /// Position of the model in models/table.rs.
     pub model: u32,
     /// Where its CDFs or its split sum start in the buffer of these.
     pub first_slice: u32,

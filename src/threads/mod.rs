@@ -10,6 +10,7 @@
 //! | the whole | [`generate()`] |
 //! | beyond it: azimuths of the view, for anisotropic BRDFs | [`azimuths`] |
 //! | beyond it: threads fitted to the BRDF | [`fitted`] |
+//! | beyond it: how albedos rise or fall in the last degree | [`rim`] |
 //! | beside it: the split sum of engines | [`split_sum`] |
 //!
 use std::f64::consts::FRAC_PI_2;
