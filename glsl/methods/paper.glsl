@@ -59,13 +59,15 @@ struct Rows {
     uint below;
     uint above;
     float t;
+    float towards; // t of albedos
 };
 
 Rows rows_at(Surface surface, Material material) {
     float last = float(material.threads.row_count - 1);
     float row = min(surface.theta_o * (last / radians(90.0)), last);
     uint below = uint(row);
-    return Rows(below, min(below + 1, material.threads.row_count - 1), row - float(below));
+    float towards = towards_row_above(row, material.threads.row_count, material.rim_power);
+    return Rows(below, min(below + 1, material.threads.row_count - 1), row - float(below), towards);
 }
 
 // The threads as published: row and frame follow the view.
@@ -125,8 +127,7 @@ vec3 estimate(Surface surface, Material material, uint first, uint stride) {
     }
     vec3 of_below = unpack_albedo(row_start(material, rows.below));
     vec3 of_above = unpack_albedo(row_start(material, rows.above));
-    float towards = towards_row_above(float(rows.below) + rows.t, material.threads.row_count, material.rim_power);
-    vec3 albedo = mix(of_below, of_above, towards);
+    vec3 albedo = mix(of_below, of_above, rows.towards);
     // The partition's part of all threads.
     float fraction = float((material.threads.count - first + stride - 1) / stride) / float(material.threads.count);
     return fraction * albedo * mean;

@@ -36,6 +36,7 @@ struct Rows {
     below: usize,
     above: usize,
     t: f32,
+    towards: f32,
 }
 
 /// The point with the threads of its material.
@@ -59,7 +60,8 @@ impl Paper<'_> {
         let last = (count - 1) as f32;
         let row = (surface.theta_o * (last / FRAC_PI_2)).min(last);
         let below = row as usize;
-        Rows { below, above: (below + 1).min(count - 1), t: row - below as f32 }
+        let towards = towards_row_above(row, count, self.threads.rim_power);
+        Rows { below, above: (below + 1).min(count - 1), t: row - below as f32, towards }
     }
 
     fn thread(&self, row: usize, k: usize) -> Vec4 {
@@ -122,7 +124,6 @@ impl Paper<'_> {
         }
         let [below, above] = [rows.below, rows.above].map(|row| Vec3::from(self.threads.albedo[row]));
         let share = self.partition().count() as f32 / self.threads.count as f32;
-        let towards = towards_row_above(rows.below as f32 + rows.t, self.threads.rows, self.threads.rim_power);
-        share * below.lerp(above, towards) * mean
+        share * below.lerp(above, rows.towards) * mean
     }
 }

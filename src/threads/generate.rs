@@ -67,8 +67,9 @@ pub fn generate(brdf: &Brdf, settings: &ThreadSettings, observer: &dyn Observer)
     });
     let threads: Vec<Vec<Sample>> = threads.collect();
     let samples = (0..rows).flat_map(|row| threads.iter().map(move |thread| thread[row])).collect();
-    let albedo = slices.iter().map(|(slice, _)| slice.albedo().as_vec3().to_array()).collect();
-    let rim_power = rim_power(rows, |theta_o| Slice::new(&seen, theta_o).albedo());
+    let albedos: Vec<_> = slices.iter().map(|(slice, _)| slice.albedo()).collect();
+    let rim_power = rim_power(&albedos, |theta_o| Slice::new(&seen, theta_o).albedo());
+    let albedo = albedos.iter().map(|albedo| albedo.as_vec3().to_array()).collect();
     Ok(ThreadTable { rows, count, seed, material: brdf.model().to_string(), rim_power, albedo, samples })
 }
 

@@ -22,15 +22,13 @@ const LEAST_POWER: f64 = 0.02;
 /// The angle of the last row to the horizon, of which 1 is a right angle.
 const LAST_TO_HORIZON: f64 = 1.0 - MAX_THETA_O_DEG / 90.0;
 
-/// The power, in that of the angle to the horizon, by which the albedo goes from the last row but one of `rows` to the last:
-/// the one that is right half-way. `albedo` is that of a view angle in radians.
-pub fn rim_power(rows: usize, albedo: impl Fn(f64) -> DVec3) -> f32 {
-    if rows < 2 {
-        return EVEN;
-    }
-    let [before, last] = [rows - 2, rows - 1].map(|row| theta_o(row, rows));
-    let middle = 0.5 * (before + last);
-    let [before_albedo, middle_albedo, last_albedo] = [before, middle, last].map(|theta_o| luminance(albedo(theta_o)));
+/// The power, in that of the angle to the horizon, by which the albedo goes from the last row but one to the last: the one that is right
+/// half-way. `albedos` are those of rows, and `albedo` is that of a view angle in radians.
+pub fn rim_power(albedos: &[DVec3], albedo: impl FnOnce(f64) -> DVec3) -> f32 {
+    let rows = albedos.len();
+    let &[.., before, last] = albedos else { return EVEN };
+    let middle = 0.5 * (theta_o(rows - 2, rows) + theta_o(rows - 1, rows));
+    let [before_albedo, middle_albedo, last_albedo] = [before, albedo(middle), last].map(luminance);
     // Not of a NaN.
     let bends = (0.5 * (before_albedo + last_albedo) - middle_albedo).abs() > LEAST_BEND * middle_albedo;
     if !bends {
@@ -77,7 +75,8 @@ mod tests {
     use super::*;
 
     fn power_of(albedo: impl Fn(f64) -> f64) -> f32 {
-        rim_power(91, |theta_o| DVec3::splat(albedo((FRAC_PI_2 - theta_o).to_degrees())))
+        let albedo = |theta_o: f64| DVec3::splat(albedo((FRAC_PI_2 - theta_o).to_degrees()));
+        rim_power(&Vec::from_iter((0..91).map(|row| albedo(theta_o(row, 91)))), albedo)
     }
 
     #[test]
@@ -98,7 +97,7 @@ mod tests {
         assert_eq!(power_of(|deg| 0.3 + 0.1 * deg), EVEN);
         assert_eq!(power_of(|_| 0.0), EVEN);
         assert_eq!(power_of(|_| f64::NAN), EVEN);
-        assert_eq!(rim_power(1, |_| DVec3::ONE), EVEN);
+        assert_eq!(rim_power(&[DVec3::ONE], |_| DVec3::ONE), EVEN);
         // It turns half-way: no power does.
         let found = power_of(|deg| (deg - 0.4).powi(2));
         assert!(POWERS[0] as f32 <= found && found <= POWERS[1] as f32, "{found}");

@@ -64,13 +64,13 @@ impl SplitSum {
             // Along and across the tangent: of a long lobe the least and the most.
             if is_isotropic { from(0.0) } else { 0.5 * (from(0.0) + from(FRAC_PI_2)) }
         };
-        let row = |row: usize| {
-            let albedo = albedo(theta_o(row, ROWS));
+        let albedos: Vec<_> = (0..ROWS).into_par_iter().map(|row| albedo(theta_o(row, ROWS))).collect();
+        let rim_power = rim_power(&albedos, albedo);
+        let parts = |albedo: DVec3| {
             let diffuse = diffuse.min(albedo);
             [diffuse, albedo - diffuse]
         };
-        let rim_power = rim_power(ROWS, albedo);
-        Self { roughness_alpha, rim_power, albedos: (0..ROWS).into_par_iter().map(row).collect() }
+        Self { roughness_alpha, rim_power, albedos: albedos.into_iter().map(parts).collect() }
     }
 
     /// The numbers of the shader's buffer: roughness_alpha, then the two albedos of each row.

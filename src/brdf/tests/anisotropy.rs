@@ -4,11 +4,6 @@ use rayon::prelude::*;
 use super::samples::of_model;
 use super::*;
 
-fn direction(theta_deg: f64, phi_deg: f64) -> DVec3 {
-    let (sin_theta, cos_theta) = theta_deg.to_radians().sin_cos();
-    (DVec2::from_angle(phi_deg.to_radians()) * sin_theta).extend(cos_theta)
-}
-
 /// Pairs of directions all over the hemisphere, half of them near mirror directions.
 fn pairs() -> impl Iterator<Item = (DVec3, DVec3)> {
     (0..400).map(f64::from).flat_map(|t| {

@@ -7,11 +7,6 @@ fn brdf(model: &str, parameters: &str) -> Brdf {
     Brdf::from_parameters(model, parameters.replace(';', "\n").parse().unwrap()).unwrap()
 }
 
-fn direction(theta_deg: f64, phi_deg: f64) -> DVec3 {
-    let (sin_theta, cos_theta) = theta_deg.to_radians().sin_cos();
-    (DVec2::from_angle(phi_deg.to_radians()) * sin_theta).extend(cos_theta)
-}
-
 /// Pairs of directions up to `most_deg` from the normal.
 fn pairs(most_deg: f64) -> impl Iterator<Item = (DVec3, DVec3)> {
     (0..300)

@@ -4,12 +4,6 @@ use rayon::prelude::*;
 use super::samples;
 use super::*;
 
-fn direction(theta_deg: f64, phi_deg: f64) -> DVec3 {
-    let (sin_theta, cos_theta) = theta_deg.to_radians().sin_cos();
-    let (sin_phi, cos_phi) = phi_deg.to_radians().sin_cos();
-    dvec3(sin_theta * cos_phi, sin_theta * sin_phi, cos_theta)
-}
-
 /// Pairs of directions all over the hemisphere.
 fn pairs() -> impl Iterator<Item = (DVec3, DVec3)> {
     (0..400).map(f64::from).map(|t| (direction((t * 7.31) % 89.9, t * 31.7), direction((t * 3.77) % 89.9, t * 11.3)))

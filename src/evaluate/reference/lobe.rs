@@ -30,27 +30,29 @@ pub struct Lobe {
     narrowness: f64,
     /// In the tangent plane, a unit vector.
     long_axis: DVec2,
+    /// The tangent of the arc's angle to the normal where it ends: 0 of an isotropic BRDF.
+    most_slope: f64,
 }
 
 impl Lobe {
     pub fn of(brdf: &Brdf) -> Self {
         let LobeShape { is_isotropic, narrowness, long_axis, .. } = LobeShape::of(brdf);
         let radii = VIEWS_DEG.map(|theta_o_deg| lobe_radius(brdf, theta_o_deg.to_radians()));
-        Self { radii, is_isotropic, narrowness, long_axis }
+        let narrowest = radii.iter().copied().fold(FRAC_PI_2, f64::min);
+        let most_slope = if is_isotropic { 0.0 } else { LENGTHS * narrowest / narrowness };
+        Self { radii, is_isotropic, narrowness, long_axis, most_slope }
     }
 
     /// It as seen from unit `w_o`, which is in the frame of the surface: with the least radius at the view angles beside that of `w_o`.
     pub fn seen_from(&self, w_o: DVec3) -> SeenLobe {
-        let Self { radii, is_isotropic, narrowness, long_axis } = *self;
+        let Self { radii, is_isotropic, narrowness, long_axis, most_slope } = *self;
         let theta_o_deg = w_o.truncate().length().atan2(w_o.z).to_degrees();
         let next = VIEWS_DEG.iter().position(|&view| view > theta_o_deg).unwrap_or(VIEWS_DEG.len() - 1);
         let radius = radii[next].min(radii[next - 1]);
-        let narrowest = radii.iter().copied().fold(FRAC_PI_2, f64::min);
-        let (long_axis, most_slope) = match is_isotropic {
-            true if w_o.z > GRAZING_COS => (long_axis, 0.0),
+        let (long_axis, most_slope) = match is_isotropic && w_o.z <= GRAZING_COS {
             // In the plane of incidence.
             true => (w_o.truncate().normalize(), LENGTHS * radius),
-            false => (long_axis, LENGTHS * narrowest / narrowness),
+            false => (long_axis, most_slope),
         };
         SeenLobe { w_o, radius, is_isotropic, narrowness, long_axis, most_slope }
     }

@@ -96,12 +96,13 @@ impl Targets {
             };
             Ok((lights, slices[0].albedo()))
         };
-        let rows = (0..azimuths * rows).into_par_iter().map(target).collect::<Result<_>>()?;
+        let targets = (0..azimuths * rows).into_par_iter().map(target).collect::<Result<Vec<_>>>()?;
         let albedo = |theta_o: f64| {
             Slice::with_lobes_of_view(brdf, &lobe, View { theta_o, phi_o: 0.0 }, Resolution::FULL)[0].albedo()
         };
-        let rim_power = rim_power(settings.rows, albedo);
-        Ok(Self { azimuths, rows, lobe, rim_power })
+        let albedos: Vec<_> = targets[..rows].iter().map(|(_, albedo)| *albedo).collect();
+        let rim_power = rim_power(&albedos, albedo);
+        Ok(Self { azimuths, rows: targets, lobe, rim_power })
     }
 
     /// Whether the cosine kernel alone does in all rows.
