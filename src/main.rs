@@ -2,7 +2,7 @@
 //!
 //! Exit codes: 0 done; 1 the machine could not (Vulkan, memory, a full disk, validation messages), or pictures differ by more than they may
 //! (`compare --at-most`); 2 the input was wrong;
-//! 130 cancelled by Ctrl-C. Whatever went wrong is one line on standard error.
+//! 130 cancelled, by Ctrl-C or SIGTERM. Whatever went wrong is one line on standard error.
 
 mod cli;
 

@@ -1,6 +1,7 @@
 //! Long computations stop soon after they are told to: a window waits for them when it closes.
 mod common;
 use common::{Validated, data, model, ready, sphere};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
@@ -188,8 +189,9 @@ fn an_interrupted_rendering_ends_soon_and_leaves_no_file() {
     let texels: Vec<[f32; 4]> = (0..width * height).map(|i| [(i % 97) as f32, (i % 31) as f32, 1.0, 1.0]).collect();
     let map = folder.path().join("map.exr");
     threadlight::low_level::output::write_exr(&map, width, height, &texels, false, &Default::default()).unwrap();
-    let mut interrupted = 0;
-    for after in [300, 1500, 3000].map(Duration::from_millis) {
+    let mut interrupted = BTreeSet::new();
+    for (after, signal) in [(300, "INT"), (1500, "TERM"), (1500, "INT"), (3000, "TERM"), (3000, "INT")] {
+        let after = Duration::from_millis(after);
         let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_threadlight"));
         command.args(["render", "--no-cache", "--environment", "map.exr", "--size", "64x48", "-o", "picture.png"]);
         if let Ok(device) = std::env::var("THREADLIGHT_TEST_DEVICE") {
@@ -198,17 +200,17 @@ fn an_interrupted_rendering_ends_soon_and_leaves_no_file() {
         let mut child = command.current_dir(folder.path()).stderr(std::process::Stdio::piped()).spawn().unwrap();
         std::thread::sleep(after);
         let start = Instant::now();
-        let sent = std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+        let sent = std::process::Command::new("kill").args(["-s", signal, &child.id().to_string()]).status().unwrap();
         let status = child.wait().unwrap();
-        println!("render, interrupted after {after:?}: {:?}", start.elapsed());
+        println!("render, {signal} after {after:?}: {:?}, {status}", start.elapsed());
         // Before the handler is there, and after the work is done, there is nothing to say.
         if sent.success() && status.code() == Some(130) {
-            interrupted += 1;
+            interrupted.insert(signal);
             assert!(start.elapsed() < SOON, "{:?}", start.elapsed());
             let left: Vec<_> =
                 std::fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().file_name()).collect();
-            assert_eq!(left, ["map.exr"], "interrupted after {after:?}");
+            assert_eq!(left, ["map.exr"], "{signal} after {after:?}");
         }
     }
-    assert!(interrupted > 0, "none of them was at work");
+    assert_eq!(interrupted.len(), 2, "only by {interrupted:?}");
 }

@@ -1,11 +1,11 @@
-//! The progress bar of a long computation, and Ctrl-C as the way out of it.
+//! The progress bar of a long computation, and the ways out of it: Ctrl-C, and SIGTERM, which schedulers and `timeout` send.
 use super::say;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use threadlight::low_level::progress::Observer;
 
-/// A bar on a terminal (nothing elsewhere); Ctrl-C cancels what it shows.
+/// A bar on a terminal (nothing elsewhere); Ctrl-C and SIGTERM cancel what it shows.
 pub struct TerminalProgress {
     bar: ProgressBar,
     cancelled: Arc<AtomicBool>,
@@ -28,6 +28,13 @@ impl TerminalProgress {
             }
             say(format_args!("stopping after what runs now; Ctrl-C again stops at once"));
         })?;
+        #[cfg(unix)]
+        {
+            use signal_hook::{consts::SIGTERM, flag};
+            // In this order, the second one ends the program and the first one does not.
+            flag::register_conditional_shutdown(SIGTERM, 128 + SIGTERM, cancelled.clone())?;
+            flag::register(SIGTERM, cancelled.clone())?;
+        }
         let style =
             ProgressStyle::with_template(&format!("{{prefix}} {{wide_bar}} {{pos}}/{{len}} {units}, {{eta}} left"))?;
         let bar = ProgressBar::no_length().with_style(style).with_prefix(name);

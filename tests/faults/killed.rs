@@ -67,7 +67,7 @@ fn a_program_that_is_ended_at_any_moment_leaves_whole_files_and_the_next_run_the
         let number = status.signal().or(status.code()).filter(|&code| code != 0);
         let numbers: &[i32] = match signal {
             "KILL" => &[9],
-            "TERM" => &[15],
+            "TERM" => &[15, 130],
             "HUP" => &[1],
             _ => &[2, 130],
         };
