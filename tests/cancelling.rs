@@ -78,7 +78,7 @@ fn hard_scene() -> Prepared {
 #[test]
 fn the_reference_stops_at_once_and_comes_in_stages() {
     let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
-    let gpu = Validated::new();
+    let gpu = Validated::with_own_memo();
     let prepared = hard_scene();
     for after in [100, 1000, 3000].map(Duration::from_millis) {
         let settings = ReferenceSettings { tolerance: 1e-6, ..ReferenceSettings::default() };
@@ -117,7 +117,7 @@ fn the_reference_stops_at_once_and_comes_in_stages() {
 #[test]
 fn an_environment_stops_being_blurred_at_once() {
     let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
-    let gpu = Validated::new();
+    let gpu = Validated::with_own_memo();
     let map = data().map(|data| data.join("env/studio_small_03_1k.hdr")).filter(|map| map.exists());
     let source = map.map_or(Source::Builtin("studio".into()), Source::File);
     let start = Instant::now();
@@ -151,7 +151,7 @@ fn a_mesh_stops_being_read_at_once() {
 #[test]
 fn the_first_stages_of_a_large_reference_come_soon() {
     let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
-    let gpu = Validated::new();
+    let gpu = Validated::with_own_memo();
     let mut scene = sphere(MaterialSource::Builtin("gold".into()), "studio", 1, (640, 480));
     scene.shading.method = Method::Reference;
     let prepared = ready(&scene);
@@ -167,7 +167,7 @@ fn the_first_stages_of_a_large_reference_come_soon() {
 #[test]
 fn repeated_frames_stop_between_two() {
     let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
-    let gpu = Validated::new();
+    let gpu = Validated::with_own_memo();
     let prepared = ready(&sphere(MaterialSource::Builtin("gold".into()), "white", 1, (48, 36)));
     let renderer = gpu.renderer(&prepared);
     let time = time_to_stop(Duration::from_millis(500), |flag| {

@@ -71,9 +71,7 @@ fn small_environment(folder: &Path, name: &str) -> EnvironmentSource {
 #[test]
 fn every_estimator_and_the_split_sum_agree_with_their_cpu_twins() {
     let gpu = Validated::new();
-    // A folder of its own: what the CPU blurs is compared with what the device does.
-    let folder = tempfile::tempdir().unwrap();
-    let cpu = Memo::new(Some(folder.path()));
+    let cpu = gpu.memo_of_twin();
     let folder = tempfile::tempdir().unwrap();
     let table = folder.path().join("table.binary");
     std::fs::write(&table, common::merl_like_table()).unwrap();
@@ -142,7 +140,7 @@ fn brushed() -> MaterialSource {
 fn estimators_that_draw_by_the_azimuth_of_the_view_agree_with_their_cpu_twins() {
     let gpu = Validated::new();
     let folder = tempfile::tempdir().unwrap();
-    let cpu = Memo::new(Some(folder.path()));
+    let cpu = gpu.memo_of_twin();
     let studio = small_environment(folder.path(), "studio");
     for method in ["importance", "importance_fixed", "filtered", "ris", "mis"] {
         // Beside it an isotropic one, whose rows are others.
@@ -160,7 +158,7 @@ fn estimators_that_draw_by_the_azimuth_of_the_view_agree_with_their_cpu_twins() 
 #[test]
 fn anisotropic_models_are_the_same_in_glsl() {
     let gpu = Validated::new();
-    let cpu = Memo::default();
+    let cpu = gpu.memo_of_twin();
     for text in [
         "model = 'conductor'\ndistribution = 'ggx'\nmetal = 'Al'\nalpha_x = 0.05\nalpha_y = 0.3\nrotation_deg = 30",
         "model = 'conductor'\ndistribution = 'beckmann'\nmetal = 'Cu'\nalpha_x = 0.4\nalpha_y = 0.1",
@@ -205,7 +203,7 @@ fn both_sides_of_a_measured_table_are_the_same_in_glsl() {
     std::fs::write(&table, common::lopsided_table()).unwrap();
     let studio = small_environment(folder.path(), "studio");
     let scene = scene(MaterialSource::File(table), studio, Method::Uniform, 32, (48, 36));
-    compare_with_twin(&gpu, &Memo::default(), &scene, "table");
+    compare_with_twin(&gpu, &gpu.memo_of_twin(), &scene, "table");
     gpu.finish();
 }
 

@@ -28,7 +28,7 @@ fn ask(gpu: &Validated, scene: &Scene) -> (DeviceScene, Vec<&'static str>) {
 
 #[test]
 fn each_change_makes_what_it_needs_and_nothing_else() {
-    let gpu = Validated::new();
+    let gpu = Validated::with_own_memo();
     let mut before = small();
     // Of a material with a lobe, which has kernels.
     before.materials[0].source = MaterialSource::Builtin("red-plastic".into());
@@ -129,7 +129,7 @@ fn what_a_renderer_is_made_of_is_in_the_key_of_a_scene_and_what_frames_are_given
 
 #[test]
 fn light_that_brings_lamps_brings_the_brdfs_that_they_are_shaded_by() {
-    let gpu = Validated::new();
+    let gpu = Validated::with_own_memo();
     let folder = tempfile::tempdir().unwrap();
     let map = |name: &str, lamp: f32| {
         let path = folder.path().join(name);
@@ -151,7 +151,7 @@ fn light_that_brings_lamps_brings_the_brdfs_that_they_are_shaded_by() {
 
 #[test]
 fn a_lobe_that_mirrors_lamps_brings_what_they_are_blurred_to() {
-    let gpu = Validated::new();
+    let gpu = Validated::with_own_memo();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("lamp.exr");
     let is_lamp = |i: usize| (60..63).contains(&(i % 128)) && (20..23).contains(&(i / 128));
@@ -170,7 +170,7 @@ fn a_lobe_that_mirrors_lamps_brings_what_they_are_blurred_to() {
 
 #[test]
 fn a_rotation_of_the_material_fits_nothing() {
-    let gpu = Validated::new();
+    let gpu = Validated::with_own_memo();
     let turned = |rotation_deg: f64| {
         let text =
             format!("distribution = 'ggx'\nmetal = 'Al'\nalpha_x = 0.1\nalpha_y = 0.3\nrotation_deg = {rotation_deg}");
@@ -193,7 +193,7 @@ fn a_rotation_of_the_material_fits_nothing() {
 
 #[test]
 fn drafts_of_a_drag_share_light_and_shaders() {
-    let gpu = Validated::new();
+    let gpu = Validated::with_own_memo();
     let of_alpha = |alpha: f64| {
         let metal = common::model(&format!("model = 'conductor'\ndistribution = 'ggx'\nmetal = 'Al'\nalpha = {alpha}"));
         sphere(metal, "sun", 2, (32, 24))
@@ -237,7 +237,7 @@ impl CustomBrdf for Counted {
 
 #[test]
 fn a_brdf_that_stays_is_not_evaluated_again() {
-    let gpu = Validated::new();
+    let gpu = Validated::with_own_memo();
     let count = Arc::new(AtomicUsize::new(0));
     let mut scene = small();
     scene.materials[0].source = MaterialSource::Custom(Custom::new(Counted(count.clone())));
@@ -262,7 +262,7 @@ fn a_brdf_that_stays_is_not_evaluated_again() {
 
 #[test]
 fn files_count_by_content() {
-    let gpu = Validated::new();
+    let gpu = Validated::with_own_memo();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("material.toml");
     let write = |reflectance: f64| {
@@ -297,7 +297,7 @@ fn files_count_by_content() {
 
 #[test]
 fn what_a_seed_does_not_change_is_not_made_again() {
-    let gpu = Validated::new();
+    let gpu = Validated::with_own_memo();
     for (method, made) in
         [(Method::Fitted, &[][..]), (Method::Gaussian, &[]), (Method::Paper, &["threads", "upload of materials"])]
     {
@@ -330,7 +330,7 @@ fn a_mesh_file_and_a_builtin_of_its_name_are_two() {
 
 #[test]
 fn thirty_materials_take_less_than_200_mb_on_the_device() {
-    let gpu = Validated::new();
+    let gpu = Validated::with_own_memo();
     let mut scene = small();
     (scene.image.width, scene.image.height) = (640, 480);
     scene.environment.source = Source::Builtin("studio".into());
@@ -374,7 +374,7 @@ impl Observer for Notes {
 
 #[test]
 fn every_slow_step_says_what_it_is_and_how_far_it_is() {
-    let gpu = Validated::new();
+    let gpu = Validated::with_own_memo();
     let notes = Notes::default();
     let folder = tempfile::tempdir().unwrap();
     let ask = |folder: &Path, notes: &dyn Observer| {

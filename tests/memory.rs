@@ -15,7 +15,7 @@ fn resident_bytes() -> Option<u64> {
 
 #[test]
 fn two_hundred_changes_do_not_grow_memory() {
-    let gpu = Validated::new();
+    let gpu = Validated::with_own_memo();
     let environments = ["white", "sky"];
     let mut scene = sphere(MaterialSource::Builtin("clay".into()), "white", 4, (32, 24));
     let mut used = Vec::new();

@@ -46,9 +46,7 @@ fn custom_metal() -> MaterialSource {
 #[test]
 fn the_shader_agrees_with_its_cpu_twin() {
     let gpu = Validated::new();
-    // A folder of its own: what the CPU blurs is compared with what the device does.
-    let folder = tempfile::tempdir().unwrap();
-    let cpu = Memo::new(Some(folder.path()));
+    let cpu = gpu.memo_of_twin();
     let mut materials = analytic_materials();
     materials.push((
         "blinn-phong",
@@ -193,7 +191,7 @@ fn lamps_of_many_sizes_are_shaded_as_by_the_cpu_twin() {
     threadlight::low_level::output::write_exr(&map, 128, 64, &texels, false, &Default::default()).unwrap();
     // As far as the view grazes it.
     std::fs::write(&ground, "v -90 -1 90\nv 90 -1 90\nv 90 -1 -90\nv -90 -1 -90\nf 1 2 3 4\n").unwrap();
-    let memo = Memo::default();
+    let memo = gpu.memo_of_twin();
     let mut _held = None;
     for (name, parameters) in [
         ("narrow", "model = 'conductor'\ndistribution = 'beckmann'\nalpha = 0.005\nmetal = 'Cr'"),
@@ -250,7 +248,7 @@ fn materials_that_need_different_shaders_are_shaded_as_their_cpu_twin_side_by_si
         scene.shading.method = method;
         let prepared = ready(&scene);
         let rendering = gpu.render(&prepared, EVERYTHING);
-        let memo = Memo::default();
+        let memo = gpu.memo_of_twin();
         let twin = shading::CpuShader::new(&prepared, &memo.round(&())).unwrap();
         let most = if gpu.has_exact_functions() { 2e-3 } else { 0.03 };
         let (interior, edge) = compare_with_twin(&prepared, &rendering, &twin, most, method.name());
@@ -694,7 +692,7 @@ fn what_takes_long_is_shaded_in_portions_that_make_up_the_picture() {
     assert_eq!(rendering.passes.iter().filter(|pass| pass.name == "shade").count(), 1);
     let Counters { interior_pixels, covered_edge_subpixels, .. } = rendering.counters;
     assert_eq!(rendering.lookups, 10_000 * u64::from(interior_pixels + covered_edge_subpixels));
-    let memo = Memo::default();
+    let memo = gpu.memo_of_twin();
     let twin = shading::CpuShader::new(&prepared, &memo.round(&())).unwrap();
     for pixel in pixels(&prepared).filter(|pixel| (pixel.x + 96 * pixel.y) % 41 == 0) {
         let expected = twin.shade(pixel, &texels_of(&prepared, &rendering, pixel));

@@ -6,7 +6,6 @@ use glam::{DAffine3, DMat3, DVec3, EulerRot, Mat3, UVec2, Vec3, Vec4};
 use threadlight::Method;
 use threadlight::low_level::evaluate::{Comparable, Display, compare};
 use threadlight::low_level::geometry_texel::GeometryTexel;
-use threadlight::low_level::memo::Memo;
 use threadlight::low_level::output::write_exr;
 use threadlight::low_level::passes::Sampling;
 use threadlight::low_level::pipeline::Rendering;
@@ -150,7 +149,7 @@ fn the_shader_agrees_with_its_cpu_twin_on_long_lobes() {
         _ => [(i % 7) as f32, (i / 64) as f32 / 8.0, 0.5, 1.0],
     };
     write_exr(&path, 64, 32, &(0..64 * 32).map(texel).collect::<Vec<_>>(), false, &Default::default()).unwrap();
-    let cpu = Memo::default();
+    let cpu = gpu.memo_of_twin();
     let turned = "alpha_x = 0.05; alpha_y = 0.3; rotation_deg = 30";
     for (method, threads, roughness) in [
         (Method::Fitted, 8, "alpha_x = 0.05; alpha_y = 0.3"),

@@ -5,6 +5,7 @@ use std::path::Path;
 use glam::DVec3;
 use plotters::coord::Shift;
 use plotters::prelude::*;
+use rayon::prelude::*;
 
 use super::material_curves::{CELLS, CHANNELS, LIGHTS, Side, albedo_angles_deg, in_plane};
 use crate::brdf::Brdf;
@@ -93,7 +94,7 @@ fn image(area: &Area, side: &Side, caption: &str) -> Drawn {
 
 fn albedo(area: &Area, side: &Side, caption: &str) -> Drawn {
     let angles: Vec<f64> = albedo_angles_deg().collect();
-    let albedos: Vec<DVec3> = angles.iter().map(|&angle| side.albedo(angle)).collect();
+    let albedos: Vec<DVec3> = angles.par_iter().map(|&angle| side.albedo(angle)).collect();
     let most = albedos.iter().fold(1.0, |most: f64, albedo| most.max(albedo.max_element()));
     let mut chart = ChartBuilder::on(area)
         .caption(caption, ("sans-serif", 15).into_font().color(&TEXT))

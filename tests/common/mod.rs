@@ -16,7 +16,7 @@ use threadlight::low_level::vulkan::{Device, DeviceKind, Instance, Messages};
 /// A device with validation on; `finish` fails the test if validation said anything, from first call to last.
 pub struct Validated {
     pub device: Arc<Device>,
-    /// In memory only.
+    /// [`memo_of_run`], if no other takes its place.
     pub memo: Memo,
     /// Holds what the next renderer may have in common with it.
     last: Mutex<Option<DeviceScene>>,
@@ -29,11 +29,16 @@ impl Validated {
         Self::on(std::env::var("THREADLIGHT_TEST_DEVICE").ok().as_deref())
     }
 
+    /// The same, with a memo of its own in memory: for tests of what is made, and when.
+    pub fn with_own_memo() -> Self {
+        Self { memo: Memo::default(), ..Self::new() }
+    }
+
     /// The device of this name or index.
     pub fn on(wanted: Option<&str>) -> Self {
         let instance = Instance::new(true).expect("an instance with validation");
         let device = Device::new(&instance, wanted).expect("a device");
-        Self { device, memo: Memo::default(), last: Mutex::default(), messages: instance.messages() }
+        Self { device, memo: memo_of_run(), last: Mutex::default(), messages: instance.messages() }
     }
 
     /// Whether exp, log, sin and the like are good to the last bits, as on the CPU. Vulkan promises less ("Precision and Operation of
@@ -46,6 +51,11 @@ impl Validated {
     /// `mipmapPrecisionBits` say; GPUs have 8.
     pub fn has_exact_lookups(&self) -> bool {
         self.device.description().kind == DeviceKind::Cpu
+    }
+
+    /// For CPU twins: where the device is a GPU, and blurs maps itself, it has none of what that made.
+    pub fn memo_of_twin(&self) -> Memo {
+        if self.device.description().kind == DeviceKind::Cpu { memo_of_run() } else { Memo::default() }
     }
 
     pub fn render(&self, prepared: &Prepared, wanted: Wanted) -> Rendering {
@@ -111,8 +121,15 @@ pub fn map([width, height]: [usize; 2], radiance: impl Fn(DVec3) -> f64) -> Envi
     CustomEnvironment::new("map", width, height, (0..width * height).map(pixel).collect()).unwrap().into()
 }
 
+/// One that keeps threads and blurred maps in the folder that THREADLIGHT_TEST_CACHE names, in memory only if it is not set: making them is most of
+/// the time of tests. `ci/test` has such a folder, empty at the start, since an earlier version of the program may have made others. Tests of what
+/// is made, and when, have a memo of their own.
+pub fn memo_of_run() -> Memo {
+    Memo::new(std::env::var_os("THREADLIGHT_TEST_CACHE").map(PathBuf::from).as_deref())
+}
+
 pub fn ready(scene: &Scene) -> Prepared {
-    prepare(scene, &Memo::default().round(&())).expect("a scene that can be prepared")
+    prepare(scene, &memo_of_run().round(&())).expect("a scene that can be prepared")
 }
 
 /// A material given by its model and parameters in TOML.
