@@ -1,10 +1,11 @@
 //! `threadlight bench` as its user meets it: what it prints and writes.
 //!
 //! Runs on the device that THREADLIGHT_TEST_DEVICE names, or else on the one that the program prefers.
+mod common;
+
 use assert_cmd::Command;
 use serde_json::Value;
 use std::fs;
-use std::path::PathBuf;
 use tempfile::TempDir;
 
 /// What makes measurements quick.
@@ -14,8 +15,7 @@ const QUICK_TRUTH: &str = "--reference-tolerance 1e-2";
 /// What `threadlight bench` prints in `folder`; it must succeed and have nothing to complain about.
 fn bench(folder: &TempDir, arguments: &str) -> String {
     let mut command = Command::new(env!("CARGO_BIN_EXE_threadlight"));
-    // Threads and blurred maps are made once in a run of all tests: see `memo_of_run` in common/mod.rs.
-    let cache = std::env::var_os("THREADLIGHT_TEST_CACHE").map_or(folder.path().join("cache"), PathBuf::from);
+    let cache = common::folder_of_run().unwrap_or(folder.path().join("cache"));
     command.current_dir(folder).env("THREADLIGHT_CACHE", cache).env_remove("RUST_LOG");
     command.arg("bench").args(arguments.split(' '));
     if let Some(device) = std::env::var_os("THREADLIGHT_TEST_DEVICE") {

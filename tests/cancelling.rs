@@ -190,8 +190,8 @@ fn an_interrupted_rendering_ends_soon_and_leaves_no_file() {
     let map = folder.path().join("map.exr");
     threadlight::low_level::output::write_exr(&map, width, height, &texels, false, &Default::default()).unwrap();
     let mut interrupted = BTreeSet::new();
-    for (after, signal) in [(300, "INT"), (1500, "TERM"), (1500, "INT"), (3000, "TERM"), (3000, "INT")] {
-        let after = Duration::from_millis(after);
+    let moments = [300, 1500, 3000].map(Duration::from_millis);
+    for (after, signal) in moments.into_iter().flat_map(|after| ["INT", "TERM"].map(|signal| (after, signal))) {
         let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_threadlight"));
         command.args(["render", "--no-cache", "--environment", "map.exr", "--size", "64x48", "-o", "picture.png"]);
         if let Ok(device) = std::env::var("THREADLIGHT_TEST_DEVICE") {

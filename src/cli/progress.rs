@@ -31,7 +31,7 @@ impl TerminalProgress {
         #[cfg(unix)]
         {
             use signal_hook::{consts::SIGTERM, flag};
-            // In this order, the second one ends the program and the first one does not.
+            // In this order a second SIGTERM ends the program, and the first one does not.
             flag::register_conditional_shutdown(SIGTERM, 128 + SIGTERM, cancelled.clone())?;
             flag::register(SIGTERM, cancelled.clone())?;
         }

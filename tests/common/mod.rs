@@ -5,6 +5,7 @@ use std::f64::consts::{PI, TAU};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
+use tempfile::TempDir;
 use threadlight::CustomEnvironment;
 use threadlight::low_level::memo::{Memo, Round};
 use threadlight::low_level::pipeline::{DeviceScene, Rendering, Wanted};
@@ -18,6 +19,8 @@ pub struct Validated {
     pub device: Arc<Device>,
     /// [`memo_of_run`], if no other takes its place.
     pub memo: Memo,
+    /// What the twin's memo keeps, where it shares nothing with other tests.
+    of_twin: TempDir,
     /// Holds what the next renderer may have in common with it.
     last: Mutex<Option<DeviceScene>>,
     messages: Messages,
@@ -38,7 +41,8 @@ impl Validated {
     pub fn on(wanted: Option<&str>) -> Self {
         let instance = Instance::new(true).expect("an instance with validation");
         let device = Device::new(&instance, wanted).expect("a device");
-        Self { device, memo: memo_of_run(), last: Mutex::default(), messages: instance.messages() }
+        let of_twin = tempfile::tempdir().expect("a folder");
+        Self { device, memo: memo_of_run(), of_twin, last: Mutex::default(), messages: instance.messages() }
     }
 
     /// Whether exp, log, sin and the like are good to the last bits, as on the CPU. Vulkan promises less ("Precision and Operation of
@@ -53,9 +57,11 @@ impl Validated {
         self.device.description().kind == DeviceKind::Cpu
     }
 
-    /// For CPU twins: where the device is a GPU, and blurs maps itself, it has none of what that made.
+    /// For the CPU twin. A GPU blurs maps itself, so there the twin has a folder of its own: what the CPU blurs is compared with what the device
+    /// does.
     pub fn memo_of_twin(&self) -> Memo {
-        if self.device.description().kind == DeviceKind::Cpu { memo_of_run() } else { Memo::default() }
+        let of_run = folder_of_run().filter(|_| self.device.description().kind == DeviceKind::Cpu);
+        Memo::new(Some(of_run.as_deref().unwrap_or(self.of_twin.path())))
     }
 
     pub fn render(&self, prepared: &Prepared, wanted: Wanted) -> Rendering {
@@ -73,7 +79,7 @@ impl Validated {
     }
 
     pub fn finish(self) {
-        let Self { device, messages, memo, last } = self;
+        let Self { device, messages, memo, last, .. } = self;
         drop((last, memo));
         // Background work that a closed viewer has left behind ends by itself.
         let left = Instant::now() + Duration::from_secs(20);
@@ -121,11 +127,15 @@ pub fn map([width, height]: [usize; 2], radiance: impl Fn(DVec3) -> f64) -> Envi
     CustomEnvironment::new("map", width, height, (0..width * height).map(pixel).collect()).unwrap().into()
 }
 
-/// One that keeps threads and blurred maps in the folder that THREADLIGHT_TEST_CACHE names, in memory only if it is not set: making them is most of
-/// the time of tests. `ci/test` has such a folder, empty at the start, since an earlier version of the program may have made others. Tests of what
-/// is made, and when, have a memo of their own.
+/// Where the tests of a run share threads, blurred maps and references: making them is most of the time of tests. `ci/test` names a folder that is
+/// empty at the start, since an earlier version of the program may have made others.
+pub fn folder_of_run() -> Option<PathBuf> {
+    std::env::var_os("THREADLIGHT_TEST_CACHE").map(PathBuf::from)
+}
+
+/// A memo of that folder, or in memory only if there is none.
 pub fn memo_of_run() -> Memo {
-    Memo::new(std::env::var_os("THREADLIGHT_TEST_CACHE").map(PathBuf::from).as_deref())
+    Memo::new(folder_of_run().as_deref())
 }
 
 pub fn ready(scene: &Scene) -> Prepared {
