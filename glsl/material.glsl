@@ -26,6 +26,8 @@ struct Material {
     float dark_from;   // that of the lobe: src/brdf/lobe/mod.rs
     vec4 narrowing;    // narrowing there
     float rim_power;   // that of its threads or its split sum: src/threads/rim.rs
+    uint base_map;     // which irradiance map its threads look up
+    float base[6];     // the profile of that: src/brdf/base.rs
 };
 
 layout(set = 0, binding = 5, std430) readonly buffer Materials {

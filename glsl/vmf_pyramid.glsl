@@ -3,7 +3,7 @@
 #include "environment_map.glsl"
 
 layout(set = 0, binding = 4) uniform samplerCube environment_pyramid;
-layout(set = 0, binding = 13) uniform samplerCube irradiance_map;
+layout(set = 0, binding = 13) uniform samplerCubeArray irradiance_maps;
 layout(set = 0, binding = 15) uniform samplerCube source_pyramid;
 
 // Width of the kernel of level 0, in radians: FINEST_WIDTH_RAD in src/threads/fitted/kernel.rs.

@@ -1,5 +1,5 @@
 //! What shading looks up of an environment, in memory: its filtered forms, and which of them the kernels of threads need.
-use crate::brdf::MIN_COS_THETA_D;
+use crate::brdf::{BaseProfile, MIN_COS_THETA_D};
 use crate::environment::sources::clearance;
 use crate::environment::{Environment, Pyramid, VmfPyramid};
 use crate::memo::Keyed;
@@ -60,8 +60,8 @@ pub struct BlurredLight {
     pub rest: Keyed<VmfPyramid>,
     /// Its small sources alone, blurred, if some lobe mirrors them.
     pub sources: Option<Keyed<VmfPyramid>>,
-    /// Irradiance over pi, without the small sources.
-    pub irradiance: Keyed<Pyramid>,
+    /// Irradiance over pi by each of [`bases`], without the small sources.
+    pub irradiance: Vec<Keyed<Pyramid>>,
     /// What kernels look up besides.
     pub needs: KernelNeeds,
 }
@@ -81,10 +81,27 @@ impl BlurredLight {
         Self {
             rest: half(&self.rest),
             sources: self.sources.as_ref().map(half),
-            irradiance: in_half_floats(&self.irradiance, scale),
+            irradiance: self.irradiance.iter().map(|map| in_half_floats(map, scale)).collect(),
             needs: self.needs,
         }
     }
+}
+
+/// The profiles of the bases of these threads, each once, Lambert's if there are none, and which of them each has; the first where it has none.
+pub fn bases<'t>(threads: impl IntoIterator<Item = Option<&'t Threads>>) -> (Vec<BaseProfile>, Vec<usize>) {
+    let mut bases = Vec::new();
+    let place = |threads: Option<&Threads>| {
+        let Some(table) = threads.and_then(Threads::fitted) else { return 0 };
+        bases.iter().position(|base| *base == table.base).unwrap_or_else(|| {
+            bases.push(table.base);
+            bases.len() - 1
+        })
+    };
+    let places = threads.into_iter().map(place).collect();
+    if bases.is_empty() {
+        bases.push(BaseProfile::EVEN);
+    }
+    (bases, places)
 }
 
 /// What kernels look up besides the pyramid of the environment without its small sources.

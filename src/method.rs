@@ -237,9 +237,9 @@ mod tests {
         for method in Method::ALL.iter().filter(|method| method.runs_on_gpu()) {
             let declares = |name| method.shader().unwrap().declares(name).unwrap();
             let split_sum = declares("SplitSums");
-            let blurred = declares("irradiance_map") && !split_sum;
+            let blurred = declares("irradiance_maps");
             let declared = Lookups {
-                box_filtered: declares("environment_pyramid") && !declares("irradiance_map"),
+                box_filtered: declares("environment_pyramid") && !blurred && !split_sum,
                 blurred,
                 map: declares("environment_map") && !blurred,
                 aliases: declares("LightAliases"),

@@ -10,8 +10,8 @@ use crate::progress::Observer;
 use crate::scene::{ImageSettings, Mesh, Scene};
 use crate::specialise::{ShadersOfMaterials, classify_constants};
 use crate::steps::{
-    CheckDevice, CompileCompute, CompileGeometryCache, UploadBackground, UploadLight, UploadMaterials, UploadMesh,
-    UploadShaders, light, pipelines,
+    CheckDevice, CompileCompute, CompileGeometryCache, UploadBackground, UploadIrradiance, UploadLight,
+    UploadMaterials, UploadMesh, UploadShaders, light, pipelines,
 };
 use crate::vulkan::{Device, Frames, PassTime, Shader, compiled};
 use crate::{Error, Result};
@@ -113,11 +113,13 @@ impl DeviceScene {
         let evaluates_brdf = method.evaluates_brdf(environment);
         let shaded = prepared.shaded();
         // Drafts follow each other faster than light could be uploaded and shaders compiled for what each of them needs.
-        let light = light(round, Some(device), method, environment, (!prepared.is_draft).then_some(&*shaded))?;
+        let light = light(round, Some(device), method, environment, &shaded, prepared.is_draft)?;
         let finest_level = light.blurred.as_ref().map(|blurred| finest_level(&blurred.rest));
         let upload = UploadMaterials { device, method, materials: &materials, evaluates_brdf, finest_level };
         let materials = round.ask(&upload)?;
         let shaders = ShadersOfMaterials::new(prepared, light.blurred.as_ref());
+        let irradiance = light.blurred.as_ref().map(|light| round.ask(&UploadIrradiance { device, light, way_around }));
+        let irradiance = irradiance.transpose()?;
         let light = round.ask(&UploadLight { device, method, environment, light: &light, way_around })?;
         let of_classes = shaders.constants_of_classes().map(|constants| compile(shader, &constants));
         let pipelines = of_classes.collect::<Result<_>>()?;
@@ -138,7 +140,7 @@ impl DeviceScene {
                 shader_count: shaders.constants.len() as u32,
                 shader_of_mixed: shaders.of_mixed,
             },
-            shade: Shade { pipelines, materials, light, sampling, method },
+            shade: Shade { pipelines, materials, light, irradiance, sampling, method },
             background,
             tone_map: ToneMap { pipeline: compile(&compiled::TONE_MAP, &[])? },
             way_around,

@@ -124,7 +124,7 @@ fn an_environment_stops_being_blurred_at_once() {
     let environment = gpu.round().ask(&LoadEnvironment(&source)).unwrap();
     println!("loaded in {:?}", start.elapsed());
     for after in [20, 200, 1000].map(Duration::from_millis) {
-        let blur = |flag: &Flag| blurred_light(&gpu.memo.round(flag), Some(&gpu.device), &environment, Some(&[]));
+        let blur = |flag: &Flag| blurred_light(&gpu.memo.round(flag), Some(&gpu.device), &environment, &[], false);
         let time = time_to_stop(after, blur);
         println!("blur, cancelled after {after:?}: {time:?}");
         assert!(time < SOON, "cancelled after {after:?}: {time:?}");

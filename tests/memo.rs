@@ -64,8 +64,10 @@ fn each_change_makes_what_it_needs_and_nothing_else() {
             // White is a single pixel, than which every kernel is sharper; in the sky none is.
             &[
                 "environment",
+                "light by cosines",
                 "irradiance",
                 "upload of materials",
+                "upload of irradiance",
                 "upload of the environment",
                 "shaders",
                 "upload of the background",

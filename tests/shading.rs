@@ -224,8 +224,8 @@ fn lamps_of_many_sizes_are_shaded_as_by_the_cpu_twin() {
 #[test]
 fn materials_that_need_different_shaders_are_shaded_as_their_cpu_twin_side_by_side() {
     let gpu = Validated::new();
-    // Kernels sharper than the pyramid, a tangent, no lobe at all, tables; and one that is as another.
-    let materials = ["chrome", "brushed-aluminium", "clay", "blue-velvet", "gold", "skin"];
+    // Kernels sharper than the pyramid, a tangent, no lobe at all, tables; one that is as another, and one with a base of its own.
+    let materials = ["chrome", "brushed-aluminium", "clay", "blue-velvet", "gold", "porcelain"];
     let mut scene = sphere(MaterialSource::Builtin("gold".to_owned()), "studio", 4, (96, 64));
     scene.image.background = threadlight::low_level::scene::Background::None;
     scene.materials = materials

@@ -228,6 +228,15 @@ vec3 within_pixel(vec3 axis, Surface surface) {
     return axis * sqrt(1.0 + 4.0 * surface.normal_variance / dot(axis, axis));
 }
 
+// What the base of a BRDF answers light at this cosine with, over what Lambert's does. Twin: src/brdf/base.rs.
+float base_profile(Material material, float cosine) {
+    float profile = 0.0;
+    [[unroll]] for (int power = 5; power >= 0; --power) {
+        profile = profile * cosine + material.base[power];
+    }
+    return profile;
+}
+
 // Adds a source, as a square of its variance.
 void add_source(inout AtSources sum, Source source, float clear, Surface surface, Material material, vec3 w_o) {
     vec3 middle = source.direction.xyz * surface.frame;
@@ -277,7 +286,7 @@ void add_source(inout AtSources sum, Source source, float clear, Surface surface
                 w_i = normalize(vec3(w_i.xy, above.y));
             }
             sum.f_cos += power * brdf_at(surface, material, w_i, w_o);
-            sum.cosine += power;
+            sum.cosine += power * base_profile(material, w_i.z);
         }
         place.x += 1.0;
         if (place.x > points.last.x) {
@@ -435,10 +444,10 @@ vec3 estimate(Surface surface, Material material, uint first, uint stride) {
     }
     vec3 cosine_part = albedo_at(rows) - float(stride) * weights; // (F11)
     ++lookups;
-    vec3 irradiance = textureLod(irradiance_map, surface.frame[2], 0.0).rgb;
+    vec3 irradiance = textureLod(irradiance_maps, vec4(surface.frame[2], float(material.base_map)), 0.0).rgb;
     sum = float(stride) * sum + cosine_part * irradiance;
     if (HAS_SOURCES != 0) {
-        // The irradiance map has no sources.
+        // Irradiance maps have no sources.
         sum += mix(at.f_cos, at.cosine * cosine_part / radians(180.0), of_kernels);
     }
     return max(sum, vec3(0.0));

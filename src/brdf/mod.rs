@@ -14,6 +14,7 @@ use glam::{DVec2, DVec3, dvec3};
 use crate::error::{Error, Result};
 use crate::file_format::{self, FileKind};
 
+mod base;
 mod builtin;
 mod files;
 mod lobe;
@@ -27,6 +28,7 @@ mod seen;
 mod symmetry;
 mod tabulate;
 
+pub use base::BaseProfile;
 pub(crate) use files::has_model;
 pub use files::merl_bytes;
 pub use lobe::{Ellipse, LobeShape, MIN_COS_THETA_D, NARROWING_COSINES, half_vector_width, lobe_radius};

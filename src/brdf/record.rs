@@ -1,5 +1,5 @@
 //! A material as shaders have it. Twin of the layout: glsl/material.glsl.
-use super::{Brdf, LobeShape};
+use super::{BaseProfile, Brdf, LobeShape};
 
 /// `ThreadTable` in glsl/material.glsl.
 #[repr(C)]
@@ -58,8 +58,10 @@ pub struct MaterialRecord {
     pub narrowing: [f32; 4],
     /// [`rim_power`](crate::threads::rim::rim_power) of its threads or its split sum.
     pub rim_power: f32,
-    /// None: shaders align records to 16 bytes.
-    pub padding: [u32; 3],
+    /// Which irradiance map is that of [`FittedTable::base`](crate::threads::FittedTable::base).
+    pub base_map: u32,
+    /// [`FittedTable::base`](crate::threads::FittedTable::base).
+    pub base: BaseProfile,
 }
 
 impl MaterialRecord {
@@ -81,7 +83,8 @@ impl MaterialRecord {
             dark_from: lobe.dark_from() as f32,
             narrowing: lobe.narrowing.map(|step| step as f32),
             rim_power: 1.0,
-            padding: [0; 3],
+            base_map: 0,
+            base: BaseProfile::EVEN,
         }
     }
 

@@ -1,14 +1,15 @@
-//! The irradiance map: the environment convolved with the cosine, which takes the part of every BRDF that is like Lambert's in one lookup.
+//! Irradiance maps: the environment convolved with what a diffuse base makes of the cosine. They take that part of a BRDF in one lookup.
 //!
-//! It is for environments without small bright sources: between the texels of a map their terminator would be a step, so
+//! They are for environments without small bright sources: between the texels of a map their terminator would be a step, so
 //! shading adds theirs exactly.
 use std::ops::Range;
 
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec3, Vec4};
 use rayon::prelude::*;
 
 use super::cube::{direction_of, face_of};
 use super::{Environment, Pyramid};
+use crate::brdf::BaseProfile;
 use crate::error::{Error, Result};
 use crate::progress::Observer;
 
@@ -31,71 +32,109 @@ struct Cell {
     centroid: Vec3,
 }
 
-/// Cells whose light is summed at once.
-const LANES: usize = 8;
-
-/// Cells side by side.
+/// Four cells side by side.
 #[derive(Clone, Copy, Default)]
 struct Block {
-    centroid: [[f32; LANES]; 3],
-    power: [[f32; LANES]; 3],
-    /// Middles times solid angles.
-    middle: [[f32; LANES]; 3],
+    centroid: [Vec4; 3],
+    power: [Vec4; 3],
+    middle: [Vec4; 3],
+    solid_angle: Vec4,
 }
 
-/// Irradiance over pi for every normal: a cube map of one level. The only error is that `observer` cancels it.
-pub fn irradiance_map(environment: &Environment, observer: &dyn Observer) -> Result<Pyramid> {
-    let cells = gather(environment, observer)?;
-    let block = |cells: &[Cell]| {
-        let mut block = Block::default();
+impl Block {
+    fn of(cells: &[Cell]) -> Self {
+        let mut block = Self::default();
         for (lane, cell) in cells.iter().enumerate() {
+            block.solid_angle[lane] = cell.solid_angle;
             for axis in 0..3 {
                 block.centroid[axis][lane] = cell.centroid[axis];
                 block.power[axis][lane] = cell.power[axis];
-                block.middle[axis][lane] = cell.solid_angle * cell.middle[axis];
+                block.middle[axis][lane] = cell.middle[axis];
             }
         }
         block
-    };
-    let blocks: Vec<_> = cells.chunks(LANES).map(block).collect();
-    let mut texels = vec![[0.0; 3]; 6 * FACE_SIZE * FACE_SIZE];
-    texels.par_chunks_mut(FACE_SIZE).enumerate().try_for_each(|(row, texels)| {
-        observer.check()?;
-        for (column, texel) in texels.iter_mut().enumerate() {
-            let middle = |index: usize| (index as f64 + 0.5) / FACE_SIZE as f64;
-            let normal = direction_of(row / FACE_SIZE, middle(column), middle(row % FACE_SIZE)).as_vec3();
-            *texel = pulp::Arch::new().dispatch(Gathering { blocks: &blocks, normal });
-        }
-        Ok::<_, Error>(())
-    })?;
-    Ok(Pyramid { face_size: FACE_SIZE, levels: vec![texels] })
+    }
 }
 
-/// A call of what sums the light that reaches a normal, compiled for the vector instructions that are there.
-struct Gathering<'a> {
-    blocks: &'a [Block],
-    normal: Vec3,
+/// Terms of a profile.
+const TERMS: usize = BaseProfile::EVEN.0.len();
+
+/// Red, green and blue light times each power of its cosine to a normal, from the first on, and the same of light of radiance 1.
+type Moments = [[f32; TERMS]; 4];
+
+/// The moments of an environment's light for every normal: what its irradiance by any base is a sum of; or only what it is by Lambert's, which is
+/// half of the work.
+pub struct LightMoments(Vec<Moments>);
+
+impl LightMoments {
+    /// Those of `environment` that `bases` need. The only error is that `observer` cancels it.
+    pub fn of(environment: &Environment, bases: &[BaseProfile], observer: &dyn Observer) -> Result<Self> {
+        let moments = match Self::are_even(bases) {
+            true => moments::<1>,
+            false => moments::<TERMS>,
+        };
+        let cells = gather(environment, observer)?;
+        let blocks: Vec<_> = cells.chunks(4).map(Block::of).collect();
+        let mut texels = vec![Moments::default(); 6 * FACE_SIZE * FACE_SIZE];
+        texels.par_chunks_mut(FACE_SIZE).enumerate().try_for_each(|(row, texels)| {
+            observer.check()?;
+            for (column, texel) in texels.iter_mut().enumerate() {
+                let middle = |index: usize| (index as f64 + 0.5) / FACE_SIZE as f64;
+                let normal = direction_of(row / FACE_SIZE, middle(column), middle(row % FACE_SIZE)).as_vec3();
+                *texel = moments(&blocks, normal);
+            }
+            Ok::<_, Error>(())
+        })?;
+        Ok(Self(texels))
+    }
+
+    /// Whether none of `bases` needs more than the first moments.
+    pub fn are_even(bases: &[BaseProfile]) -> bool {
+        bases.iter().all(|base| *base == BaseProfile::EVEN)
+    }
+
+    /// Irradiance over pi by one of its bases: a cube map of one level.
+    pub fn irradiance(&self, BaseProfile(profile): &BaseProfile) -> Pyramid {
+        let texel = |moments: &Moments| {
+            let sum = |moments: &[f32; TERMS]| moments.iter().zip(profile).map(|(moment, term)| moment * term).sum();
+            let [red, green, blue, constant]: [f32; 4] = moments.each_ref().map(sum);
+            // Over what a constant gives, which is pi but for the size of the cells: constants stay as they are.
+            [red, green, blue].map(|light| light / constant)
+        };
+        Pyramid { face_size: FACE_SIZE, levels: vec![self.0.iter().map(texel).collect()] }
+    }
 }
 
-impl pulp::NullaryFnOnce for Gathering<'_> {
-    type Output = [f32; 3];
-
-    #[inline(always)]
-    fn call(self) -> [f32; 3] {
-        let n = self.normal;
-        let dot = |[x, y, z]: &[[f32; LANES]; 3], lane: usize| n.x * x[lane] + n.y * y[lane] + n.z * z[lane];
-        let mut sums = [[0.0; LANES]; 4];
-        for Block { centroid, power, middle } in self.blocks {
-            for lane in 0..LANES {
-                let cos = dot(centroid, lane).max(0.0);
-                (0..3).for_each(|channel| sums[channel][lane] += cos * power[channel][lane]);
-                sums[3][lane] += dot(middle, lane).max(0.0);
+/// What of the light in `blocks` reaches a surface of this normal: the first moments.
+fn moments<const FIRST: usize>(blocks: &[Block], normal: Vec3) -> Moments {
+    let cosines = |[x, y, z]: [Vec4; 3]| (normal.x * x + normal.y * y + normal.z * z).max(Vec4::ZERO);
+    let mut sums = [[Vec4::ZERO; FIRST]; 4];
+    let [red, green, blue, constant] = &mut sums;
+    for block in blocks {
+        let cosines = cosines(block.centroid);
+        // Half of all blocks are below the horizon.
+        if cosines != Vec4::ZERO {
+            let mut powers = cosines;
+            for term in 0..FIRST {
+                red[term] += powers * block.power[0];
+                green[term] += powers * block.power[1];
+                blue[term] += powers * block.power[2];
+                powers *= cosines;
             }
         }
-        let [red, green, blue, cosines] = sums.map(|lanes| lanes.iter().sum::<f32>());
-        // Over what a constant gives, which is pi but for the size of the cells: constants stay as they are.
-        [red, green, blue].map(|sum| sum / cosines)
     }
+    for block in blocks {
+        let cosines = cosines(block.middle);
+        if cosines != Vec4::ZERO {
+            let mut powers = cosines * block.solid_angle;
+            for term in constant.iter_mut() {
+                *term += powers;
+                powers *= cosines;
+            }
+        }
+    }
+    let first = |sums: [Vec4; FIRST]| std::array::from_fn(|term| sums.get(term).map_or(0.0, |sum| sum.element_sum()));
+    sums.map(first)
 }
 
 /// The light of `environment` in cells.
@@ -165,12 +204,21 @@ mod tests {
     use super::*;
     use glam::DVec3;
 
+    /// About that of a plastic.
+    const COATED: BaseProfile = BaseProfile([0.0, 3.0, -3.0, 1.5, -0.4, 0.1]);
+
+    /// Of T over cosine-weighted directions.
+    fn mean(BaseProfile(terms): &BaseProfile) -> f64 {
+        terms.iter().enumerate().map(|(power, term)| 2.0 * f64::from(*term) / (power as f64 + 2.0)).sum()
+    }
+
     #[test]
     fn a_constant_stays_as_it_is_however_few_pixels_it_has() {
         for (width, height) in [(1, 1), (3, 2), (64, 32), (1, 300), (300, 1)] {
             let map = environment(width, height, |_, _| [1.0, 0.1, 7.0]);
-            let irradiance = irradiance_map(&map, &()).unwrap();
-            for texel in &irradiance.levels[0] {
+            let moments = LightMoments::of(&map, &[COATED], &()).unwrap();
+            let irradiance = [BaseProfile::EVEN, COATED].map(|base| moments.irradiance(&base));
+            for texel in irradiance.iter().flat_map(|map| &map.levels[0]) {
                 assert!((Vec3::from(*texel) / Vec3::new(1.0, 0.1, 7.0) - 1.0).abs().max_element() < 1e-5, "{texel:?}");
             }
         }
@@ -185,8 +233,9 @@ mod tests {
         let sources = map.small_sources();
         let sources: Vec<_> = sources.leaves().collect();
         assert_eq!(sources.len(), 1);
-        let irradiance = irradiance_map(&map.part(false), &()).unwrap();
-        for i in 0..200 {
+        let moments = LightMoments::of(&map.part(false), &[COATED], &()).unwrap();
+        let irradiance = [BaseProfile::EVEN, COATED].map(|base| (base, moments.irradiance(&base)));
+        for (i, (base, irradiance)) in (0..200).flat_map(|i| irradiance.iter().map(move |of_base| (i, of_base))) {
             let z: f64 = 1.0 - (f64::from(i) + 0.5) / 100.0;
             let angle = f64::from(i) * 2.4;
             let n = DVec3::new(angle.cos() * (1.0 - z * z).sqrt(), z, angle.sin() * (1.0 - z * z).sqrt());
@@ -194,13 +243,16 @@ mod tests {
             for row in 0..map.height {
                 for column in 0..map.width {
                     let cos = n.dot(map.direction(column as f64, row as f64)).max(0.0);
+                    let answer = cos * f64::from(base.at(cos as f32));
                     let solid_angle = map.weight_solid_angle(row);
-                    truth += cos * solid_angle * to_dvec3(&map.texels[row * map.width + column]);
+                    truth += answer * solid_angle * to_dvec3(&map.texels[row * map.width + column]);
                 }
             }
-            let of_source = sources[0].power * n.dot(sources[0].direction).max(0.0);
+            let cos = n.dot(sources[0].direction).max(0.0);
+            let of_source = sources[0].power * cos * f64::from(base.at(cos as f32)) / mean(base);
             let found = irradiance.lookup(n.as_vec3(), 0.0).as_dvec3() * std::f64::consts::PI + of_source;
             // A texel at the edge of the hemisphere is half in it.
+            truth /= mean(base);
             let error = ((found - truth) / truth.max(DVec3::splat(1.0))).abs().max_element();
             assert!(error < 2e-3, "{n}: {found}, not {truth}");
         }

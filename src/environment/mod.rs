@@ -22,7 +22,7 @@ mod vmf_pyramid;
 
 pub use custom::CustomEnvironment;
 pub use ggx_pyramid::{FINEST_ALPHA, ggx_pyramid, level_of_alpha};
-pub use irradiance::irradiance_map;
+pub use irradiance::LightMoments;
 pub use light_map::{Alias, LightMap};
 pub use procedural::builtin_names;
 pub use pyramid::{FractionBits, Pyramid};

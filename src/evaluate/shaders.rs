@@ -109,7 +109,7 @@ pub fn run(
 fn shaders_of(prepared: &Prepared, round: &Round) -> Result<ShadersOfMaterials> {
     let Prepared { method, environment, .. } = prepared;
     let light = match method.lookups().blurred {
-        true => Some(blurred_light(round, None, environment, Some(&prepared.shaded()))?),
+        true => Some(blurred_light(round, None, environment, &prepared.shaded(), false)?),
         false => None,
     };
     Ok(ShadersOfMaterials::new(prepared, light.as_ref()))

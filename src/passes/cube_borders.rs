@@ -3,7 +3,8 @@ use super::Readbacks;
 use crate::Result;
 use crate::graph::{FrameGraph, ImageDesc};
 use crate::vulkan::{
-    self, Device, GraphicsPipeline, GraphicsState, PipelineCache, Sampler, Triangles, VertexAttribute, compiled,
+    self, Device, GraphicsPipeline, GraphicsState, ImageKind, PipelineCache, Sampler, Triangles, VertexAttribute,
+    compiled,
 };
 use ash::vk;
 use serde::{Deserialize, Serialize};
@@ -31,7 +32,7 @@ impl WayAround {
     }
 }
 
-/// Draws a triangle of which nothing is seen, with `cube` bound.
+/// Draws a triangle of which nothing is seen, with `cube`, a cube map or an array of them, bound.
 ///
 /// # Errors
 /// Whatever Vulkan refuses.
@@ -45,7 +46,11 @@ pub(super) fn draw_with_cube_map(device: &Arc<Device>, cube: &vulkan::Image, sam
         colors: &[COLOR_FORMAT],
         depth: DEPTH_FORMAT,
     };
-    let (vertex, fragment) = (&compiled::CUBE_BORDERS_VERT, &compiled::CUBE_BORDERS_FRAG);
+    let vertex = &compiled::CUBE_BORDERS_VERT;
+    let fragment = match cube.shape.kind {
+        ImageKind::Cubes(_) => &compiled::CUBE_ARRAY_BORDERS_FRAG,
+        _ => &compiled::CUBE_BORDERS_FRAG,
+    };
     let cache = PipelineCache::new(device, None)?;
     let pipeline = GraphicsPipeline::new(device, &cache, vertex, fragment, &state)?;
     let mut graph = FrameGraph::new();

@@ -41,6 +41,27 @@ fn check_pixels(most: usize, environment: &Environment) -> Result<()> {
     Err(crate::Error::input(&environment.name, problem, "scale it down, or use --method filtered"))
 }
 
+/// The irradiance by each base of the scene's materials, on the device.
+pub struct DeviceIrradiance(DevicePyramid);
+
+impl DeviceIrradiance {
+    /// Uploads what `light` has; cube maps by `way_around`.
+    ///
+    /// # Errors
+    /// No device memory left, or more bases than an image has layers for: Vulkan promises 42.
+    pub fn new(device: &Arc<Device>, light: &BlurredLight, way_around: Option<WayAround>) -> Result<Self> {
+        let maps: Vec<&Pyramid> = light.irradiance.iter().map(|map| &**map).collect();
+        let kind = ImageKind::Cubes(maps.len() as u32);
+        let scale = light.radiance_scale();
+        DevicePyramid::of_kind(device, "irradiance maps", kind, &maps, scale, way_around).map(Self)
+    }
+
+    /// What it is in the shader.
+    pub(super) fn binding(&self) -> (&'static str, Bound<'_>) {
+        ("irradiance_maps", Bound::Sampled(&self.0.image, &self.0.sampler))
+    }
+}
+
 /// A pyramid on the device.
 pub(super) struct DevicePyramid {
     pub(super) image: vulkan::Image,
@@ -110,7 +131,6 @@ impl DeviceLight {
         let upload = |name, pyramid: &Pyramid| DevicePyramid::new(device, name, pyramid, scale, way_around).map(Some);
         self.pyramid = upload("environment pyramid", pyramid)?;
         self.source_pyramid = upload("source pyramid", source_pyramid)?;
-        self.irradiance = upload("irradiance map", &blurred.irradiance)?;
         let (words, uniform) = (environment.small_sources().device_words(scale), vk::BufferUsageFlags::UNIFORM_BUFFER);
         self.sources = Some(Buffer::with_contents(device, "light sources", uniform, bytemuck::cast_slice(&words))?);
         Ok(())
@@ -161,22 +181,39 @@ impl DevicePyramid {
         scale: f32,
         way_around: Option<WayAround>,
     ) -> Result<Self> {
+        Self::of_kind(device, name, ImageKind::Cube, &[pyramid], scale, way_around)
+    }
+
+    /// The same of several pyramids alike, one after the other.
+    fn of_kind(
+        device: &Arc<Device>,
+        name: &str,
+        kind: ImageKind,
+        pyramids: &[&Pyramid],
+        scale: f32,
+        way_around: Option<WayAround>,
+    ) -> Result<Self> {
         let single = vk::Format::R32G32B32A32_SFLOAT;
-        let use_single = !pyramid.fits_half(scale) && device.filters_linearly(single);
+        let fit_half = pyramids.iter().all(|pyramid| pyramid.fits_half(scale));
+        let use_single = !fit_half && device.filters_linearly(single);
         let level = |level| -> Vec<u8> {
-            if use_single {
-                bytemuck::cast_slice(&pyramid.texels_rgba32f(level, scale)).to_vec()
-            } else {
-                bytemuck::cast_slice(&pyramid.texels_rgba16f(level, scale)).to_vec()
-            }
+            let of_pyramid = |pyramid: &&Pyramid| -> Vec<u8> {
+                if use_single {
+                    bytemuck::cast_slice(&pyramid.texels_rgba32f(level, scale)).to_vec()
+                } else {
+                    bytemuck::cast_slice(&pyramid.texels_rgba16f(level, scale)).to_vec()
+                }
+            };
+            pyramids.iter().flat_map(of_pyramid).collect()
         };
-        let levels: Vec<_> = (0..pyramid.levels.len()).map(level).collect();
-        let face_size = pyramid.face_size as u32;
+        let first = pyramids[0];
+        let levels: Vec<_> = (0..first.levels.len()).map(level).collect();
+        let face_size = first.face_size as u32;
         let shape = ImageShape {
             format: if use_single { single } else { vk::Format::R16G16B16A16_SFLOAT },
             extent: [face_size, face_size, 1],
             levels: levels.len() as u32,
-            kind: ImageKind::Cube,
+            kind,
         };
         let image = vulkan::Image::with_texels(device, name, shape, &levels)?;
         let sampler = Sampler::new(device, name, SamplerKind::Trilinear)?;

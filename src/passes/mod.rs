@@ -28,7 +28,7 @@ pub use cube_borders::WayAround;
 pub use device_check::{Answers, Questions, Volume, ask};
 pub use geometry_cache::{DeviceMesh, GeometryCache, PlacedMesh, PlacedTangent, geometry_cache, geometry_pipeline};
 pub(crate) use geometry_cache::{GEOMETRY_STATE, geometry_shaders};
-pub use light::{DeviceLight, check_aliases};
+pub use light::{DeviceIrradiance, DeviceLight, check_aliases};
 #[cfg(feature = "viewer")]
 pub use present::{Area, present};
 pub use readback::{Readbacks, is_readback, texels};

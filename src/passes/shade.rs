@@ -1,6 +1,6 @@
 //! Pass 2 of the paper (section 4.2): the radiance of every listed pixel, by its partition of the sample threads.
 use super::brdf_atlas::BrdfAtlas;
-use super::{CameraRays, Counters, DeviceLight, Tiles, View};
+use super::{CameraRays, Counters, DeviceIrradiance, DeviceLight, Tiles, View};
 use crate::Result;
 use crate::brdf::{Brdf, LobeShape, MADE_TABLE_SIZE, MaterialRecord, ThreadTableRecord, merl};
 use crate::graph::{BufferDesc, BufferHandle, FrameGraph, ImageDesc, ImageHandle};
@@ -40,6 +40,8 @@ pub struct ShadedMaterial<'a> {
     pub lobe: &'a LobeShape,
     /// Its threads, for methods that have any.
     pub threads: Option<&'a Threads>,
+    /// Which irradiance map these look up.
+    pub base_map: usize,
     /// Its table, if it [has one](Brdf::has_table) and shaders evaluate it.
     pub table: Option<&'a Brdf>,
     /// Its CDFs, for methods that draw by them.
@@ -71,7 +73,9 @@ impl DeviceMaterials {
         let [phi_d, theta_d, _] = merl::DEVICE_TABLE_SIZE;
         let mut measured = BrdfAtlas::new([phi_d, theta_d]);
         let mut made = BrdfAtlas::new(MADE_TABLE_SIZE);
-        for ShadedMaterial { brdf, lobe, threads: own_threads, table, slices: own_slices, split_sum } in materials {
+        for ShadedMaterial { brdf, lobe, threads: own_threads, base_map, table, slices: own_slices, split_sum } in
+            materials
+        {
             let mut record = MaterialRecord::new(brdf, lobe);
             if evaluates_brdf && brdf.has_table() {
                 let table = table.expect("a table of a BRDF that shaders look up");
@@ -86,6 +90,7 @@ impl DeviceMaterials {
             }
             if let Some(own_threads) = own_threads {
                 record = own_threads.in_record(record, lobe);
+                record.base_map = base_map as u32;
                 [record.threads, record.subpixel_threads] = threads.add(own_threads);
             }
             record.first_slice = slices.len() as u32;
@@ -183,6 +188,8 @@ pub struct Shade {
     pub materials: Keyed<DeviceMaterials>,
     /// What lights them.
     pub light: Keyed<DeviceLight>,
+    /// What of the light the bases of fitted threads look up.
+    pub irradiance: Option<Keyed<DeviceIrradiance>>,
     /// How many threads or samples, and which random numbers.
     pub sampling: Sampling,
     /// The method of the shader.
@@ -260,7 +267,7 @@ pub fn shade<'a>(
     view: &View,
 ) -> Shaded {
     let Tiles { counters, parts, pixels, .. } = *tiles;
-    let Shade { pipelines, materials, light, sampling, .. } = shade;
+    let Shade { pipelines, materials, light, irradiance, sampling, .. } = shade;
     let format = vk::Format::R32G32B32A32_SFLOAT;
     let mut radiance = graph.kept_image("radiance", ImageDesc { format, width: view.width, height: view.height });
     let mut lookups = graph.buffer("lookups", BufferDesc { size_bytes: size_of::<u64>() as u64 });
@@ -287,6 +294,7 @@ pub fn shade<'a>(
         pass.modify("all_lookups", &mut lookups)
             .bind_all(materials.bindings())
             .bind_all(light.bindings())
+            .bind_all(irradiance.iter().map(|irradiance| irradiance.binding()))
             .indirect(counters, (0..pipelines.len()).map(dispatch));
     }
     Shaded { radiance, lookups }

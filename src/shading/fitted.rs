@@ -291,7 +291,7 @@ impl AtSources {
             if cos > 0.0 {
                 let power = weight * cos * source.power.truncate();
                 self.f_cos += power * point.brdf(w_i.with_z(above).normalize(), lobe.w_o);
-                self.cosine += power;
+                self.cosine += power * point.record().base.at(w_i.with_z(above).normalize().z);
             }
         }
     }
@@ -385,7 +385,13 @@ pub(super) fn estimate(point: &Point) -> Vec3 {
     }
     let share = point.stride as f32;
     let cosine_part = rows.albedo(threads) - share * weights;
-    sum = share * sum + cosine_part * light.irradiance.lookup_by(surface.frame.z_axis, 0.0, point.twin.fractions);
+    sum = share * sum
+        + cosine_part
+            * light.irradiance[point.record().base_map as usize].lookup_by(
+                surface.frame.z_axis,
+                0.0,
+                point.twin.fractions,
+            );
     sum += at.f_cos.lerp(at.cosine * cosine_part / PI, of_kernels);
     sum.max(Vec3::ZERO)
 }

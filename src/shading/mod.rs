@@ -6,7 +6,7 @@ use crate::Result;
 use crate::brdf::{Brdf, MAX_THETA_O_DEG, MaterialRecord};
 use crate::environment::{Alias, FractionBits, LightMap, SourceRecord};
 use crate::geometry_texel::GeometryTexel;
-use crate::light::Light;
+use crate::light::{Light, bases};
 use crate::memo::{Keyed, Round};
 use crate::method::{Lookups, Method};
 use crate::passes::{SMOOTH_DEG, SmoothVariance, View};
@@ -172,7 +172,7 @@ impl<'a> CpuShader<'a> {
         let Prepared { method, environment, materials, .. } = prepared;
         let evaluates_brdf = method.evaluates_brdf(environment);
         let lookups = method.lookups();
-        let light = light(round, None, *method, environment, Some(&prepared.shaded()))?;
+        let light = light(round, None, *method, environment, &prepared.shaded(), false)?;
         let map = match lookups {
             Lookups { blurred: true, .. } => Some(LightMap::with_sources_marked(environment)),
             Lookups { map: true, .. } => Some(LightMap::new(environment)),
@@ -184,8 +184,10 @@ impl<'a> CpuShader<'a> {
             false => Ok(None),
             true => Ok(Some((*round.ask(&Tabulate(&material.brdf))?).clone())),
         };
-        let record = |material: &PreparedMaterial| {
-            let record = MaterialRecord::new(&material.brdf, &material.lobe);
+        let (_, base_maps) = bases(materials.iter().map(|material| material.threads.as_deref()));
+        let record = |(material, base_map): (&PreparedMaterial, usize)| {
+            let record =
+                MaterialRecord { base_map: base_map as u32, ..MaterialRecord::new(&material.brdf, &material.lobe) };
             material.threads.as_deref().map_or(record, |threads| threads.in_record(record, &material.lobe))
         };
         let split_sums = where_needed(lookups.split_sum).map(|material| round.ask(&FitSplitSum(&material.brdf)));
@@ -196,7 +198,7 @@ impl<'a> CpuShader<'a> {
             map,
             slices: slices.collect::<Result<_>>()?,
             split_sums: split_sums.collect::<Result<_>>()?,
-            records: materials.iter().map(record).collect(),
+            records: materials.iter().zip(base_maps).map(record).collect(),
             tables: materials.iter().map(table).collect::<Result<_>>()?,
             sources: environment.small_sources().records(1.0),
             fractions: FractionBits::ALL,

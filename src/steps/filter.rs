@@ -1,7 +1,8 @@
 //! Filters environments: what the methods look up of them, in memory.
 use crate::Result;
-use crate::environment::{Environment, Pyramid, VmfPyramid, ggx_pyramid, irradiance_map, vmf_file};
-use crate::light::{BlurredLight, KernelNeeds, Light, PrefilteredLight};
+use crate::brdf::BaseProfile;
+use crate::environment::{Environment, LightMoments, Pyramid, VmfPyramid, ggx_pyramid, vmf_file};
+use crate::light::{BlurredLight, KernelNeeds, Light, PrefilteredLight, bases};
 use crate::memo::{Key, Keyed, Memo, Round, Step, Stored};
 use crate::method::Method;
 use crate::passes::vmf_pyramid;
@@ -45,19 +46,37 @@ impl BoxFilter<'_> {
     }
 }
 
-/// Irradiance over pi.
-struct Irradiance<'a>(&'a Keyed<Environment>);
+/// What irradiance of an environment by these bases is a sum of.
+struct GatherLight<'a>(&'a Keyed<Environment>, &'a [BaseProfile]);
+
+impl Step for GatherLight<'_> {
+    type Output = LightMoments;
+    const NAME: &'static str = "light by cosines";
+
+    fn key(&self, _: &Memo) -> Result<Key> {
+        Ok(Key::builder("moments").key(self.0.key).number(LightMoments::are_even(self.1)).build())
+    }
+
+    fn make(&self, round: &Round) -> Result<LightMoments> {
+        LightMoments::of(self.0, self.1, round.observer())
+    }
+}
+
+/// Irradiance over pi by a base of this profile.
+struct Irradiance<'a>(&'a Keyed<LightMoments>, BaseProfile);
 
 impl Step for Irradiance<'_> {
     type Output = Pyramid;
     const NAME: &'static str = "irradiance";
 
     fn key(&self, _: &Memo) -> Result<Key> {
-        Ok(Key::builder("irradiance").key(self.0.key).build())
+        let Self(light, BaseProfile(terms)) = self;
+        let key = Key::builder("irradiance").key(light.key);
+        Ok(terms.iter().fold(key, |key, term| key.real((*term).into())).build())
     }
 
-    fn make(&self, round: &Round) -> Result<Pyramid> {
-        irradiance_map(self.0, round.observer())
+    fn make(&self, _: &Round) -> Result<Pyramid> {
+        Ok(self.0.irradiance(&self.1))
     }
 }
 
@@ -131,7 +150,7 @@ impl Step for Blur<'_> {
     }
 }
 
-/// What `method` looks up of `environment` for these materials, or for any where there are none; `device` blurs, if there is one.
+/// What `method` looks up of `environment` for these materials, or what kernels of any others with the same bases do, too; `device` blurs, if there is one.
 ///
 /// # Errors
 /// Whatever Vulkan refuses; cancelled.
@@ -140,7 +159,8 @@ pub fn light(
     device: Option<&Arc<Device>>,
     method: Method,
     environment: &Keyed<Environment>,
-    materials: Option<&[WithThreads]>,
+    materials: &[WithThreads],
+    for_any: bool,
 ) -> Result<Light> {
     let lookups = method.lookups();
     Ok(Light {
@@ -149,20 +169,23 @@ pub fn light(
             false => None,
         },
         blurred: match lookups.blurred {
-            true => Some(blurred_light(round, device, environment, materials)?),
+            true => Some(blurred_light(round, device, environment, materials, for_any)?),
             false => None,
         },
         prefiltered: match lookups.split_sum {
             true => Some(PrefilteredLight {
                 by_ggx: round.ask(&GgxFilter(environment))?,
-                irradiance: round.ask(&Irradiance(environment))?,
+                irradiance: round.ask(&Irradiance(
+                    &round.ask(&GatherLight(environment, &[BaseProfile::EVEN]))?,
+                    BaseProfile::EVEN,
+                ))?,
             }),
             false => None,
         },
     })
 }
 
-/// What fitted threads look up of `environment` for these materials, or for any where there are none.
+/// What fitted threads look up of `environment` for these materials, or those of any others with the same bases, too.
 ///
 /// # Errors
 /// Whatever Vulkan refuses; cancelled.
@@ -170,7 +193,8 @@ pub fn blurred_light(
     round: &Round,
     device: Option<&Arc<Device>>,
     environment: &Keyed<Environment>,
-    materials: Option<&[WithThreads]>,
+    materials: &[WithThreads],
+    for_any: bool,
 ) -> Result<BlurredLight> {
     let has_sources = environment.has_small_sources();
     let part = |of_sources| match has_sources {
@@ -178,11 +202,13 @@ pub fn blurred_light(
         false => Ok(environment.clone()),
     };
     let rest = part(false)?;
-    let irradiance = round.ask(&Irradiance(&rest))?;
+    let (bases, _) = bases(materials.iter().map(|(_, threads)| *threads));
+    let by_cosines = round.ask(&GatherLight(&rest, &bases))?;
+    let irradiance = bases.into_iter().map(|base| round.ask(&Irradiance(&by_cosines, base))).collect::<Result<_>>()?;
     let rest = round.ask(&Blur { environment: &rest, device })?;
-    let needs = match materials {
-        Some(materials) => KernelNeeds::of(environment, materials, &rest),
-        None => KernelNeeds::of_any(environment),
+    let needs = match for_any {
+        true => KernelNeeds::of_any(environment),
+        false => KernelNeeds::of(environment, materials, &rest),
     };
     let sources = match needs.mirrored_sources {
         true => Some(round.ask(&Blur { environment: &part(true)?, device })?),

@@ -11,4 +11,4 @@ pub use compile::{CompileCompute, CompileGeometryCache, pipelines};
 pub use filter::{Blur, BoxFilter, blurred_light, light};
 pub use fit::{DraftThreads, FitSplitSum, FitThreads};
 pub use load::{FindLobe, LoadBrushedMesh, LoadEnvironment, LoadMaterial, LoadMesh, Tabulate, TabulateSlices};
-pub use upload::{UploadBackground, UploadLight, UploadMaterials, UploadMesh, UploadShaders};
+pub use upload::{UploadBackground, UploadIrradiance, UploadLight, UploadMaterials, UploadMesh, UploadShaders};

@@ -5,11 +5,12 @@ use super::load::{FindLobe, Tabulate, TabulateSlices};
 use crate::Result;
 use crate::brdf::Brdf;
 use crate::environment::Environment;
-use crate::light::Light;
+use crate::light::{BlurredLight, Light, bases};
 use crate::memo::{Key, Keyed, Memo, Round, Step};
 use crate::method::Method;
 use crate::passes::{
-    BackgroundMap, DeviceLight, DeviceMaterials, DeviceMesh, ShadedMaterial, WayAround, upload_shaders,
+    BackgroundMap, DeviceIrradiance, DeviceLight, DeviceMaterials, DeviceMesh, ShadedMaterial, WayAround,
+    upload_shaders,
 };
 use crate::scene::Mesh;
 use crate::threads::{FittedTable, Threads};
@@ -96,10 +97,12 @@ impl Step for UploadMaterials<'_> {
         let slices = self.of_each(|_| lookups.slices, |brdf| round.ask(&TabulateSlices(brdf)))?;
         let split_sums = self.of_each(|_| lookups.split_sum, |brdf| round.ask(&FitSplitSum(brdf)))?;
         let lobes = self.materials.iter().map(|(brdf, _)| round.ask(&FindLobe(brdf))).collect::<Result<Vec<_>>>()?;
+        let (_, base_maps) = bases(self.materials.iter().map(|(_, threads)| threads.map(|threads| &**threads)));
         let materials = self.materials.iter().enumerate().map(|(i, (brdf, threads))| ShadedMaterial {
             brdf,
             lobe: &lobes[i],
             threads: threads.map(|threads| &**threads),
+            base_map: base_maps[i],
             table: tables[i].as_deref(),
             slices: slices[i].as_deref(),
             split_sum: split_sums[i].as_deref(),
@@ -140,6 +143,31 @@ impl Step for UploadLight<'_> {
 
     fn make(&self, _: &Round) -> Result<DeviceLight> {
         DeviceLight::new(self.device, self.method, self.environment, self.light, self.way_around)
+    }
+}
+
+/// Uploads the irradiance by each base of the scene's materials.
+pub struct UploadIrradiance<'a> {
+    /// To where.
+    pub device: &'a Arc<Device>,
+    /// What it is part of.
+    pub light: &'a BlurredLight,
+    /// How cube maps are uploaded. Part of no key: a device has one.
+    pub way_around: Option<WayAround>,
+}
+
+impl Step for UploadIrradiance<'_> {
+    type Output = DeviceIrradiance;
+    const NAME: &'static str = "upload of irradiance";
+
+    fn key(&self, _: &Memo) -> Result<Key> {
+        let scale = self.light.radiance_scale();
+        let maps = self.light.irradiance.iter().map(|map| map.key);
+        Ok(on(self.device, "irradiance").real(scale.into()).keys(maps).build())
+    }
+
+    fn make(&self, _: &Round) -> Result<DeviceIrradiance> {
+        DeviceIrradiance::new(self.device, self.light, self.way_around)
     }
 }
 

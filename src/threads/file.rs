@@ -7,7 +7,7 @@
 //! | 8 | magic `THREADS\0` |
 //! | 4 | u32 format version, [`FORMAT_VERSION`] |
 //! | 4 | u32 length H of the header |
-//! | H | header, JSON: `method` ("fitted", "paper" or "gaussian"), `material`, `count`, `rows`, `seed`, `rim_power` if it is not 1, and `azimuths` and `sets` if there is more than one |
+//! | H | header, JSON: `method` ("fitted", "paper" or "gaussian"), `material`, `count`, `rows`, `seed`, `rim_power` if it is not 1, `base` if it is not Lambert's, and `azimuths` and `sets` if there is more than one |
 //! | ... | the rows, then the threads, see below |
 //! | 32 | BLAKE3 digest of everything before |
 //!
@@ -31,7 +31,8 @@
 //! numbers, x in the low half; level and red weight as half floats, level in the low half; green and blue weight as half floats, green
 //! in the low half. The level says by which von Mises-Fisher kernel the environment is to be blurred: of width 2^level / 256 radians if
 //! it is whole, by none at level -1, and otherwise by the linear blend of the two kernels of whole levels beside it. What the weights of
-//! all threads leave of the albedo is the weight of the irradiance over pi.
+//! all threads leave of the albedo is the weight of the irradiance over pi, by a base that answers light at the cosine c with the
+//! polynomial `base` in the place of Lambert's 1: its coefficients, that of c^0 first.
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
@@ -40,12 +41,13 @@ use super::azimuths::is_azimuth_count;
 use super::fitted::FittedTable;
 use super::rim::{EVEN, is_rim_power};
 use super::{ThreadKind, ThreadTable, Threads};
+use crate::brdf::BaseProfile;
 use crate::error::{Error, Result};
 use crate::file_format;
 use crate::output::write_whole;
 
 /// Version of the file format and of the threads in it: to be raised when either changes, since caches depend on it.
-pub const FORMAT_VERSION: u32 = 26;
+pub const FORMAT_VERSION: u32 = 27;
 
 const MAGIC: &[u8; 8] = b"THREADS\0";
 const DIGEST_BYTES: usize = blake3::OUT_LEN;
@@ -59,6 +61,8 @@ struct Header {
     seed: u64,
     #[serde(default = "even", skip_serializing_if = "is_even")]
     rim_power: f32,
+    #[serde(default = "lambert", skip_serializing_if = "is_lambert")]
+    base: [f32; 6],
     #[serde(default = "one", skip_serializing_if = "is_one")]
     azimuths: usize,
     #[serde(default = "one", skip_serializing_if = "is_one")]
@@ -75,6 +79,14 @@ fn even() -> f32 {
 
 fn is_even(power: &f32) -> bool {
     *power == EVEN
+}
+
+fn lambert() -> [f32; 6] {
+    BaseProfile::EVEN.0
+}
+
+fn is_lambert(base: &[f32; 6]) -> bool {
+    *base == lambert()
 }
 
 fn is_one(number: &usize) -> bool {
@@ -102,13 +114,13 @@ pub fn parse(path: &Path, bytes: &[u8]) -> Result<Threads> {
 fn encode(threads: &Threads) -> Vec<u8> {
     let [rows, count] = threads.size();
     let method = threads.kind().name().to_owned();
-    let (material, seed, rim_power, azimuths, sets) = match threads {
+    let (material, seed, rim_power, base, azimuths, sets) = match threads {
         Threads::Fitted(table) | Threads::Gaussian(table) => {
-            (table.material.clone(), 0, table.rim_power, table.azimuths, table.for_subpixels().sets)
+            (table.material.clone(), 0, table.rim_power, table.base.0, table.azimuths, table.for_subpixels().sets)
         }
-        Threads::Paper(table) => (table.material.clone(), table.seed, table.rim_power, 1, 1),
+        Threads::Paper(table) => (table.material.clone(), table.seed, table.rim_power, lambert(), 1, 1),
     };
-    let header = serde_json::to_vec(&Header { method, material, count, rows, seed, rim_power, azimuths, sets });
+    let header = serde_json::to_vec(&Header { method, material, count, rows, seed, rim_power, base, azimuths, sets });
     let header = header.expect("a header of strings and numbers is always JSON");
     let mut bytes = MAGIC.to_vec();
     bytes.extend(FORMAT_VERSION.to_le_bytes());
@@ -139,7 +151,7 @@ fn decode(bytes: &[u8]) -> Result<Threads, String> {
     let (&length, rest) = rest.split_first_chunk().ok_or("is cut short")?;
     let (header, payload) = rest.split_at_checked(u32::from_le_bytes(length) as usize).ok_or("is cut short")?;
     let header: Header = serde_json::from_slice(header).map_err(|error| format!("has a bad header ({error})"))?;
-    let Header { method, material, count, rows, seed, rim_power, azimuths, sets } = header;
+    let Header { method, material, count, rows, seed, rim_power, base, azimuths, sets } = header;
     let kind = ThreadKind::ALL.into_iter().find(|kind| kind.name() == method);
     let kind = kind.ok_or_else(|| format!("holds threads of the unknown method {method:?}"))?;
     let words_a_row = match kind {
@@ -156,6 +168,9 @@ fn decode(bytes: &[u8]) -> Result<Threads, String> {
     if !is_rim_power(rim_power) {
         return Err("has a header with a `rim_power` out of range".into());
     }
+    if !base.iter().all(|term| term.is_finite()) {
+        return Err("has a header with a `base` that is not of finite numbers".into());
+    }
     if count == 0 || rows == 0 || !is_possible || expected != Some(payload.len()) {
         return Err("has a header that does not fit its content".into());
     }
@@ -166,7 +181,7 @@ fn decode(bytes: &[u8]) -> Result<Threads, String> {
             let table = |words: &[u32], sets| -> Result<_, String> {
                 let (of_rows, of_threads) = words.split_at(words_a_row * rows * azimuths);
                 let table = FittedTable::from_file_words(of_rows, of_threads)?;
-                Ok(FittedTable { rows, azimuths, count, sets, rim_power, ..table })
+                Ok(FittedTable { rows, azimuths, count, sets, rim_power, base: BaseProfile(base), ..table })
             };
             let of_subpixels = are_two.then(|| table(second, sets).map(Box::new)).transpose()?;
             let table = table(first, if are_two { 1 } else { sets })?;
@@ -207,6 +222,7 @@ mod tests {
             sets: 1,
             material: "b".into(),
             rim_power: 0.3,
+            base: BaseProfile([0.5, 1.0, -0.25, 0.0, 0.0, 0.0]),
             albedo: vec![[0.1, 0.2, 0.4]; 2],
             relative_error: vec![1e-3; 2],
             kernels: vec![PackedKernel([0x1234_5678, 0x3800_4000, 0x3400_3000]); 2],

@@ -140,7 +140,8 @@ impl Threads {
         let record = MaterialRecord { rim_power: self.rim_power(), ..record };
         let Some(GivingWay { lobe_radius_rad, clear }) = self.giving_way(lobe) else { return record };
         let shared_deviation = self.shared_deviation(lobe) as f32;
-        MaterialRecord { shared_deviation, lobe_radius: lobe_radius_rad as f32, clear, ..record }
+        let base = self.fitted().map_or(record.base, |table| table.base);
+        MaterialRecord { shared_deviation, lobe_radius: lobe_radius_rad as f32, clear, base, ..record }
     }
 
     /// Whether albedos do not go evenly from the last row but one to the last.

@@ -91,7 +91,7 @@ impl Answers {
     fn new(brdf: &SeenBrdf, row: usize) -> Self {
         let theta_o = theta_o(row, ROWS);
         let slices = Slice::with_lobes(brdf, theta_o, Resolution::DRAFT);
-        let lights = TestLights::new(&slices, LIGHTS, 0, Quadrature::DRAFT);
+        let lights = TestLights::new(&slices, LIGHTS, 0, Quadrature::DRAFT, super::fitted::lights::BaseAnswers::even());
         Self { lights, albedo: slices[0].albedo(), mirror: dvec3(-theta_o.sin(), 0.0, theta_o.cos()) }
     }
 

@@ -152,7 +152,9 @@ impl Device {
         let mut timeline_semaphore = vk::PhysicalDeviceTimelineSemaphoreFeatures::default().timeline_semaphore(true);
         let mut synchronization2 = vk::PhysicalDeviceSynchronization2Features::default().synchronization2(true);
         let mut dynamic_rendering = vk::PhysicalDeviceDynamicRenderingFeatures::default().dynamic_rendering(true);
+        let features = vk::PhysicalDeviceFeatures::default().image_cube_array(true);
         let info = vk::DeviceCreateInfo::default()
+            .enabled_features(&features)
             .queue_create_infos(&queues)
             .enabled_extension_names(&extensions)
             .push_next(&mut timeline_semaphore)

@@ -16,6 +16,8 @@ pub enum ImageKind {
     Volume,
     /// Six square faces, sampled by direction.
     Cube,
+    /// So many of these, sampled by direction and number.
+    Cubes(u32),
 }
 
 /// Size, format and kind of an image.
@@ -38,7 +40,11 @@ impl ImageShape {
     }
 
     fn layers(&self) -> u32 {
-        if self.kind == ImageKind::Cube { 6 } else { 1 }
+        match self.kind {
+            ImageKind::Plane | ImageKind::Volume => 1,
+            ImageKind::Cube => 6,
+            ImageKind::Cubes(count) => 6 * count,
+        }
     }
 
     fn view_type(&self) -> vk::ImageViewType {
@@ -46,6 +52,7 @@ impl ImageShape {
             ImageKind::Plane => vk::ImageViewType::TYPE_2D,
             ImageKind::Volume => vk::ImageViewType::TYPE_3D,
             ImageKind::Cube => vk::ImageViewType::CUBE,
+            ImageKind::Cubes(_) => vk::ImageViewType::CUBE_ARRAY,
         }
     }
 
@@ -123,7 +130,7 @@ impl Image {
         let (flags, kind) = match shape.kind {
             ImageKind::Plane => (vk::ImageCreateFlags::empty(), vk::ImageType::TYPE_2D),
             ImageKind::Volume => (vk::ImageCreateFlags::empty(), vk::ImageType::TYPE_3D),
-            ImageKind::Cube => (vk::ImageCreateFlags::CUBE_COMPATIBLE, vk::ImageType::TYPE_2D),
+            ImageKind::Cube | ImageKind::Cubes(_) => (vk::ImageCreateFlags::CUBE_COMPATIBLE, vk::ImageType::TYPE_2D),
         };
         check_shape(device, name, shape, kind, usage, flags)?;
         let info = vk::ImageCreateInfo::default()
@@ -242,7 +249,8 @@ fn check_shape(
     let has_extent = shape.extent.iter().zip(most).all(|(size, most)| (1..=most).contains(size));
     let levels = width.max(height).max(depth).max(1).ilog2() + 1;
     let has_levels = (1..=levels.min(limits.max_mip_levels)).contains(&shape.levels);
-    let has_layers = shape.layers() <= limits.max_array_layers && (shape.kind != ImageKind::Cube || width == height);
+    let is_square = width == height || matches!(shape.kind, ImageKind::Plane | ImageKind::Volume);
+    let has_layers = (1..=limits.max_array_layers).contains(&shape.layers()) && is_square;
     if has_extent && has_levels && has_layers { Ok(()) } else { Err(refused()) }
 }
 

@@ -127,6 +127,11 @@ fn candidate(instance: &Instance, index: usize, physical: vk::PhysicalDevice) ->
     if properties.limits.max_per_stage_descriptor_storage_buffers < STORAGE_BUFFERS {
         lacks.push("seven storage buffers in a shader (maxPerStageDescriptorStorageBuffers)");
     }
+    // SAFETY: `physical` comes from this instance.
+    let features = unsafe { instance.raw.get_physical_device_features(physical) };
+    if features.image_cube_array == vk::FALSE {
+        lacks.push("arrays of cube maps (imageCubeArray)");
+    }
     let extensions = extensions(instance, physical, &name, &mut lacks)?;
     let (queue_family, timestamp_valid_bits) = queue_family(instance, physical, &mut lacks);
     let description = DeviceDescription {

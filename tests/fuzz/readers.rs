@@ -2,7 +2,7 @@
 use std::path::Path;
 
 use glam::{DVec3, dvec3};
-use threadlight::low_level::brdf::Brdf;
+use threadlight::low_level::brdf::{BaseProfile, Brdf};
 use threadlight::low_level::device_check::Verdict;
 use threadlight::low_level::environment::{Environment, Pyramid, VmfPyramid, vmf_file};
 use threadlight::low_level::evaluate::{Row, reference};
@@ -366,6 +366,7 @@ pub fn threads() -> Reader {
                 sets: 2,
                 material: material.clone(),
                 rim_power: -0.5,
+                base: BaseProfile([0.5, 1.0, -0.25, 0.0, 0.0, 0.0]),
                 albedo: vec![[0.1, 0.2, 0.4]; rows * azimuths],
                 relative_error: vec![1e-3; rows * azimuths],
                 kernels: vec![PackedKernel([0x1234_5678, 0x3800_4000, 0x3400_3000]); 2 * rows * azimuths],

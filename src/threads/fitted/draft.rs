@@ -4,7 +4,7 @@ use glam::DVec3;
 use super::edit::Edit;
 use super::generate::{Neighbour, Row, carried, from_the_middle, most_moved, scaled};
 use super::kernel::{Kernel, WIDEST_LEVEL, all_between, sharpest_level};
-use super::lights::{Quadrature, TestLights};
+use super::lights::{BaseAnswers, Quadrature, TestLights};
 use super::sets::share_of_sets;
 use super::solve::{Effort, Fit};
 use super::table::FittedTable;
@@ -53,7 +53,9 @@ const LIGHTS_A_THREAD: usize = 16;
 /// Cancelled by `observer`.
 pub fn draft(brdf: &Brdf, before: &FittedTable, observer: &dyn Observer) -> Result<FittedTable> {
     let share = share_of_sets(before.azimuths, before.of_subpixels.is_some());
-    let of_pixels = Drafting { brdf, before, share, lobe: LobeShape::of(brdf) };
+    // A map of another would take as long as several drafts.
+    let base = BaseAnswers::of(&before.base);
+    let of_pixels = Drafting { brdf, before, share, lobe: LobeShape::of(brdf), base: &base };
     let Some(of_subpixels) = &before.of_subpixels else { return continued(&of_pixels, observer) };
     let of_subpixels = Drafting { before: of_subpixels, ..of_pixels };
     let (of_pixels, of_subpixels) =
@@ -64,7 +66,7 @@ pub fn draft(brdf: &Brdf, before: &FittedTable, observer: &dyn Observer) -> Resu
 /// The threads that `drafting` continues, but not those of their sub-pixels.
 fn continued(drafting: &Drafting, observer: &dyn Observer) -> Result<FittedTable> {
     let before = drafting.before;
-    let FittedTable { rows, azimuths, sets, rim_power, .. } = *before;
+    let FittedTable { rows, azimuths, sets, rim_power, base, .. } = *before;
     let (mut places, columns) = (every(ROW_STEP, rows), every(AZIMUTH_STEP, azimuths));
     let before_rim = rows.saturating_sub(RIM_STEP + 1);
     if let (Err(place), 1) = (places.binary_search(&before_rim), azimuths) {
@@ -102,16 +104,17 @@ fn continued(drafting: &Drafting, observer: &dyn Observer) -> Result<FittedTable
         .map(|column| (0..places.len()).map(|at| edited[index(column, at)].clone()).collect())
         .collect();
     let row = |to: usize| {
-        let sharpest = sharpest_level(&drafting.lobe, view(to).theta_o);
+        let sharpest = sharpest_level(&drafting.lobe, before.count, view(to).theta_o);
         with_rest(blend(&fitted, to), &blend(&edited_where_fitted, to), &edited[to], sharpest)
     };
-    Ok(FittedTable::pack(&(0..azimuths * rows).map(row).collect::<Vec<_>>(), azimuths, sets, rim_power))
+    Ok(FittedTable::pack(&(0..azimuths * rows).map(row).collect::<Vec<_>>(), azimuths, sets, rim_power, base))
 }
 
 /// What rows are fitted by; what `share` is, [`Fit::in_sets`] says.
 struct Drafting<'a> {
     brdf: &'a Brdf,
     before: &'a FittedTable,
+    base: &'a BaseAnswers,
     share: f32,
     lobe: LobeShape,
 }
@@ -131,7 +134,7 @@ impl Drafting<'_> {
     fn target(&self, index: usize) -> Target {
         let slices = Slice::with_lobes_of_view(self.brdf, &self.lobe, self.view(index), Resolution::DRAFT);
         let count = FEWEST_LIGHTS + LIGHTS_A_THREAD * self.before.count;
-        let lights = TestLights::new(&slices, count, 0, Quadrature::DRAFT);
+        let lights = TestLights::new(&slices, count, 0, Quadrature::DRAFT, self.base);
         let albedo = slices[0].albedo();
         let kernels = scaled(&in_proportion(self.before, index, albedo), 1.0 / lights.unit);
         Target { lights, albedo, kernels }
@@ -140,9 +143,11 @@ impl Drafting<'_> {
     /// The fit of the row of this `index` to `target`.
     fn fit_to<'t>(&self, target: &'t Target, index: usize) -> Fit<'t> {
         let Target { lights, albedo, .. } = target;
-        Fit::new(lights, *albedo / lights.unit)
-            .in_sets(self.before.sets, self.share)
-            .no_sharper_than(sharpest_level(&self.lobe, self.view(index).theta_o))
+        Fit::new(lights, *albedo / lights.unit).in_sets(self.before.sets, self.share).no_sharper_than(sharpest_level(
+            &self.lobe,
+            self.before.count,
+            self.view(index).theta_o,
+        ))
     }
 
     /// How the BRDF was edited, as seen in the row of this `index`.

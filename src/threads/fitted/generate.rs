@@ -4,14 +4,15 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use glam::{DVec2, DVec3, dvec3};
 use rayon::prelude::*;
 
+use super::base::base_of;
 use super::cells::in_sets;
 use super::kernel::{Kernel, all_between, scale_rad, sharpest_level};
-use super::lights::{Quadrature, TestLights};
+use super::lights::{BaseAnswers, Quadrature, TestLights};
 use super::sets::{pixels_have_own, share_of_sets};
 use super::solve::{Effort, Fit};
 use super::stray;
 use super::table::FittedTable;
-use crate::brdf::{Brdf, LobeShape, SeenBrdf, luminance};
+use crate::brdf::{BaseProfile, Brdf, LobeShape, SeenBrdf, luminance};
 use crate::error::Result;
 use crate::progress::Observer;
 use crate::threads::azimuths::{View, azimuth_count};
@@ -72,6 +73,8 @@ struct Targets {
     lobe: LobeShape,
     /// Of its albedos, of an anisotropic BRDF those seen along its tangent.
     rim_power: f32,
+    /// The profile of what takes what kernels leave.
+    base: BaseProfile,
 }
 
 /// How many lights there are in a row for so many threads.
@@ -87,12 +90,17 @@ impl Targets {
     fn new(brdf: &Brdf, settings: &ThreadSettings, observer: &dyn Observer) -> Result<Self> {
         let (rows, count) = (settings.rows, light_count(settings.count));
         let (azimuths, lobe) = (azimuth_count(brdf), LobeShape::of(brdf));
+        let base = match settings.kind {
+            ThreadKind::Fitted => base_of(brdf, &lobe, observer)?,
+            _ => BaseProfile::EVEN,
+        };
+        let answers = BaseAnswers::of(&base);
         let target = |index: usize| -> Result<(TestLights, DVec3)> {
             observer.check()?;
             let slices = Slice::with_lobes_of_view(brdf, &lobe, View::of_row(index, rows), Resolution::FULL);
             let lights = match settings.kind {
                 ThreadKind::Gaussian => TestLights::directions(&slices, DIRECTIONS_A_LIGHT * count),
-                _ => TestLights::new(&slices, count, LIGHTS_SEED, Quadrature::FIT),
+                _ => TestLights::new(&slices, count, LIGHTS_SEED, Quadrature::FIT, &answers),
             };
             Ok((lights, slices[0].albedo()))
         };
@@ -102,7 +110,7 @@ impl Targets {
         };
         let albedos: Vec<_> = targets[..rows].iter().map(|(_, albedo)| *albedo).collect();
         let rim_power = rim_power(&albedos, albedo);
-        Ok(Self { azimuths, rows: targets, lobe, rim_power })
+        Ok(Self { azimuths, rows: targets, lobe, rim_power, base })
     }
 
     /// Whether the cosine kernel alone does in all rows.
@@ -159,7 +167,7 @@ fn fit_all(
         let (before, neighbours): (Vec<_>, Vec<_>) = neighbours.unzip();
         let fit = Fit::new(lights, *albedo / lights.unit)
             .in_sets(settings.sets, share)
-            .no_sharper_than(sharpest_level(&targets.lobe, to.theta_o));
+            .no_sharper_than(sharpest_level(&targets.lobe, settings.count, to.theta_o));
         let start = match &neighbours[..] {
             [] => {
                 let [_, lobes] = Slice::with_lobes_of_view(brdf, &targets.lobe, to, Resolution::FULL);
@@ -207,7 +215,7 @@ fn fit_all(
         // Where kernels are is kept, for drafts to start from.
         fitted.iter_mut().for_each(|(kernels, ..)| *kernels = scaled(kernels, 0.0));
     }
-    Ok(FittedTable::pack(&fitted, targets.azimuths, settings.sets, targets.rim_power))
+    Ok(FittedTable::pack(&fitted, targets.azimuths, settings.sets, targets.rim_power, targets.base))
 }
 
 /// f (n . w) of `brdf` for a view.

@@ -57,6 +57,7 @@ mod tests {
             sets: 1,
             material: String::new(),
             rim_power: 1.0,
+            base: crate::brdf::BaseProfile::EVEN,
             albedo: vec![[0.0; 3]],
             relative_error: vec![error],
             kernels: Vec::new(),

@@ -88,13 +88,18 @@ pub(super) const TOLD_RAD: f64 = 0.02;
 
 /// No kernel of a cusp is sharper than this: shading would look up a map of 1024 columns as it is, which costs several lookups.
 /// [`sharp_part`] is 0 there from 0.5 on, and half floats round levels by less than a thousandth.
-const SHARPEST_OF_CUSP: f64 = 0.51;
+///
+/// Nor is one of few threads of a lobe that is wide enough up to a view of this cosine: few pixels see it beyond that, but all would pay.
+const SHARPEST_WITHOUT_MAP: f64 = 0.51;
+const FEW_THREADS: usize = 16;
+const COS_OF_WIDE: f64 = 0.5;
 
-/// The level that kernels of a BRDF with this lobe are no sharper than, at the view angle `theta_o` in radians.
-pub fn sharpest_level(lobe: &LobeShape, theta_o: f64) -> f64 {
-    let narrowest_rad = (NARROWEST_IN_LOBE * lobe.width_rad).min(TOLD_RAD) * theta_o.cos().max(MIN_COS_THETA_D);
-    let least = if lobe.is_cusp { SHARPEST_OF_CUSP } else { SHARPEST_LEVEL };
-    (narrowest_rad / FINEST_WIDTH_RAD).log2().max(least)
+/// The level that kernels of so many threads of a BRDF with this lobe are no sharper than, at the view angle `theta_o` in radians.
+pub fn sharpest_level(lobe: &LobeShape, count: usize, theta_o: f64) -> f64 {
+    let at = |cos: f64| ((NARROWEST_IN_LOBE * lobe.width_rad).min(TOLD_RAD) * cos / FINEST_WIDTH_RAD).log2();
+    let is_wide = count <= FEW_THREADS && at(COS_OF_WIDE) > SHARPEST_WITHOUT_MAP;
+    let least = if lobe.is_cusp || is_wide { SHARPEST_WITHOUT_MAP } else { SHARPEST_LEVEL };
+    at(theta_o.cos().max(MIN_COS_THETA_D)).max(least)
 }
 
 /// A length on the scale of a kernel of `level`: its width; for those sharper than level 0, as if widths went on halving.

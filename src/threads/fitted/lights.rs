@@ -6,7 +6,7 @@ use std::sync::OnceLock;
 use glam::{DVec2, DVec3, Vec3, dvec2};
 
 use super::kernel::{SHARPEST_LEVEL, kappa_of_level, vmf_direction, vmf_peak};
-use crate::brdf::luminance;
+use crate::brdf::{BaseProfile, luminance};
 use crate::threads::slice::{Slice, fibonacci_lattice, on_sphere};
 use crate::vector_math::exp;
 
@@ -83,7 +83,13 @@ impl Quadrature {
 
 impl TestLights {
     /// About `count` lights, half in the `lobes` of `slice` and half anywhere. `seed` turns them.
-    pub fn new([slice, lobes]: &[Slice; 2], count: usize, seed: usize, quadrature: Quadrature) -> Self {
+    pub fn new(
+        [slice, lobes]: &[Slice; 2],
+        count: usize,
+        seed: usize,
+        quadrature: Quadrature,
+        base: &BaseAnswers,
+    ) -> Self {
         let per_scale = (count / SCALES / 2).next_multiple_of(LANES / 2);
         let mut directions = Vec::with_capacity(count);
         for scale in 0..SCALES {
@@ -104,7 +110,7 @@ impl TestLights {
             light_width(scale_of(j)).powf(WIDTH_EXPONENT) / (luminance(*response) / unit + DIM_RESPONSE)
         });
         let weights: Vec<f64> = weights.collect();
-        let cosine = |j: usize| cosine_response(directions[j].z, scale_of(j));
+        let cosine = |j: usize| base.response(directions[j].z, scale_of(j));
         Self::weighted(slice, &directions, &weights, &response, 0..SCALES, &cosine)
     }
 
@@ -254,27 +260,42 @@ impl pulp::NullaryFnOnce for Summing<'_> {
     }
 }
 
-/// The integral of max(cos, 0) / pi over a light of `scale` at this z.
-fn cosine_response(z: f64, scale: usize) -> f64 {
-    const STEPS: usize = 512;
-    static TABLES: OnceLock<Vec<Vec<f64>>> = OnceLock::new();
-    let tables = TABLES.get_or_init(|| {
+/// What the base answers lights with: the integral of T cos / pi over a light of each scale, over z.
+pub struct BaseAnswers(Vec<Vec<f64>>);
+
+const STEPS: usize = 512;
+
+impl BaseAnswers {
+    /// Of a base of this profile.
+    pub fn of(base: &BaseProfile) -> Self {
         let table = |scale| {
             let points = kernel_points(light_kappa(scale), 512);
-            (0..=STEPS).map(|i| cosine_integral(2.0 * i as f64 / STEPS as f64 - 1.0, &points)).collect()
+            let z = |i: usize| 2.0 * i as f64 / STEPS as f64 - 1.0;
+            (0..=STEPS).map(|i| base_integral(base, z(i), &points)).collect()
         };
-        (0..SCALES).map(table).collect()
-    });
-    let at = (0.5 * (z + 1.0)).clamp(0.0, 1.0) * STEPS as f64;
-    let below = (at as usize).min(STEPS - 1);
-    let table = &tables[scale];
-    table[below] + (table[below + 1] - table[below]) * (at - below as f64)
+        Self((0..SCALES).map(table).collect())
+    }
+
+    /// Of Lambert's.
+    pub fn even() -> &'static Self {
+        static EVEN: OnceLock<BaseAnswers> = OnceLock::new();
+        EVEN.get_or_init(|| Self::of(&BaseProfile::EVEN))
+    }
+
+    fn response(&self, z: f64, scale: usize) -> f64 {
+        let at = (0.5 * (z + 1.0)).clamp(0.0, 1.0) * STEPS as f64;
+        let below = (at as usize).min(STEPS - 1);
+        let table = &self.0[scale];
+        table[below] + (table[below + 1] - table[below]) * (at - below as f64)
+    }
 }
 
 /// That integral for a light of these points whose direction has this z.
-fn cosine_integral(z: f64, points: &[DVec3]) -> f64 {
+fn base_integral(base: &BaseProfile, z: f64, points: &[DVec3]) -> f64 {
     let sin = (1.0 - z * z).max(0.0).sqrt();
-    FRAC_1_PI * points.iter().map(|point| (z * point.z + sin * point.x).max(0.0)).sum::<f64>() / points.len() as f64
+    let answer = |cos: f64| cos * f64::from(base.at(cos as f32));
+    FRAC_1_PI * points.iter().map(|point| answer((z * point.z + sin * point.x).max(0.0))).sum::<f64>()
+        / points.len() as f64
 }
 
 /// So many points of equal mass of the kernel of this kappa around z.

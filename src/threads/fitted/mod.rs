@@ -5,6 +5,7 @@
 //! | kernels, and how they overlap lights | [`kernel`] |
 //! | the lights that they are fitted to | [`lights`] |
 //! | the directions that Gaussians are fitted to instead | `directions` |
+//! | what takes what kernels leave | `base` |
 //! | where the fit of the first row starts | [`cells`] |
 //! | how kernels answer them | [`answers`] |
 //! | the fit of one row | [`solve`] |
@@ -16,6 +17,7 @@
 //! | where kernels give way to the BRDF beside lamps | [`GivingWay`] |
 //! | as stored, 12 bytes a thread and row, and looked up, 16 | [`FittedTable`] |
 pub mod answers;
+mod base;
 pub mod cells;
 mod directions;
 mod draft;

@@ -18,7 +18,7 @@ use crate::progress::Observer;
 const MOST_OVER: f64 = 3.0;
 
 /// How often a row is fitted again: others may stray then.
-const ROUNDS: usize = 4;
+const ROUNDS: usize = 8;
 
 /// f (n . w) of a direction.
 pub type FCos<'a> = dyn Fn(DVec3) -> DVec3 + 'a;

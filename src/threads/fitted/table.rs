@@ -5,6 +5,7 @@ use glam::{DVec3, Vec2, Vec3};
 use half::f16;
 
 use super::kernel::{Kernel, SHARPEST_LEVEL, WIDEST_LEVEL, all_between, sharp_part};
+use crate::brdf::BaseProfile;
 use crate::packing::{
     STEREOGRAPHIC_EXTENT, pack_snorm_2x16, stereographic_decode, stereographic_encode, unpack_snorm_2x16,
 };
@@ -90,7 +91,9 @@ pub struct FittedTable {
     pub material: String,
     /// How albedos go from the last row but one to the last: [`rim_power`](crate::threads::rim::rim_power).
     pub rim_power: f32,
-    /// In each row, azimuth by azimuth. What the threads' weights leave of it is the cosine kernel's.
+    /// The profile of what takes what the threads' weights leave of the albedo.
+    pub base: BaseProfile,
+    /// In each row, azimuth by azimuth. What the threads' weights leave of it is the base's.
     pub albedo: Vec<[f32; 3]>,
     /// Expected error of each row, relative to the radiance under lights of all sizes.
     pub relative_error: Vec<f32>,
@@ -205,6 +208,7 @@ impl FittedTable {
             sets: 0,
             material: String::new(),
             rim_power: EVEN,
+            base: BaseProfile::EVEN,
             albedo,
             relative_error,
             kernels,
@@ -213,7 +217,13 @@ impl FittedTable {
     }
 
     /// Packs rows of kernels, with the albedo and the relative error of each; as many rows for each of `azimuths`.
-    pub(super) fn pack(rows: &[(Vec<Kernel>, DVec3, f64)], azimuths: usize, sets: usize, rim_power: f32) -> Self {
+    pub(super) fn pack(
+        rows: &[(Vec<Kernel>, DVec3, f64)],
+        azimuths: usize,
+        sets: usize,
+        rim_power: f32,
+        base: BaseProfile,
+    ) -> Self {
         let kernels: Vec<_> = rows.iter().flat_map(|(kernels, ..)| kernels.iter().map(PackedKernel::new)).collect();
         Self {
             rows: rows.len() / azimuths,
@@ -222,6 +232,7 @@ impl FittedTable {
             sets,
             material: String::new(),
             rim_power,
+            base,
             albedo: rows.iter().map(|(_, albedo, _)| albedo.as_vec3().to_array()).collect(),
             relative_error: rows.iter().map(|&(.., error)| error as f32).collect(),
             kernels,

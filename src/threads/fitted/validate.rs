@@ -2,7 +2,7 @@
 use rayon::prelude::*;
 
 use super::kernel::Kernel;
-use super::lights::{Quadrature, TestLights};
+use super::lights::{BaseAnswers, Quadrature, TestLights};
 use super::solve::Fit;
 use super::table::FittedTable;
 use crate::brdf::{Brdf, LobeShape};
@@ -23,11 +23,12 @@ const SEED: usize = 5;
 /// with more points: RMS over view angles, each with the weight sin(2 theta_o) that it has on a sphere.
 pub fn validation_error(table: &FittedTable, brdf: &Brdf) -> f64 {
     let lobe = LobeShape::of(brdf);
+    let base = BaseAnswers::of(&table.base);
     let error = |index: usize| {
         let theta_o = ANGLES_DEG[index % ANGLES_DEG.len()].to_radians();
         let phi_o = AZIMUTHS_DEG[index / ANGLES_DEG.len()].to_radians();
         let slices = Slice::with_lobes_of_view(brdf, &lobe, View { theta_o, phi_o }, Resolution::FULL);
-        let lights = TestLights::new(&slices, LIGHTS, SEED, Quadrature::FINE);
+        let lights = TestLights::new(&slices, LIGHTS, SEED, Quadrature::FINE, &base);
         let in_units = |kernel: Kernel| Kernel { weight: kernel.weight / lights.unit, ..kernel };
         let kernels: Vec<_> = table.seen_from(theta_o, phi_o).into_iter().map(in_units).collect();
         let error = Fit::new(&lights, slices[0].albedo() / lights.unit).relative_error(&kernels);
