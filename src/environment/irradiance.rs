@@ -62,17 +62,12 @@ const TERMS: usize = BaseProfile::EVEN.0.len();
 /// Red, green and blue light times each power of its cosine to a normal, from the first on, and the same of light of radiance 1.
 type Moments = [[f32; TERMS]; 4];
 
-/// The moments of an environment's light for every normal: what its irradiance by any base is a sum of; or only what it is by Lambert's, which is
-/// half of the work.
+/// The moments of an environment's light for every normal: what its irradiance by any base is a sum of.
 pub struct LightMoments(Vec<Moments>);
 
 impl LightMoments {
-    /// Those of `environment` that `bases` need. The only error is that `observer` cancels it.
-    pub fn of(environment: &Environment, bases: &[BaseProfile], observer: &dyn Observer) -> Result<Self> {
-        let moments = match Self::are_even(bases) {
-            true => moments::<1>,
-            false => moments::<TERMS>,
-        };
+    /// Those of `environment`. The only error is that `observer` cancels it.
+    pub fn of(environment: &Environment, observer: &dyn Observer) -> Result<Self> {
         let cells = gather(environment, observer)?;
         let blocks: Vec<_> = cells.chunks(4).map(Block::of).collect();
         let mut texels = vec![Moments::default(); 6 * FACE_SIZE * FACE_SIZE];
@@ -88,12 +83,7 @@ impl LightMoments {
         Ok(Self(texels))
     }
 
-    /// Whether none of `bases` needs more than the first moments.
-    pub fn are_even(bases: &[BaseProfile]) -> bool {
-        bases.iter().all(|base| *base == BaseProfile::EVEN)
-    }
-
-    /// Irradiance over pi by one of its bases: a cube map of one level.
+    /// Irradiance over pi by a base of this profile: a cube map of one level.
     pub fn irradiance(&self, BaseProfile(profile): &BaseProfile) -> Pyramid {
         let texel = |moments: &Moments| {
             let sum = |moments: &[f32; TERMS]| moments.iter().zip(profile).map(|(moment, term)| moment * term).sum();
@@ -105,17 +95,17 @@ impl LightMoments {
     }
 }
 
-/// What of the light in `blocks` reaches a surface of this normal: the first moments.
-fn moments<const FIRST: usize>(blocks: &[Block], normal: Vec3) -> Moments {
+/// What of the light in `blocks` reaches a surface of this normal.
+fn moments(blocks: &[Block], normal: Vec3) -> Moments {
     let cosines = |[x, y, z]: [Vec4; 3]| (normal.x * x + normal.y * y + normal.z * z).max(Vec4::ZERO);
-    let mut sums = [[Vec4::ZERO; FIRST]; 4];
+    let mut sums = [[Vec4::ZERO; TERMS]; 4];
     let [red, green, blue, constant] = &mut sums;
     for block in blocks {
         let cosines = cosines(block.centroid);
         // Half of all blocks are below the horizon.
         if cosines != Vec4::ZERO {
             let mut powers = cosines;
-            for term in 0..FIRST {
+            for term in 0..TERMS {
                 red[term] += powers * block.power[0];
                 green[term] += powers * block.power[1];
                 blue[term] += powers * block.power[2];
@@ -133,8 +123,7 @@ fn moments<const FIRST: usize>(blocks: &[Block], normal: Vec3) -> Moments {
             }
         }
     }
-    let first = |sums: [Vec4; FIRST]| std::array::from_fn(|term| sums.get(term).map_or(0.0, |sum| sum.element_sum()));
-    sums.map(first)
+    sums.map(|terms| terms.map(Vec4::element_sum))
 }
 
 /// The light of `environment` in cells.
@@ -216,7 +205,7 @@ mod tests {
     fn a_constant_stays_as_it_is_however_few_pixels_it_has() {
         for (width, height) in [(1, 1), (3, 2), (64, 32), (1, 300), (300, 1)] {
             let map = environment(width, height, |_, _| [1.0, 0.1, 7.0]);
-            let moments = LightMoments::of(&map, &[COATED], &()).unwrap();
+            let moments = LightMoments::of(&map, &()).unwrap();
             let irradiance = [BaseProfile::EVEN, COATED].map(|base| moments.irradiance(&base));
             for texel in irradiance.iter().flat_map(|map| &map.levels[0]) {
                 assert!((Vec3::from(*texel) / Vec3::new(1.0, 0.1, 7.0) - 1.0).abs().max_element() < 1e-5, "{texel:?}");
@@ -233,7 +222,7 @@ mod tests {
         let sources = map.small_sources();
         let sources: Vec<_> = sources.leaves().collect();
         assert_eq!(sources.len(), 1);
-        let moments = LightMoments::of(&map.part(false), &[COATED], &()).unwrap();
+        let moments = LightMoments::of(&map.part(false), &()).unwrap();
         let irradiance = [BaseProfile::EVEN, COATED].map(|base| (base, moments.irradiance(&base)));
         for (i, (base, irradiance)) in (0..200).flat_map(|i| irradiance.iter().map(move |of_base| (i, of_base))) {
             let z: f64 = 1.0 - (f64::from(i) + 0.5) / 100.0;

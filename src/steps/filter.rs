@@ -46,19 +46,19 @@ impl BoxFilter<'_> {
     }
 }
 
-/// What irradiance of an environment by these bases is a sum of.
-struct GatherLight<'a>(&'a Keyed<Environment>, &'a [BaseProfile]);
+/// What irradiance of an environment by any base is a sum of.
+struct GatherLight<'a>(&'a Keyed<Environment>);
 
 impl Step for GatherLight<'_> {
     type Output = LightMoments;
     const NAME: &'static str = "light by cosines";
 
     fn key(&self, _: &Memo) -> Result<Key> {
-        Ok(Key::builder("moments").key(self.0.key).number(LightMoments::are_even(self.1)).build())
+        Ok(Key::builder("moments").key(self.0.key).build())
     }
 
     fn make(&self, round: &Round) -> Result<LightMoments> {
-        LightMoments::of(self.0, self.1, round.observer())
+        LightMoments::of(self.0, round.observer())
     }
 }
 
@@ -175,10 +175,7 @@ pub fn light(
         prefiltered: match lookups.split_sum {
             true => Some(PrefilteredLight {
                 by_ggx: round.ask(&GgxFilter(environment))?,
-                irradiance: round.ask(&Irradiance(
-                    &round.ask(&GatherLight(environment, &[BaseProfile::EVEN]))?,
-                    BaseProfile::EVEN,
-                ))?,
+                irradiance: round.ask(&Irradiance(&round.ask(&GatherLight(environment))?, BaseProfile::EVEN))?,
             }),
             false => None,
         },
@@ -203,7 +200,7 @@ pub fn blurred_light(
     };
     let rest = part(false)?;
     let (bases, _) = bases(materials.iter().map(|(_, threads)| *threads));
-    let by_cosines = round.ask(&GatherLight(&rest, &bases))?;
+    let by_cosines = round.ask(&GatherLight(&rest))?;
     let irradiance = bases.into_iter().map(|base| round.ask(&Irradiance(&by_cosines, base))).collect::<Result<_>>()?;
     let rest = round.ask(&Blur { environment: &rest, device })?;
     let needs = match for_any {
