@@ -7,16 +7,16 @@ use glam::dvec3;
 
 use super::{Brdf, luminance};
 
-/// Coefficients of [`BaseProfile`]: transmission through a coat by Schlick's formula is of this degree in the cosine.
-const TERMS: usize = 6;
-
 /// A diffuse base under a coat, or one of rough facets, answers light from theta_i as T(cos theta_i) cos theta_i: T is a polynomial of the cosine,
 /// in the mean over cosine-weighted directions 1, and 1 everywhere of Lambert's.
 #[repr(transparent)]
 #[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
-pub struct BaseProfile(pub [f32; TERMS]);
+pub struct BaseProfile(pub [f32; BaseProfile::TERMS]);
 
 impl BaseProfile {
+    /// How many coefficients it has: transmission through a coat by Schlick's formula is of degree 5 in the cosine.
+    pub const TERMS: usize = 6;
+
     /// Lambert's.
     pub const EVEN: Self = Self([1.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
 
@@ -26,6 +26,7 @@ impl BaseProfile {
         const ANGLES_DEG: [f64; 6] = [40.0, 48.0, 56.0, 64.0, 72.0, 80.0];
         const AZIMUTHS: usize = 24;
         const COSINES: usize = 64;
+        const TERMS: usize = BaseProfile::TERMS;
         /// Less than this part of what is reflected has no say.
         const LEAST_SHARE: f64 = 1e-3;
         let cosine = |i: usize| (i as f64 + 0.5) / COSINES as f64;
@@ -63,7 +64,7 @@ impl BaseProfile {
         Self(found.map(|t| (t / integral) as f32))
     }
 
-    /// T at this cosine.
+    /// T at this cosine. Twin of `base_profile` in glsl/methods/fitted.glsl.
     pub fn at(&self, cos: f32) -> f32 {
         self.0.iter().rev().fold(0.0, |sum, t| sum * cos + t)
     }

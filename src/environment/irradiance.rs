@@ -56,8 +56,7 @@ impl Block {
     }
 }
 
-/// Terms of a profile.
-const TERMS: usize = BaseProfile::EVEN.0.len();
+const TERMS: usize = BaseProfile::TERMS;
 
 /// Red, green and blue light times each power of its cosine to a normal, from the first on, and the same of light of radiance 1.
 type Moments = [[f32; TERMS]; 4];

@@ -62,7 +62,7 @@ struct Header {
     #[serde(default = "even", skip_serializing_if = "is_even")]
     rim_power: f32,
     #[serde(default = "lambert", skip_serializing_if = "is_lambert")]
-    base: [f32; 6],
+    base: [f32; BaseProfile::TERMS],
     #[serde(default = "one", skip_serializing_if = "is_one")]
     azimuths: usize,
     #[serde(default = "one", skip_serializing_if = "is_one")]
@@ -81,11 +81,11 @@ fn is_even(power: &f32) -> bool {
     *power == EVEN
 }
 
-fn lambert() -> [f32; 6] {
+fn lambert() -> [f32; BaseProfile::TERMS] {
     BaseProfile::EVEN.0
 }
 
-fn is_lambert(base: &[f32; 6]) -> bool {
+fn is_lambert(base: &[f32; BaseProfile::TERMS]) -> bool {
     *base == lambert()
 }
 

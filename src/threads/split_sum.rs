@@ -8,11 +8,11 @@ use glam::{DVec3, dvec3};
 use rayon::prelude::*;
 
 use super::fitted::kernel::vmf_peak;
-use super::fitted::lights::{Quadrature, SCALES, TestLights, light_kappa};
+use super::fitted::lights::{BaseAnswers, Quadrature, SCALES, TestLights, light_kappa};
 use super::rim::rim_power;
 use super::slice::{Resolution, Slice};
 use super::theta_o;
-use crate::brdf::{Brdf, SeenBrdf, Tap, ggx_lobe};
+use crate::brdf::{BaseProfile, Brdf, SeenBrdf, Tap, ggx_lobe};
 
 /// View angles: theta_o = row 90 deg / (ROWS - 1), the last 89.99 degrees. `SPLIT_SUM_ROWS` in glsl/methods/split_sum.glsl.
 pub const ROWS: usize = 91;
@@ -91,7 +91,7 @@ impl Answers {
     fn new(brdf: &SeenBrdf, row: usize) -> Self {
         let theta_o = theta_o(row, ROWS);
         let slices = Slice::with_lobes(brdf, theta_o, Resolution::DRAFT);
-        let lights = TestLights::new(&slices, LIGHTS, 0, Quadrature::DRAFT, super::fitted::lights::BaseAnswers::even());
+        let lights = TestLights::new(&slices, LIGHTS, 0, Quadrature::DRAFT, &BaseAnswers::of(&BaseProfile::EVEN));
         Self { lights, albedo: slices[0].albedo(), mirror: dvec3(-theta_o.sin(), 0.0, theta_o.cos()) }
     }
 

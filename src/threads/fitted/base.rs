@@ -2,8 +2,7 @@
 use rayon::prelude::*;
 
 use super::cells::in_sets;
-use super::generate::scaled;
-use super::kernel::sharpest_level;
+use super::kernel::{scaled, sharpest_level};
 use super::lights::{BaseAnswers, Quadrature, TestLights};
 use super::solve::{Effort, Fit};
 use crate::brdf::{BaseProfile, Brdf, LobeShape};
@@ -35,7 +34,7 @@ pub(super) fn base_of(brdf: &Brdf, lobe: &LobeShape, observer: &dyn Observer) ->
     if own == BaseProfile::EVEN {
         return Ok(own);
     }
-    let bases = [BaseAnswers::even(), &BaseAnswers::of(&own)];
+    let bases = [BaseProfile::EVEN, own].map(|base| BaseAnswers::of(&base));
     let squares = |view: &View| -> Result<[f64; 2]> {
         let slices = Slice::with_lobes_of_view(brdf, lobe, *view, Resolution::DRAFT);
         let starts = in_sets(&slices[1], KERNELS, 1);
@@ -48,7 +47,7 @@ pub(super) fn base_of(brdf: &Brdf, lobe: &LobeShape, observer: &dyn Observer) ->
             fit.solve(&mut kernels, EFFORT, observer)?;
             Ok((2.0 * view.theta_o).sin() * fit.relative_error(&kernels).powi(2))
         };
-        Ok([square(bases[0])?, square(bases[1])?])
+        Ok([square(&bases[0])?, square(&bases[1])?])
     };
     let all = VIEWS.par_iter().map(squares).collect::<Result<Vec<_>>>()?;
     let [even, of_own] = all.iter().fold([0.0; 2], |[a, b], [even, own]| [a + even, b + own]);

@@ -54,7 +54,7 @@ fn alike(lobes: &Slice, count: usize, sets: usize) -> Vec<Kernel> {
 }
 
 /// Kernels at the centroids of `count` cells of `lobes`, as wide as their second moments say, with the mass of the cell (F26).
-/// What lobes stand on is left to the cosine kernel: started there, most kernels stay there, and a few cannot make out a lobe's core.
+/// What lobes stand on is left to the base: started there, most kernels stay there, and a few cannot make out a lobe's core.
 ///
 /// Lloyd's relaxation (1982) of points of equal mass.
 fn cells(lobes: &Slice, count: usize) -> Vec<Kernel> {

@@ -2,8 +2,8 @@
 use glam::DVec3;
 
 use super::edit::Edit;
-use super::generate::{Neighbour, Row, carried, from_the_middle, most_moved, scaled};
-use super::kernel::{Kernel, WIDEST_LEVEL, all_between, sharpest_level};
+use super::generate::{Neighbour, Row, carried, from_the_middle, most_moved};
+use super::kernel::{Kernel, WIDEST_LEVEL, all_between, scaled, sharpest_level};
 use super::lights::{BaseAnswers, Quadrature, TestLights};
 use super::sets::share_of_sets;
 use super::solve::{Effort, Fit};
@@ -53,7 +53,7 @@ const LIGHTS_A_THREAD: usize = 16;
 /// Cancelled by `observer`.
 pub fn draft(brdf: &Brdf, before: &FittedTable, observer: &dyn Observer) -> Result<FittedTable> {
     let share = share_of_sets(before.azimuths, before.of_subpixels.is_some());
-    // A map of another would take as long as several drafts.
+    // Kernels go on from those of before, which have that base under them; and another would have a map of its own uploaded for each draft.
     let base = BaseAnswers::of(&before.base);
     let of_pixels = Drafting { brdf, before, share, lobe: LobeShape::of(brdf), base: &base };
     let Some(of_subpixels) = &before.of_subpixels else { return continued(&of_pixels, observer) };
@@ -143,11 +143,8 @@ impl Drafting<'_> {
     /// The fit of the row of this `index` to `target`.
     fn fit_to<'t>(&self, target: &'t Target, index: usize) -> Fit<'t> {
         let Target { lights, albedo, .. } = target;
-        Fit::new(lights, *albedo / lights.unit).in_sets(self.before.sets, self.share).no_sharper_than(sharpest_level(
-            &self.lobe,
-            self.before.count,
-            self.view(index).theta_o,
-        ))
+        let sharpest = sharpest_level(&self.lobe, self.before.count, self.view(index).theta_o);
+        Fit::new(lights, *albedo / lights.unit).in_sets(self.before.sets, self.share).no_sharper_than(sharpest)
     }
 
     /// How the BRDF was edited, as seen in the row of this `index`.

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::base::base_of;
 use super::cells::in_sets;
-use super::kernel::{Kernel, all_between, scale_rad, sharpest_level};
+use super::kernel::{Kernel, all_between, scale_rad, scaled, sharpest_level};
 use super::lights::{BaseAnswers, Quadrature, TestLights};
 use super::sets::{pixels_have_own, share_of_sets};
 use super::solve::{Effort, Fit};
@@ -113,7 +113,7 @@ impl Targets {
         Ok(Self { azimuths, rows: targets, lobe, rim_power, base })
     }
 
-    /// Whether the cosine kernel alone does in all rows.
+    /// Whether the base alone does in all rows.
     fn are_diffuse(&self) -> bool {
         let error =
             |(lights, albedo): &(TestLights, DVec3)| Fit::new(lights, *albedo / lights.unit).relative_error(&[]);
@@ -274,11 +274,6 @@ pub(super) fn from_the_middle<T: Send + Sync>(
     all.push(first);
     all.extend(up?);
     Ok(all)
-}
-
-/// The same with `scale` times the weights.
-pub(super) fn scaled(kernels: &[Kernel], scale: f64) -> Vec<Kernel> {
-    kernels.iter().map(|kernel| Kernel { weight: scale * kernel.weight, ..*kernel }).collect()
 }
 
 /// Kernels of the row for the view `from` as a start for that of `to` (F32).

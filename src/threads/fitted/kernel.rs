@@ -46,6 +46,11 @@ pub fn all_between(a: &[Kernel], b: &[Kernel], t: f64) -> Vec<Kernel> {
     a.iter().zip(b).map(|(a, b)| a.between(b, t)).collect()
 }
 
+/// The same with `scale` times the weights.
+pub(super) fn scaled(kernels: &[Kernel], scale: f64) -> Vec<Kernel> {
+    kernels.iter().map(|kernel| Kernel { weight: scale * kernel.weight, ..*kernel }).collect()
+}
+
 /// kappa of the kernel of a whole `level`.
 pub fn kappa_of_level(level: f64) -> f64 {
     // For none at all a width of 0.002 degrees: far narrower than any light or pixel, and its square is no trouble to f64.

@@ -266,20 +266,20 @@ pub struct BaseAnswers(Vec<Vec<f64>>);
 const STEPS: usize = 512;
 
 impl BaseAnswers {
-    /// Of a base of this profile.
-    pub fn of(base: &BaseProfile) -> Self {
-        let table = |scale| {
-            let points = kernel_points(light_kappa(scale), 512);
-            let z = |i: usize| 2.0 * i as f64 / STEPS as f64 - 1.0;
-            (0..=STEPS).map(|i| base_integral(base, z(i), &points)).collect()
+    /// Of a base of this profile: sums of the same integrals, since T is a polynomial.
+    pub fn of(BaseProfile(profile): &BaseProfile) -> Self {
+        static INTEGRALS: OnceLock<Vec<Vec<CosineIntegrals>>> = OnceLock::new();
+        let integrals = INTEGRALS.get_or_init(|| {
+            let of_scale = |scale| {
+                let points = kernel_points(light_kappa(scale), 512);
+                (0..=STEPS).map(|i| cosine_integrals(2.0 * i as f64 / STEPS as f64 - 1.0, &points)).collect()
+            };
+            (0..SCALES).map(of_scale).collect()
+        });
+        let answer = |integrals: &CosineIntegrals| {
+            integrals.iter().zip(profile).map(|(integral, term)| integral * f64::from(*term)).sum()
         };
-        Self((0..SCALES).map(table).collect())
-    }
-
-    /// Of Lambert's.
-    pub fn even() -> &'static Self {
-        static EVEN: OnceLock<BaseAnswers> = OnceLock::new();
-        EVEN.get_or_init(|| Self::of(&BaseProfile::EVEN))
+        Self(integrals.iter().map(|of_scale| of_scale.iter().map(answer).collect()).collect())
     }
 
     fn response(&self, z: f64, scale: usize) -> f64 {
@@ -290,12 +290,22 @@ impl BaseAnswers {
     }
 }
 
-/// That integral for a light of these points whose direction has this z.
-fn base_integral(base: &BaseProfile, z: f64, points: &[DVec3]) -> f64 {
+/// Integrals of cos, cos^2 and so on over pi, one for each term of a profile.
+type CosineIntegrals = [f64; BaseProfile::TERMS];
+
+/// Those over a light of these points whose direction has this z.
+fn cosine_integrals(z: f64, points: &[DVec3]) -> CosineIntegrals {
     let sin = (1.0 - z * z).max(0.0).sqrt();
-    let answer = |cos: f64| cos * f64::from(base.at(cos as f32));
-    FRAC_1_PI * points.iter().map(|point| answer((z * point.z + sin * point.x).max(0.0))).sum::<f64>()
-        / points.len() as f64
+    let mut sums = CosineIntegrals::default();
+    for point in points {
+        let cos = (z * point.z + sin * point.x).max(0.0);
+        let mut power = cos;
+        for sum in &mut sums {
+            *sum += power;
+            power *= cos;
+        }
+    }
+    sums.map(|sum| FRAC_1_PI * sum / points.len() as f64)
 }
 
 /// So many points of equal mass of the kernel of this kappa around z.

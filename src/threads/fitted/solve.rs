@@ -200,7 +200,7 @@ impl<'a> Fit<'a> {
         (0..kernels.len()).map(|k| bounds(k).map(|level| level.max(self.sharpest_level(k)))).collect()
     }
 
-    /// What the answers of each kernel differ by from those of the cosine kernel, whose weight is what kernels leave of the albedo.
+    /// What the answers of each kernel differ by from those of the base, whose weight is what kernels leave of the albedo.
     fn differences(&self, answers: &Answers) -> Vec<f32> {
         let cosine = &self.lights.cosine;
         let of_kernel = |answers: &[f32]| answers.iter().zip(cosine).map(|(answer, cosine)| answer - cosine).collect();

@@ -3,14 +3,14 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use glam::{DVec3, dvec3};
 
-use super::generate::{MOST_MOVED, carried, f_cos_of, most_moved, scaled};
-use super::kernel::{Kernel, SHARPEST_LEVEL, WIDEST_LEVEL, kappa_of_level, scale_rad, vmf_peak};
-use super::lights::{Quadrature, TestLights};
+use super::generate::{MOST_MOVED, carried, f_cos_of, most_moved};
+use super::kernel::{Kernel, SHARPEST_LEVEL, WIDEST_LEVEL, kappa_of_level, scale_rad, scaled, vmf_peak};
+use super::lights::{BaseAnswers, Quadrature, TestLights};
 use super::sets::pixels_have_own;
 use super::solve::{Effort, Fit};
 use super::stray::strays;
 use super::{FittedTable, MAX_COUNT, PackedKernel, draft, generate, validation_error};
-use crate::brdf::{Brdf, CustomBrdf, LobeShape, MIN_COS_THETA_D, SeenBrdf, half_vector_width, luminance};
+use crate::brdf::{BaseProfile, Brdf, CustomBrdf, LobeShape, MIN_COS_THETA_D, SeenBrdf, half_vector_width, luminance};
 use crate::error::Error;
 use crate::progress::Observer;
 use crate::threads::azimuths::View;
@@ -123,7 +123,7 @@ fn no_kernel_of_a_cusp_looks_up_the_environment_as_it_is() {
 fn seen_gold() -> (TestLights, DVec3) {
     let gold = gold(0.3);
     let slices = Slice::with_lobes(&SeenBrdf::from_azimuth(&gold, 0.0), 0.7, Resolution::DRAFT);
-    let lights = TestLights::new(&slices, 512, 0, Quadrature::DRAFT, super::lights::BaseAnswers::even());
+    let lights = TestLights::new(&slices, 512, 0, Quadrature::DRAFT, &BaseAnswers::of(&BaseProfile::EVEN));
     let albedo = slices[0].albedo() / lights.unit;
     (lights, albedo)
 }
