@@ -2,6 +2,7 @@
 // Sorts pixels into interior, edge and background, and by the shader of their material. Lists those that have to be shaded.
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_samplerless_texture_functions : require
+#include "camera.glsl"
 #include "geometry_texel.glsl"
 #include "normal_variance.glsl"
 #include "tiles.glsl"
@@ -29,12 +30,17 @@ layout(set = 0, binding = 3, std430) writeonly buffer PixelList {
 layout(set = 0, binding = 5, std430) writeonly buffer Coverage {
     uvec4 coverage[];
 };
-// The shader of each material.
+// Which shader a material is shaded by. Twin: src/passes/classify.rs.
+struct ShaderOfMaterial {
+    uint shader;
+    float cos_grazing; // where cos theta_o is less, it is the one of mixed pixels: that has what only grazing views need
+};
 layout(set = 0, binding = 4, std430) readonly buffer Shaders {
-    uint shaders[];
+    ShaderOfMaterial shaders[];
 };
 
 layout(push_constant) uniform Push {
+    Camera camera;
     uvec2 size_px;
     uvec2 first_tile; // the tile of the first workgroup
     // Of normals along each of two axes, and of tangents around the normal, in rad^2: below both, sub-pixels are one smooth surface,
@@ -75,6 +81,12 @@ void list_pixel(uint slot) {
     pixel_list.pixels[this_tile() * TILE_PIXELS + slot] = gl_LocalInvocationIndex;
 }
 
+// The shader of a sub-pixel that sees this normal of a material.
+uint shader_of(uvec2 place, vec3 normal, uint material) {
+    vec3 w_o = -normalize(camera_ray(push.camera, (vec2(place) + 0.5) / vec2(push.size_px * SUBPIXELS)));
+    return dot(normal, w_o) < shaders[material].cos_grazing ? push.shader_of_mixed : shaders[material].shader;
+}
+
 void main() {
     if (gl_LocalInvocationIndex < CLASSES) {
         listed[gl_LocalInvocationIndex] = 0;
@@ -98,7 +110,8 @@ void main() {
         NormalMoments normals = normal_moments(vec3(0.0));
         vec3 tangents = vec3(0.0);
         for (uint j = 0; j < SUBPIXELS * SUBPIXELS; ++j) {
-            uvec2 texel = texelFetch(geometry, ivec2(pixel * SUBPIXELS + uvec2(j % SUBPIXELS, j / SUBPIXELS)), 0).xy;
+            uvec2 place = pixel * SUBPIXELS + uvec2(j % SUBPIXELS, j / SUBPIXELS);
+            uvec2 texel = texelFetch(geometry, ivec2(place), 0).xy;
             if (!is_covered(texel)) {
                 continue;
             }
@@ -106,7 +119,7 @@ void main() {
             if (HAS_TANGENTS != 0 && has_tangent(texel)) {
                 tangents += geometry_tangent(texel, normal);
             }
-            uint own_shader = CLASSES != 2 ? shaders[geometry_material(texel)] : 0;
+            uint own_shader = CLASSES != 2 ? shader_of(place, normal, geometry_material(texel)) : 0;
             if (covered++ == 0) {
                 reference = texel;
                 normals = normal_moments(normal);

@@ -120,6 +120,12 @@ pub fn finest_level(pyramid: &VmfPyramid) -> f32 {
     (pyramid.finest_width_rad() / FINEST_WIDTH_RAD).log2() as f32
 }
 
+/// The view angle in radians up to which no kernel of these threads is sharper than `rest`; none if none ever is.
+pub fn sharp_from(threads: &Threads, rest: &VmfPyramid) -> Option<f64> {
+    let tables = threads.fitted().into_iter().flat_map(FittedTable::tables);
+    tables.filter_map(|table| table.used().sharp_from(finest_level(rest))).reduce(f64::min)
+}
+
 impl KernelNeeds {
     /// The most that any kernels may look up: what one frame needs and the next does not is there for all frames.
     pub fn of_any(environment: &Environment) -> Self {
@@ -129,7 +135,6 @@ impl KernelNeeds {
 
     /// What those of `materials` do, where the environment without its small sources is blurred as `rest`.
     pub fn of(environment: &Environment, materials: &[WithThreads], rest: &VmfPyramid) -> Self {
-        let finest_level = finest_level(rest);
         let sources = environment.small_sources();
         let mirrors = |(lobe, threads): &WithThreads| {
             let giving_way = threads.and_then(|threads| threads.giving_way(lobe));
@@ -140,12 +145,9 @@ impl KernelNeeds {
                 sources.leaves().any(|source| clearance(0.0, source.width_rad() as f32, lobe_radius) < clear)
             })
         };
-        let is_sharp = |threads: Option<&Threads>| {
-            let mut tables = threads.and_then(Threads::fitted).into_iter().flat_map(FittedTable::tables);
-            tables.any(|table| table.used().sharp_count(finest_level) > 0)
-        };
+        let is_sharp = |threads: &Threads| sharp_from(threads, rest).is_some();
         Self {
-            map: materials.iter().any(|(_, threads)| is_sharp(*threads)),
+            map: materials.iter().any(|(_, threads)| threads.is_some_and(is_sharp)),
             sources: environment.has_small_sources(),
             mirrored_sources: materials.iter().any(mirrors),
         }

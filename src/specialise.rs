@@ -1,21 +1,25 @@
 //! By which constants shaders are specialised for what a scene has: what it does not need is compiled out.
-use crate::light::{BlurredLight, KernelNeeds};
-use crate::passes::{MAX_SHADERS, models_used};
+use crate::light::{BlurredLight, KernelNeeds, sharp_from};
+use crate::passes::{MAX_SHADERS, ShaderOfMaterial, models_used};
 use crate::prepare::{Prepared, PreparedMaterial};
 use crate::scene::Pattern;
 use crate::threads::Threads;
+
+/// Views from this angle on are grazing, in radians: a quarter of a sphere is seen at 60 degrees or more. Kernels that look up the environment as it is
+/// there only are compiled into a shader of its own.
+const GRAZING_RAD: f64 = 60.0 * std::f64::consts::PI / 180.0;
 
 /// Specialisation constants by name.
 pub(crate) type Constants = Vec<(&'static str, u32)>;
 
 /// The shaders of a scene's method: materials that need the same share one, so that no pixel pays for what other materials are made of.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct ShadersOfMaterials {
     /// What each is specialised by, besides the kind of pixels; no two are alike.
     pub constants: Vec<Constants>,
     /// Which of them shades each material.
-    pub of_materials: Vec<u32>,
-    /// Which of them shades pixels of several materials that have different ones.
+    pub of_materials: Vec<ShaderOfMaterial>,
+    /// Which of them shades pixels of several materials that have different ones, and what only grazing views need.
     pub of_mixed: u32,
 }
 
@@ -23,12 +27,18 @@ impl ShadersOfMaterials {
     /// For `prepared`, under this light of fitted threads if its method looks that up.
     pub fn new(prepared: &Prepared, light: Option<&BlurredLight>) -> Self {
         let of_each = prepared.materials.iter().map(|material| {
-            let needs = light.map(|light| match prepared.is_draft {
-                // Drafts follow each other faster than shaders could be compiled for what each of them needs.
-                true => light.needs,
-                false => KernelNeeds::of(&prepared.environment, &[material.shaded()], &light.rest),
-            });
-            shade_constants(prepared, std::slice::from_ref(material), needs)
+            let constants = |needs| shade_constants(prepared, std::slice::from_ref(material), needs);
+            // Drafts follow each other faster than shaders could be compiled for what each of them needs.
+            let Some(light) = light.filter(|_| !prepared.is_draft) else {
+                return (constants(light.map(|light| light.needs)), ShaderOfMaterial::NEVER);
+            };
+            let needs = KernelNeeds::of(&prepared.environment, &[material.shaded()], &light.rest);
+            match material.threads.as_deref().and_then(|threads| sharp_from(threads, &light.rest)) {
+                Some(theta_o) if theta_o >= GRAZING_RAD => {
+                    (constants(Some(KernelNeeds { map: false, ..needs })), theta_o.cos() as f32)
+                }
+                _ => (constants(Some(needs)), ShaderOfMaterial::NEVER),
+            }
         });
         let of_all = shade_constants(prepared, &prepared.materials, light.map(|light| light.needs));
         Self::of(&of_each.collect::<Vec<_>>(), of_all)
@@ -41,21 +51,26 @@ impl ShadersOfMaterials {
         })
     }
 
-    /// Where each material needs these constants, and all together need `of_all`; that is also the shader of materials beyond [`MAX_SHADERS`].
-    fn of(of_each: &[Constants], of_all: Constants) -> Self {
+    /// Where each material needs these constants, but those of all where cos theta_o is less, and all together need `of_all`; that is also the shader of
+    /// materials beyond [`MAX_SHADERS`].
+    fn of(of_each: &[(Constants, f32)], of_all: Constants) -> Self {
         let mut constants: Vec<Constants> = Vec::new();
-        for needed in of_each {
+        for (needed, _) in of_each {
             if constants.len() + 1 < MAX_SHADERS && !constants.contains(needed) {
                 constants.push(needed.clone());
             }
         }
-        if constants.len() != 1 && !constants.contains(&of_all) {
+        let has_grazing = of_each.iter().any(|(_, cos_grazing)| *cos_grazing != ShaderOfMaterial::NEVER);
+        if (constants.len() != 1 || has_grazing) && !constants.contains(&of_all) {
             constants.push(of_all.clone());
         }
-        let shader = |needed| constants.iter().position(|constants| constants == needed);
+        let shader = |needed: &Constants| constants.iter().position(|constants| constants == needed);
         let of_mixed = shader(&of_all).unwrap_or(0);
-        let of_materials = of_each.iter().map(|needed| shader(needed).unwrap_or(of_mixed) as u32).collect();
-        Self { of_materials, of_mixed: of_mixed as u32, constants }
+        let of_material = |(needed, cos_grazing): &(Constants, f32)| {
+            let shader = shader(needed).unwrap_or(of_mixed) as u32;
+            ShaderOfMaterial { shader, cos_grazing: *cos_grazing }
+        };
+        Self { of_materials: of_each.iter().map(of_material).collect(), of_mixed: of_mixed as u32, constants }
     }
 }
 
@@ -104,10 +119,11 @@ mod tests {
     fn materials_that_need_the_same_share_a_shader_and_pixels_of_others_have_one_with_all() {
         let of = |models: &[u32]| {
             let all = models.iter().fold(0, |all, models| all | models);
-            let shaders =
-                ShadersOfMaterials::of(&models.iter().map(|models| needing(*models)).collect::<Vec<_>>(), needing(all));
+            let of_each: Vec<_> = models.iter().map(|models| (needing(*models), ShaderOfMaterial::NEVER)).collect();
+            let shaders = ShadersOfMaterials::of(&of_each, needing(all));
             let constants: Vec<_> = shaders.constants.iter().map(|constants| constants[1].1).collect();
-            (constants, shaders.of_materials, shaders.of_mixed)
+            let of_materials: Vec<_> = shaders.of_materials.iter().map(|of_material| of_material.shader).collect();
+            (constants, of_materials, shaders.of_mixed)
         };
         assert_eq!(of(&[]), (vec![0], vec![], 0));
         assert_eq!(of(&[1, 1]), (vec![1], vec![0, 0], 0));
@@ -119,5 +135,16 @@ mod tests {
         assert_eq!((constants.len(), of_mixed), (MAX_SHADERS, MAX_SHADERS as u32 - 1));
         assert_eq!(constants[of_mixed as usize], (1 << 20) - 1);
         assert_eq!(of_materials, (0..20).map(|material| of_mixed.min(material)).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn a_material_that_needs_more_at_grazing_views_has_the_shader_for_all_there() {
+        let of_each = [(needing(1), 0.2), (needing(1), ShaderOfMaterial::NEVER)];
+        for materials in [&of_each[..1], &of_each] {
+            let shaders = ShadersOfMaterials::of(materials, needing(3));
+            assert_eq!((shaders.constants, shaders.of_mixed), (vec![needing(1), needing(3)], 1));
+            let cosines = shaders.of_materials.iter().map(|of_material| (of_material.shader, of_material.cos_grazing));
+            assert!(cosines.eq(materials.iter().map(|(_, cosine)| (0, *cosine))));
+        }
     }
 }

@@ -257,6 +257,22 @@ fn materials_that_need_different_shaders_are_shaded_as_their_cpu_twin_side_by_si
     gpu.finish();
 }
 
+#[test]
+fn what_grazing_views_alone_need_of_a_shader_is_theirs_as_the_cpu_twin_has_it() {
+    let gpu = Validated::new();
+    // Above 80 degrees it has kernels sharper than the pyramid.
+    let plastic = "model = 'plastic'\ndistribution = 'beckmann'\nalpha = 0.015\nior = 1.5\ndiffuse = [0.6, 0.6, 0.55]";
+    let mut scene = sphere(model(plastic), "lamps-70", 16, (96, 64));
+    scene.image.background = Background::None;
+    let prepared = ready(&scene);
+    let rendering = gpu.render(&prepared, EVERYTHING);
+    let memo = gpu.memo_of_twin();
+    let twin = shading::CpuShader::new(&prepared, &memo.round(&())).unwrap();
+    let most = if gpu.has_exact_lookups() { 1e-3 } else { 0.01 };
+    compare_with_twin(&prepared, &rendering, &twin, most, "plastic");
+    gpu.finish();
+}
+
 /// One albedo for each degree, by quadrature, which knows nothing of threads.
 fn albedos(material: &MaterialSource) -> Vec<Vec3> {
     let brdf = Memo::default().round(&()).ask(&LoadMaterial(material)).expect("a material");

@@ -401,7 +401,8 @@ vec3 estimate(Surface surface, Material material, uint first, uint stride) {
     Rows rows = rows_at(surface, material);
     vec3 weights = vec3(0.0);
     vec3 sum = vec3(0.0);
-    uint k = first + (table.sharp_count + stride - 1 - first) / stride * stride;
+    uint sharp_count = HAS_SHARP_KERNELS != 0 ? table.sharp_count : 0;
+    uint k = first + (sharp_count + stride - 1 - first) / stride * stride;
     if (k < table.count) {
         do {
             Kernel kernel = kernel_at(rows, k);
@@ -419,7 +420,7 @@ vec3 estimate(Surface surface, Material material, uint first, uint stride) {
         }
     }
     k = first;
-    if (HAS_SHARP_KERNELS != 0 && k < table.sharp_count) {
+    if (HAS_SHARP_KERNELS != 0 && k < sharp_count) {
         do {
             Kernel kernel = kernel_at(rows, k);
             weights += kernel.weight;
@@ -430,7 +431,7 @@ vec3 estimate(Surface surface, Material material, uint first, uint stride) {
             if (sharp < 1.0) {
                 sum += kernel.weight * (1.0 - sharp) * blurred_radiance(looks_towards(kernel, surface), kernel.level);
             }
-        } while ((k += stride) < table.sharp_count);
+        } while ((k += stride) < sharp_count);
     }
     k = first;
     if (HAS_MIRRORED_SOURCES != 0 && of_kernels > 0.0 && k < table.count) {

@@ -1,5 +1,5 @@
 //! Sorts pixels into interior, edge and background, and by the shader of their material. It lists those to shade: nothing else is looked at again.
-use super::{Region, View};
+use super::{CameraRays, Region, View};
 use crate::Result;
 use crate::environment::Environment;
 use crate::graph::{BufferDesc, BufferHandle, FrameGraph, ImageHandle};
@@ -65,7 +65,7 @@ pub struct Classify {
     pub pipeline: Keyed<ComputePipeline>,
     /// From which variances of their normals and tangents on sub-pixels are no smooth surface: see [`SmoothVariance::of`].
     pub smooth_variance: SmoothVariance,
-    /// The number of the shader of each material.
+    /// [`ShaderOfMaterial`] of each material.
     pub shaders: Keyed<Buffer>,
     /// How many there are.
     pub shader_count: u32,
@@ -81,9 +81,25 @@ impl Classify {
     }
 }
 
+/// Which shader a material is shaded by: the same in glsl/classify.comp.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct ShaderOfMaterial {
+    /// Its number.
+    pub shader: u32,
+    /// Where cos theta_o is less, it is the one of mixed pixels: that has what only grazing views need.
+    pub cos_grazing: f32,
+}
+
+impl ShaderOfMaterial {
+    /// A cosine that no view has less of.
+    pub const NEVER: f32 = -2.0;
+}
+
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct Push {
+    camera: CameraRays,
     size_px: [u32; 2],
     first_tile: [u32; 2],
     smooth_variance: SmoothVariance,
@@ -132,15 +148,16 @@ pub struct Tiles {
     pub coverage: BufferHandle,
 }
 
-/// Uploads the number of the shader of each material.
+/// Uploads the shader of each material.
 ///
 /// # Errors
 /// No device memory left.
-pub fn upload_shaders(device: &Arc<Device>, of_materials: &[u32]) -> Result<Buffer> {
+pub fn upload_shaders(device: &Arc<Device>, of_materials: &[ShaderOfMaterial]) -> Result<Buffer> {
     // The binding needs something where there are no materials.
-    let numbers = if of_materials.is_empty() { &[0] } else { of_materials };
+    let none = [ShaderOfMaterial { shader: 0, cos_grazing: ShaderOfMaterial::NEVER }];
+    let shaders = if of_materials.is_empty() { &none } else { of_materials };
     let usage = vk::BufferUsageFlags::STORAGE_BUFFER;
-    Ok(Buffer::with_contents(device, "shaders of materials", usage, bytemuck::cast_slice(numbers))?)
+    Ok(Buffer::with_contents(device, "shaders of materials", usage, bytemuck::cast_slice(shaders))?)
 }
 
 /// Lists the pixels of `geometry` that hold surface, all of which is in `region`.
@@ -172,6 +189,7 @@ pub fn classify<'a>(
         .write("pixel_list", &mut pixels)
         .write("Coverage", &mut coverage)
         .push(&Push {
+            camera: view.camera_rays(),
             size_px: [width, height],
             first_tile: region.first_tile,
             smooth_variance: classify.smooth_variance,

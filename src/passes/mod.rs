@@ -23,7 +23,9 @@ mod vmf_pyramid;
 
 pub use background::{Background, BackgroundMap, background};
 pub use bare_lookups::{BareLookup, BareLookups, bare_lookups};
-pub use classify::{Classify, Counters, MAX_SHADERS, SMOOTH_DEG, SmoothVariance, Tiles, classify, upload_shaders};
+pub use classify::{
+    Classify, Counters, MAX_SHADERS, SMOOTH_DEG, ShaderOfMaterial, SmoothVariance, Tiles, classify, upload_shaders,
+};
 pub use cube_borders::WayAround;
 pub use device_check::{Answers, Questions, Volume, ask};
 pub use geometry_cache::{DeviceMesh, GeometryCache, PlacedMesh, PlacedTangent, geometry_cache, geometry_pipeline};

@@ -9,8 +9,8 @@ use crate::light::{BlurredLight, Light, bases};
 use crate::memo::{Key, Keyed, Memo, Round, Step};
 use crate::method::Method;
 use crate::passes::{
-    BackgroundMap, DeviceIrradiance, DeviceLight, DeviceMaterials, DeviceMesh, ShadedMaterial, WayAround,
-    upload_shaders,
+    BackgroundMap, DeviceIrradiance, DeviceLight, DeviceMaterials, DeviceMesh, ShadedMaterial, ShaderOfMaterial,
+    WayAround, upload_shaders,
 };
 use crate::scene::Mesh;
 use crate::threads::{FittedTable, Threads};
@@ -196,8 +196,8 @@ impl Step for UploadBackground<'_> {
 pub struct UploadShaders<'a> {
     /// To where.
     pub device: &'a Arc<Device>,
-    /// The shaders' numbers.
-    pub of_materials: &'a [u32],
+    /// Which.
+    pub of_materials: &'a [ShaderOfMaterial],
 }
 
 impl Step for UploadShaders<'_> {

@@ -261,6 +261,18 @@ impl UsedThreads<'_> {
         self.threads.iter().rposition(is_sharp).map_or(0, |last| last + 1)
     }
 
+    /// The view angle in radians, that of a row, up to which none of them does; none if none ever does.
+    pub fn sharp_from(&self, level: f32) -> Option<f64> {
+        let FittedTable { rows, azimuths, .. } = *self.table;
+        let is_sharp = |thread: &(usize, f32), row: usize| {
+            thread.1.is_finite() && sharp_part(self.table.row(row)[thread.0].unpack().level, level) > 0.0
+        };
+        let of_angle = |row: &usize| {
+            (0..azimuths).any(|azimuth| self.threads.iter().any(|thread| is_sharp(thread, azimuth * rows + row)))
+        };
+        (0..rows).find(of_angle).map(|first| theta_o(first.saturating_sub(1), rows))
+    }
+
     /// The buffer of the shader. Azimuth by azimuth: the albedo of each row, then thread by thread its kernels of all rows.
     pub fn device_elements(&self) -> Vec<[u32; 4]> {
         let FittedTable { rows, azimuths, .. } = *self.table;
