@@ -12,6 +12,7 @@ layout(local_size_x = TILE_SIDE, local_size_y = TILE_SIDE) in;
 layout(constant_id = 0) const uint SUBPIXELS = 2; // per axis
 layout(constant_id = 1) const uint HAS_TANGENTS = 0; // 0: no material of the scene needs them
 layout(constant_id = 2) const uint CLASSES = 2; // two for each shader of a material; at most as many as a tile has pixels
+layout(constant_id = 3) const uint HAS_GRAZING = 1; // 0: no material has another shader at grazing views
 
 layout(set = 0, binding = 0) uniform utexture2D geometry;
 layout(set = 0, binding = 1, std430) buffer Counters {
@@ -83,8 +84,12 @@ void list_pixel(uint slot) {
 
 // The shader of a sub-pixel that sees this normal of a material.
 uint shader_of(uvec2 place, vec3 normal, uint material) {
+    ShaderOfMaterial of_material = shaders[material];
+    if (HAS_GRAZING == 0) {
+        return of_material.shader;
+    }
     vec3 w_o = -normalize(camera_ray(push.camera, (vec2(place) + 0.5) / vec2(push.size_px * SUBPIXELS)));
-    return dot(normal, w_o) < shaders[material].cos_grazing ? push.shader_of_mixed : shaders[material].shader;
+    return dot(normal, w_o) < of_material.cos_grazing ? push.shader_of_mixed : of_material.shader;
 }
 
 void main() {

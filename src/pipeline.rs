@@ -134,7 +134,7 @@ impl DeviceScene {
             view: view.clone(),
             geometry_cache,
             classify: Classify {
-                pipeline: compile(&compiled::CLASSIFY, &classify_constants(prepared, shaders.constants.len()))?,
+                pipeline: compile(&compiled::CLASSIFY, &classify_constants(prepared, &shaders))?,
                 smooth_variance: prepared.smooth_variance(),
                 shaders: round.ask(&UploadShaders { device, of_materials: &shaders.of_materials })?,
                 shader_count: shaders.constants.len() as u32,

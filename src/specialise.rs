@@ -6,7 +6,7 @@ use crate::scene::Pattern;
 use crate::threads::Threads;
 
 /// Views from this angle on are grazing, in radians: a quarter of a sphere is seen at 60 degrees or more. Kernels that look up the environment as it is
-/// there only are compiled into a shader of its own.
+/// there only are left to a shader for such views.
 const GRAZING_RAD: f64 = 60.0 * std::f64::consts::PI / 180.0;
 
 /// Specialisation constants by name.
@@ -74,12 +74,14 @@ impl ShadersOfMaterials {
     }
 }
 
-/// What `classify` is specialised by, if shading has so many shaders.
-pub(crate) fn classify_constants(prepared: &Prepared, shader_count: usize) -> Constants {
+/// What `classify` is specialised by, if shading has these shaders.
+pub(crate) fn classify_constants(prepared: &Prepared, shaders: &ShadersOfMaterials) -> Constants {
+    let has_grazing = shaders.of_materials.iter().any(ShaderOfMaterial::has_grazing);
     vec![
         ("SUBPIXELS", prepared.view.subpixels),
         ("HAS_TANGENTS", prepared.has_tangents().into()),
-        ("CLASSES", 2 * shader_count as u32),
+        ("CLASSES", 2 * shaders.constants.len() as u32),
+        ("HAS_GRAZING", has_grazing.into()),
     ]
 }
 

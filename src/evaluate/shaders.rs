@@ -90,7 +90,7 @@ pub fn run(
         if index == 0 {
             add(geometry("scene", prepared.has_tangents())?)?;
             add(geometry("any", true)?)?;
-            add(compute(&compiled::CLASSIFY, "scene", classify_constants(&prepared, shaders.constants.len()))?)?;
+            add(compute(&compiled::CLASSIFY, "scene", classify_constants(&prepared, &shaders))?)?;
         }
         for constants in shaders.constants_of_classes() {
             add(compute(shader, "scene", constants)?)?;

@@ -94,6 +94,11 @@ pub struct ShaderOfMaterial {
 impl ShaderOfMaterial {
     /// A cosine that no view has less of.
     pub const NEVER: f32 = -2.0;
+
+    /// Whether some views have less.
+    pub fn has_grazing(&self) -> bool {
+        self.cos_grazing != Self::NEVER
+    }
 }
 
 #[repr(C)]
