@@ -60,8 +60,7 @@ impl ShadersOfMaterials {
                 constants.push(needed.clone());
             }
         }
-        let has_grazing = of_each.iter().any(|(_, cos_grazing)| *cos_grazing != ShaderOfMaterial::NEVER);
-        if (constants.len() != 1 || has_grazing) && !constants.contains(&of_all) {
+        if !constants.contains(&of_all) {
             constants.push(of_all.clone());
         }
         let shader = |needed: &Constants| constants.iter().position(|constants| constants == needed);
