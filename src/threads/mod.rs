@@ -244,10 +244,13 @@ impl Default for ThreadSettings {
 }
 
 impl ThreadSettings {
-    /// The same, in the sets that a picture of a BRDF of this lobe with `subpixels` x `subpixels` to the pixel has them in.
+    /// The same, but as many as a picture of a BRDF of this lobe with `subpixels` x `subpixels` to the pixel has for them, and in as many sets.
     pub fn for_picture(self, lobe: &LobeShape, subpixels: u32) -> Self {
-        let sets = if self.kind.are_kernels() { fitted::set_count(lobe, self.count, subpixels) } else { 1 };
-        Self { sets, ..self }
+        if !self.kind.are_kernels() {
+            return Self { sets: 1, ..self };
+        }
+        let [count, sets] = fitted::count_and_sets(lobe, self.count, subpixels);
+        Self { count, sets, ..self }
     }
 
     /// Errors where there is nothing or too much to make.

@@ -38,7 +38,7 @@ pub use draft::draft;
 pub use generate::generate;
 pub use giving_way::GivingWay;
 pub use sets::NEARLY_FLAT_RAD;
-pub(super) use sets::{set_count, shared_deviation};
+pub(super) use sets::{count_and_sets, shared_deviation};
 pub use table::{FittedTable, PackedKernel, UnpackedKernel, UsedThreads};
 pub use validate::validation_error;
 
