@@ -100,7 +100,7 @@ impl Renderer {
     }
 
     /// The threads that pictures of a material have by default: a built-in, a file, or a [`Custom`](crate::Custom) BRDF. They are
-    /// along the material's own axes, whatever its rotation.
+    /// along the material's own axes, whatever its rotation. An anisotropic one has 13 where 16 are asked for.
     ///
     /// ```
     /// # let renderer = threadlight::Renderer::new()?;

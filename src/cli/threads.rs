@@ -23,7 +23,7 @@ Examples:
 pub struct Threads {
     #[arg(help = nameable::material("Material"))]
     material: String,
-    /// Number of threads: 1 to 128 (fitted; 16 by default) or 1 to 1024 (paper; 100 by default).
+    /// Number of threads: 1 to 128 (fitted; 16 by default, of which anisotropic materials have 13) or 1 to 1024 (paper; 100 by default).
     #[arg(long, value_name = "N")]
     count: Option<u32>,
     /// Whose threads: fitted, paper or gaussian.
