@@ -6,9 +6,10 @@ use crate::brdf::LobeShape;
 /// 0.05 x 0.3, sets of 4 threads err by 0.066 of the radiance, of 8 by 0.024, of 16 by 0.010.
 const ASKED_FOR_OF_LONG_LOBE: usize = 8;
 
-/// Where two or more sub-pixels look each of such sets up, they are up to twice as many lookups as were asked for. So three of 16 threads are left
-/// out: four brushed materials in three maps err by 0.0019 in the place of 0.0014, and take 1.3 to 1.5 times the time of isotropic ones in the place of
-/// 1.6 to 1.8. With 12 of 16 they err by 0.0020, and the worst of 24 pictures by 0.0082 in the place of 0.0072.
+/// Where there are half as many such sets as sub-pixels, or fewer, each is looked up by two or more of these, and a pixel would make twice as many
+/// lookups as were asked for, or more. So three of 16 threads are left out: four brushed materials in three maps err by 0.0019 in the place of 0.0014,
+/// and take 1.3 to 1.5 times the time of isotropic ones in the place of 1.6 to 1.8. With 12 of 16 they err by 0.0020, and the worst of 24 pictures by
+/// 0.0082 in the place of 0.0072.
 const LEFT_OUT_OF_16: usize = 3;
 
 /// Most threads of a set, and part of a lobe's width in half vectors that normals may deviate by, of those that share one sum where normals are
