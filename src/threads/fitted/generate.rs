@@ -95,19 +95,22 @@ impl Targets {
             _ => BaseProfile::EVEN,
         };
         let answers = BaseAnswers::of(&base);
+        let (resolution, quadrature) = match azimuths {
+            1 => (Resolution::FULL, Quadrature::FIT),
+            _ => (Resolution::OF_AZIMUTHS, Quadrature::OF_AZIMUTHS),
+        };
+        let slices = |view: View| Slice::with_lobes_of_view(brdf, &lobe, view, resolution);
         let target = |index: usize| -> Result<(TestLights, DVec3)> {
             observer.check()?;
-            let slices = Slice::with_lobes_of_view(brdf, &lobe, View::of_row(index, rows), Resolution::FULL);
+            let slices = slices(View::of_row(index, rows));
             let lights = match settings.kind {
                 ThreadKind::Gaussian => TestLights::directions(&slices, DIRECTIONS_A_LIGHT * count),
-                _ => TestLights::new(&slices, count, LIGHTS_SEED, Quadrature::FIT, &answers),
+                _ => TestLights::new(&slices, count, LIGHTS_SEED, quadrature, &answers),
             };
             Ok((lights, slices[0].albedo()))
         };
         let targets = (0..azimuths * rows).into_par_iter().map(target).collect::<Result<Vec<_>>>()?;
-        let albedo = |theta_o: f64| {
-            Slice::with_lobes_of_view(brdf, &lobe, View { theta_o, phi_o: 0.0 }, Resolution::FULL)[0].albedo()
-        };
+        let albedo = |theta_o: f64| slices(View { theta_o, phi_o: 0.0 })[0].albedo();
         let albedos: Vec<_> = targets[..rows].iter().map(|(_, albedo)| *albedo).collect();
         let rim_power = rim_power(&albedos, albedo);
         Ok(Self { azimuths, rows: targets, lobe, rim_power, base })

@@ -75,6 +75,9 @@ pub struct Quadrature {
 impl Quadrature {
     /// What a fit needs: with three times as many points of a light its error is the same.
     pub const FIT: Self = Self { slice_points: 1500, light_points: 16 };
+    /// The same of an anisotropic BRDF, whose many fits this makes a third quicker: four brushed materials err under other lights as they do with
+    /// [`Self::FIT`] and [`Resolution::FULL`](crate::threads::slice::Resolution::FULL), within 1 % in the mean with 16 threads and 2 % with 64.
+    pub const OF_AZIMUTHS: Self = Self { slice_points: 750, light_points: 8 };
     /// For drafts.
     pub const DRAFT: Self = Self { slice_points: 400, light_points: 8 };
     /// Far more, to see what the fit's leaves.
