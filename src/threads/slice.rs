@@ -56,7 +56,8 @@ pub struct Slice<'a> {
     ring_cdf: Vec<f64>,
     /// CDF over phi_h within each step of x: a value more than steps of phi_h, from 0 to 1.
     azimuth_cdf: Vec<f64>,
-    peak: DVec3,
+    /// The half vector of the middle of a step, or the normal, where the pdf is greatest of all of these; and how far the next one is, in radians.
+    highest: (DVec3, f64),
 }
 
 /// The middle of a step of x and phi_h.
@@ -189,13 +190,12 @@ impl<'a> Slice<'a> {
         counted: impl Fn(DVec3) -> DVec3,
     ) -> Self {
         let Resolution { theta, phi, .. } = resolution;
-        let density = |w_i: DVec3| counted(brdf.evaluate(w_i, w_o)) * w_i.z;
         let mut albedo = DVec3::ZERO;
         let mut ring_cdf = vec![0.0];
         let mut azimuth_cdf = Vec::with_capacity(theta * (phi + 1));
         // The mirror direction is where sharp lobes have their maximum, and no cell has it as its centre.
         let mirror = dvec3(-w_o.x, 0.0 - w_o.y, w_o.z);
-        let mut peak = (luminance(density(mirror)), 0.0, DVec3::Z);
+        let mut peak = (luminance(counted(brdf.evaluate(mirror, w_o))) * mirror.z, 0.0, DVec3::Z);
         for i in 0..theta {
             let x = (i as f64 + 0.5) / theta as f64;
             // sin(theta_h) dtheta_h dphi_h, dtheta_h = pi x dx, by 4 of the reflection.
@@ -221,10 +221,7 @@ impl<'a> Slice<'a> {
         }
         let total = ring_cdf[theta];
         normalise(&mut ring_cdf);
-        let peak = climb(peak.2, FRAC_PI_2 * (2.0 * peak.1 + 1.0 / theta as f64) / theta as f64, |h| {
-            let w_i = reflect(w_o, h);
-            if w_i.z > 0.0 && w_o.dot(h) > 0.0 { luminance(density(w_i)) } else { 0.0 }
-        });
+        let (_, x, h) = peak;
         Self {
             brdf: brdf.clone(),
             w_o,
@@ -234,7 +231,7 @@ impl<'a> Slice<'a> {
             resolution,
             ring_cdf,
             azimuth_cdf,
-            peak: reflect(w_o, peak),
+            highest: (h, FRAC_PI_2 * (2.0 * x + 1.0 / theta as f64) / theta as f64),
         }
     }
 
@@ -266,7 +263,9 @@ impl<'a> Slice<'a> {
 
     /// Where the pdf is greatest.
     pub fn peak(&self) -> DVec3 {
-        self.peak
+        let (h, step) = self.highest;
+        let height = |h: DVec3| if self.w_o.dot(h) > 0.0 { self.pdf(reflect(self.w_o, h)) } else { 0.0 };
+        reflect(self.w_o, climb(h, step, height))
     }
 
     /// Inverse CDF: the unit square onto the hemisphere, equal areas onto equal masses.
