@@ -47,7 +47,7 @@ use crate::file_format;
 use crate::output::write_whole;
 
 /// Version of the file format and of the threads in it: to be raised when either changes, since caches depend on it.
-pub const FORMAT_VERSION: u32 = 28;
+pub const FORMAT_VERSION: u32 = 29;
 
 const MAGIC: &[u8; 8] = b"THREADS\0";
 const DIGEST_BYTES: usize = blake3::OUT_LEN;

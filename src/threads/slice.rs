@@ -195,7 +195,7 @@ impl<'a> Slice<'a> {
         let mut azimuth_cdf = Vec::with_capacity(theta * (phi + 1));
         // The mirror direction is where sharp lobes have their maximum, and no cell has it as its centre.
         let mirror = dvec3(-w_o.x, 0.0 - w_o.y, w_o.z);
-        let mut peak = (luminance(counted(brdf.evaluate(mirror, w_o))) * mirror.z, 0.0, DVec3::Z);
+        let mut highest = (luminance(counted(brdf.evaluate(mirror, w_o))) * mirror.z, 0.0, DVec3::Z);
         for i in 0..theta {
             let x = (i as f64 + 0.5) / theta as f64;
             // sin(theta_h) dtheta_h dphi_h, dtheta_h = pi x dx, by 4 of the reflection.
@@ -210,8 +210,8 @@ impl<'a> Slice<'a> {
                     let value = luminance(rgb);
                     albedo += rgb * (cos_theta_d * ring);
                     sum += value * cos_theta_d * ring;
-                    if value > peak.0 {
-                        peak = (value, x, h);
+                    if value > highest.0 {
+                        highest = (value, x, h);
                     }
                 }
                 azimuth_cdf.push(sum);
@@ -221,7 +221,7 @@ impl<'a> Slice<'a> {
         }
         let total = ring_cdf[theta];
         normalise(&mut ring_cdf);
-        let (_, x, h) = peak;
+        let (_, x, h) = highest;
         Self {
             brdf: brdf.clone(),
             w_o,

@@ -17,7 +17,7 @@
 //! Lambda is (e^(-x^2) / (x sqrt pi) - erfc(x)) / 2, Smith's. As printed, the paper's is without the exponential.
 //!
 //! Departures: Delta, a perfect mirror in the paper, is a Beckmann lobe of the width `specular_alpha`, as a mirror has no BRDF. For g above
-//! 100 the sum, a mean over Poisson's distribution, is taken by its moments, with an error of the order of 1 / g^2 near its peak.
+//! 20 the sum, a mean over Poisson's distribution, is taken by its moments, with an error of at most 1e-4 of its peak.
 //!
 //! Rough surfaces (sigma_0 well above lambda) are those of geometrical optics: Beckmann's facets of alpha = 2 sigma_0 / tau. Smooth ones
 //! are mirrors. Reciprocal. Energy is at most 1.05 within the theory's range, tau above lambda and 2 sigma_0 / tau below about 0.6, with
@@ -25,6 +25,7 @@
 use std::f64::consts::{FRAC_1_PI, PI};
 
 use glam::{DVec3, dvec3};
+use lambert_w::lambert_w0;
 
 use crate::brdf::microfacet::metals::index_of_refraction;
 use crate::brdf::microfacet::{Distribution, fresnel_conductor};
@@ -52,67 +53,87 @@ pub struct HeTorrance {
 }
 
 impl HeTorrance {
-    /// sigma / sigma_0: z_0 solves sqrt(pi / 2) z_0 = sigma_0 / 4 (K(theta_i) + K(theta_o)) e^(-z_0^2 / (2 sigma_0^2)).
-    fn effective_roughness(&self, x: [f64; 2]) -> f64 {
+    /// sigma / sigma_0, of the `slopes` of both directions: z_0 solves
+    /// sqrt(pi / 2) z_0 = sigma_0 / 4 (K(theta_i) + K(theta_o)) e^(-z_0^2 / (2 sigma_0^2)).
+    fn effective_roughness(&self, slopes: &[Slope; 2]) -> f64 {
         // K = tan theta erfc(x), and tan theta is tau / (2 sigma_0 x).
-        let slope = 0.5 * self.tau_um / self.sigma_um;
-        let k: f64 = x.iter().map(|&x| slope / x.max(1e-12) * libm::erfc(x)).sum();
+        let k: f64 = slopes.iter().map(|slope| 0.5 * self.tau_um / self.sigma_um * slope.erfc / slope.x).sum();
         let right = k / 4.0 / (PI / 2.0).sqrt();
-        // Of y = z_0 / sigma_0, y = right e^(-y^2 / 2): it lies below `right`, and below 10 for any number.
-        let (mut low, mut high) = (0.0f64, right.min(10.0));
-        for _ in 0..40 {
-            let middle = 0.5 * (low + high);
-            if middle < right * (-0.5 * middle * middle).exp() { low = middle } else { high = middle }
-        }
-        (1.0 + low * low).sqrt().recip()
-    }
-
-    /// D of one channel over (pi tau / (2 lambda))^2, where `a` is v_xy^2 tau^2 / 4.
-    fn scattering(g: f64, a: f64) -> f64 {
-        let term = |m: f64| (-a / m).exp() / m;
-        if g > 100.0 {
-            let second = (-a / g).exp() * (2.0 - 4.0 * a / g + (a / g).powi(2)) / g.powi(3);
-            return (term(g) + 0.5 * g * second).max(0.0);
-        }
-        // Poisson's weights beyond eight deviations are less than what double precision resolves of the rest.
-        let first = (g - 8.0 * g.sqrt()).floor().max(1.0);
-        let last = (g + 8.0 * g.sqrt() + 12.0).ceil();
-        let mut weight = (first * g.ln() - g - libm::lgamma(first + 1.0)).exp();
-        let (mut sum, mut m) = (0.0, first);
-        while m <= last {
-            sum += weight * term(m);
-            m += 1.0;
-            weight *= g / m;
-        }
-        sum
+        // With y = z_0 / sigma_0 this is y^2 e^(y^2) = right^2, and y^2 is Lambert's W(right^2).
+        (1.0 + lambert_w0(right * right)).sqrt().recip()
     }
 }
 
-/// S of one direction.
-fn shadowing(x: f64) -> f64 {
-    // cot theta is infinite along the normal, where nothing is in the shade.
-    if x > 6.0 {
-        return 1.0;
+/// The mean of e^(-a / m) / m over Poisson's distribution of m >= 1 around g: D of one channel over (pi tau / (2 lambda))^2, where `a` is v_xy^2 tau^2 / 4.
+fn scattering(g: f64, a: f64) -> f64 {
+    if g > MOST_SUMMED { by_moments(g, a / g) } else { by_sum(g, a) }
+}
+
+/// Where Poisson's distribution is narrow enough for its moments.
+const MOST_SUMMED: f64 = 20.0;
+
+/// By its terms, as far as they hold more than 1e-7 of Poisson's weights: up to five deviations and five above the mean.
+fn by_sum(g: f64, a: f64) -> f64 {
+    let last = (g + 5.0 * g.sqrt()) as u32 + 5;
+    let (mut weight, mut sum) = ((-g).exp(), 0.0);
+    for m in 1..=last {
+        let by_m = f64::from(m).recip();
+        weight *= g * by_m;
+        sum += weight * by_m * (-a * by_m).exp();
     }
-    let x = x.max(1e-12);
-    let lambda = 0.5 * ((-x * x).exp() / (PI.sqrt() * x) - libm::erfc(x));
-    (1.0 - 0.5 * libm::erfc(x)) / (1.0 + lambda)
+    sum
+}
+
+/// By Poisson's moments, `u` = a / g, with an error of 1e-4 of the peak: with m = g (1 + e), e^(-a / m) / m is e^-u / g times the sum over n of
+/// (-e)^n L_n(u), the series that generates Laguerre's polynomials. The means of powers of -e up to the sixth are those here.
+fn by_moments(g: f64, u: f64) -> f64 {
+    let r = g.recip();
+    let means = [r, -r * r, r * r * (3.0 + r), -r.powi(3) * (10.0 + r), r.powi(3) * (15.0 + r * (25.0 + r))];
+    // L_0 has the mean 1, L_1 the mean 0.
+    let (mut before, mut laguerre, mut sum) = (1.0, 1.0 - u, 1.0);
+    for (n, mean) in (2..).map(f64::from).zip(means) {
+        (before, laguerre) = (laguerre, ((2.0 * n - 1.0 - u) * laguerre - (n - 1.0) * before) / n);
+        sum += mean * laguerre;
+    }
+    ((-u).exp() * r * sum).max(0.0)
+}
+
+/// x of one direction, and erfc(x).
+struct Slope {
+    x: f64,
+    erfc: f64,
+}
+
+impl Slope {
+    fn of(w: DVec3, sigma_um: f64, tau_um: f64) -> Self {
+        // cot theta is infinite along the normal; at grazing angles x would be 0, by which S and K divide.
+        let x = (0.5 * tau_um / sigma_um * w.z / (w.x * w.x + w.y * w.y).sqrt().max(1e-12)).max(1e-12);
+        Self { x, erfc: libm::erfc(x) }
+    }
+
+    /// S of the direction.
+    fn shadowing(&self) -> f64 {
+        let &Self { x, erfc } = self;
+        let lambda = 0.5 * ((-x * x).exp() / (PI.sqrt() * x) - erfc);
+        (1.0 - 0.5 * erfc) / (1.0 + lambda)
+    }
 }
 
 impl Model for HeTorrance {
     fn evaluate(&self, w_i: DVec3, w_o: DVec3) -> DVec3 {
         let sum = w_i + w_o;
         let h = sum.normalize();
-        let x = [w_i, w_o].map(|w| 0.5 * self.tau_um / self.sigma_um * w.z / (w.x * w.x + w.y * w.y).sqrt().max(1e-12));
-        let sigma_um = self.sigma_um * self.effective_roughness(x);
-        let visible = fresnel_conductor(w_o.dot(h), self.eta, self.k) * (shadowing(x[0]) * shadowing(x[1]));
+        let slopes = [w_i, w_o].map(|w| Slope::of(w, self.sigma_um, self.tau_um));
+        let sigma_um = self.sigma_um * self.effective_roughness(&slopes);
+        let shadowing: f64 = slopes.iter().map(Slope::shadowing).product();
+        let visible = fresnel_conductor(w_o.dot(h), self.eta, self.k) * shadowing;
         let geometry = (sum.length_squared() / sum.z).powi(2);
         let over_cos = (w_i.z * w_o.z).recip();
         let mirror = 0.25 * Distribution::Beckmann.density(h, self.specular_alpha) * over_cos;
         let channel = |lambda_um: f64| {
             let g = (2.0 * PI * sigma_um / lambda_um * sum.z).powi(2).max(1e-300);
             let a = (PI * self.tau_um / lambda_um).powi(2) * (sum.x * sum.x + sum.y * sum.y);
-            let d = (0.5 * PI * self.tau_um / lambda_um).powi(2) * Self::scattering(g, a);
+            let d = (0.5 * PI * self.tau_um / lambda_um).powi(2) * scattering(g, a);
             (-g).exp() * mirror + d * geometry * over_cos * FRAC_1_PI
         };
         visible * LAMBDA_UM.map(channel) + self.diffuse * FRAC_1_PI
@@ -136,5 +157,24 @@ impl Model for HeTorrance {
             hash_numbers(hasher, colour.to_array());
         }
         hash_numbers(hasher, [self.sigma_um, self.tau_um, self.specular_alpha]);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn scattering_is_poissons_mean() {
+        for g in [1e-300, 1e-3, 0.3, 1.0, 4.0, 11.0, 19.9, 20.1, 30.0, 100.0, 3000.0] {
+            let last = (g + 12.0 * f64::sqrt(g)) as u32 + 40;
+            let weight = |m: f64| (m * g.ln() - g - libm::lgamma(m + 1.0)).exp();
+            let mean = |a: f64| (1..last).map(f64::from).map(|m| weight(m) * (-a / m).exp() / m).sum::<f64>();
+            for u in [0.0, 0.01, 0.2, 1.0, 3.0, 10.0, 100.0, 1e8] {
+                let a = u * f64::max(g, 1.0);
+                let error = (scattering(g, a) - mean(a)).abs() / mean(0.0);
+                assert!(error < if g > MOST_SUMMED { 1e-4 } else { 1e-6 } || mean(0.0) < 1e-30, "{g} {a}: {error}");
+            }
+        }
     }
 }

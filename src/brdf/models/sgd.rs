@@ -45,37 +45,30 @@ pub struct Sgd {
 }
 
 impl Sgd {
-    fn channel(&self, channel: usize, w_i: DVec3, w_o: DVec3) -> f64 {
-        let h = (w_i + w_o).normalize();
-        let (cos2, sin2) = (h.z * h.z, h.x * h.x + h.y * h.y);
-        let a = self.alpha[channel] + sin2 / cos2 / self.alpha[channel];
-        let exponential = (-a).exp();
-        // Far out on the lobe, at grazing half vectors, 0 times infinity threatens.
-        let d = if exponential > 0.0 {
-            self.kappa[channel] * exponential * FRAC_1_PI / (a.powf(self.p[channel]) * cos2 * cos2)
-        } else {
-            0.0
-        };
-        let cos_theta_d = w_o.dot(h);
-        let (f0, f1) = (self.f0[channel], self.f1[channel]);
-        let fresnel = f0 - f1 * cos_theta_d + (1.0 - f0) * (1.0 - cos_theta_d).powi(5);
-        let shadowing = self.g1(channel, w_i) * self.g1(channel, w_o);
-        let lobe = if shadowing > 0.0 { d * fresnel * shadowing / (w_i.z * w_o.z) } else { 0.0 };
-        ((self.diffuse[channel] + self.specular[channel] * lobe) * FRAC_1_PI).max(0.0)
-    }
-
-    fn g1(&self, channel: usize, w: DVec3) -> f64 {
-        let theta = (w.x * w.x + w.y * w.y).sqrt().atan2(w.z);
-        let power = (theta - self.theta_0[channel]).max(0.0).powf(self.k[channel]);
+    /// G1 of the direction `w`.
+    fn g1(&self, w: DVec3) -> DVec3 {
+        let theta = w.truncate().length().atan2(w.z);
+        let power = |channel: usize| (theta - self.theta_0[channel]).max(0.0).powf(self.k[channel]);
         // Beyond e^700 is no double; so deep a shadow is black whatever the rest.
-        let exponential = (self.c[channel] * power).min(700.0).exp_m1();
-        (1.0 - self.lambda[channel] * exponential).clamp(0.0, 1.0)
+        let exponent = (self.c * DVec3::from_array([0, 1, 2].map(power))).min(DVec3::splat(700.0));
+        (1.0 - self.lambda * exponent.map(f64::exp_m1)).clamp(DVec3::ZERO, DVec3::ONE)
     }
 }
 
 impl Model for Sgd {
     fn evaluate(&self, w_i: DVec3, w_o: DVec3) -> DVec3 {
-        DVec3::from_array([0, 1, 2].map(|channel| self.channel(channel, w_i, w_o)))
+        let h = (w_i + w_o).normalize();
+        let (cos2, sin2) = (h.z * h.z, h.x * h.x + h.y * h.y);
+        let a = self.alpha + sin2 / cos2 / self.alpha;
+        let d = self.kappa * (-a - self.p * a.map(f64::ln)).exp() * FRAC_1_PI / (cos2 * cos2);
+        let cos_theta_d = w_o.dot(h);
+        let fresnel = self.f0 - self.f1 * cos_theta_d + (1.0 - self.f0) * (1.0 - cos_theta_d).powi(5);
+        let shadowing = self.g1(w_i) * self.g1(w_o);
+        let lobe = d * fresnel * shadowing / (w_i.z * w_o.z);
+        // At grazing directions, in the shade or far out on the lobe, 0 times infinity threatens; e^-700 is about the smallest double.
+        let is_lit = a.cmplt(DVec3::splat(700.0)) & shadowing.cmpgt(DVec3::ZERO);
+        let lobe = DVec3::select(is_lit, lobe, DVec3::ZERO);
+        ((self.diffuse + self.specular * lobe) * FRAC_1_PI).max(DVec3::ZERO)
     }
 
     fn from_parameters(parameters: &mut Parameters) -> Result<Self> {
