@@ -228,6 +228,9 @@ struct SlicePoint {
     density: f32,
 }
 
+/// e^-30 of a light's peak is lost in single precision.
+const LEAST_EXPONENT: f32 = -30.0;
+
 /// A call of what adds up the slice's points over lights of one kappa, compiled for the vector instructions that are there.
 struct Summing<'a> {
     points: &'a [SlicePoint],
@@ -249,9 +252,18 @@ impl pulp::NullaryFnOnce for Summing<'_> {
         for (((xs, ys), zs), ((reds, greens), blues)) in lights.zip(reds.iter_mut().zip(greens).zip(blues)) {
             let [mut red, mut green, mut blue] = [[0.0; LANES]; 3];
             for &SlicePoint { direction, f_cos, density } in self.points {
+                let mut exponents = [0.0; LANES];
                 for j in 0..LANES {
                     let [x, y, z] = [direction.x - xs[j], direction.y - ys[j], direction.z - zs[j]];
-                    let radiance = peak * exp(-0.5 * kappa * (x * x + y * y + z * z));
+                    exponents[j] = -0.5 * kappa * (x * x + y * y + z * z);
+                }
+                // Most points are far from narrow lights. `any` would not be made of vector instructions.
+                let near = exponents.iter().fold(0, |near, &exponent| near | u32::from(exponent > LEAST_EXPONENT));
+                if near == 0 {
+                    continue;
+                }
+                for j in 0..LANES {
+                    let radiance = peak * exp(exponents[j]);
                     let share = radiance / (density + self.light_points * radiance);
                     red[j] += f_cos.x * share;
                     green[j] += f_cos.y * share;
