@@ -64,15 +64,15 @@ impl HeTorrance {
     }
 }
 
-/// The mean of e^(-a / m) / m over Poisson's distribution of m >= 1 around g: D of one channel over (pi tau / (2 lambda))^2, where `a` is v_xy^2 tau^2 / 4.
+/// The sum over m >= 1 of g^m e^-g / m! e^(-a / m) / m: D of one channel over (pi tau / (2 lambda))^2, where `a` is v_xy^2 tau^2 / 4.
 fn scattering(g: f64, a: f64) -> f64 {
     if g > MOST_SUMMED { by_moments(g, a / g) } else { by_sum(g, a) }
 }
 
-/// Where Poisson's distribution is narrow enough for its moments.
+/// Above this g Poisson's weights g^m e^-g / m! are narrow enough for their moments.
 const MOST_SUMMED: f64 = 20.0;
 
-/// By its terms, as far as they hold more than 1e-7 of Poisson's weights: up to five deviations and five above the mean.
+/// By its terms, up to five deviations and five above the mean: the others have less than 1e-7 of Poisson's weights.
 fn by_sum(g: f64, a: f64) -> f64 {
     let last = (g + 5.0 * g.sqrt()) as u32 + 5;
     let (mut weight, mut sum) = ((-g).exp(), 0.0);

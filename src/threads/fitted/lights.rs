@@ -229,7 +229,7 @@ struct SlicePoint {
 }
 
 /// e^-30 of a light's peak is lost in single precision.
-const LEAST_EXPONENT: f32 = -30.0;
+const LOST_EXPONENT: f32 = -30.0;
 
 /// A call of what adds up the slice's points over lights of one kappa, compiled for the vector instructions that are there.
 struct Summing<'a> {
@@ -258,7 +258,7 @@ impl pulp::NullaryFnOnce for Summing<'_> {
                     exponents[j] = -0.5 * kappa * (x * x + y * y + z * z);
                 }
                 // Most points are far from narrow lights. `any` would not be made of vector instructions.
-                let near = exponents.iter().fold(0, |near, &exponent| near | u32::from(exponent > LEAST_EXPONENT));
+                let near = exponents.iter().fold(0, |near, &exponent| near | u32::from(exponent > LOST_EXPONENT));
                 if near == 0 {
                     continue;
                 }
