@@ -19,9 +19,9 @@ pub struct Cubature<'a, G> {
     g: G,
     /// What `g` was found to be at nodes: most are shared by neighbouring cells.
     known: FxHashMap<NodePlace, DVec3>,
-    /// The estimate.
+    /// The estimate, up to what [`Self::sum`] rounds away.
     pub integral: DVec3,
-    /// The sum over cells of the squares of their errors, per channel.
+    /// The sum over cells of the squares of their errors, per channel; the same.
     pub squares: DVec3,
     cells: Vec<Cell>,
     /// How much a cell matters, as the bits of a number that is not negative, and which it is.
@@ -32,6 +32,8 @@ pub struct Cubature<'a, G> {
 #[derive(Clone, Copy)]
 struct Cell {
     place: CellPlace,
+    /// The integral over it.
+    integral: DVec3,
     /// How much the integral over the cell changed when the cell was made.
     change: DVec3,
     /// Estimated error of the integral over the cell, squared.
@@ -46,7 +48,6 @@ impl<'a, G: Fn(&[DVec3]) -> Vec<DVec3>> Cubature<'a, G> {
         let mut cubature = Self { light, g, known, integral, squares, cells: vec![], worst };
         let mut waiting: Vec<Cell> = CellPlace::all(FIRST_LEVEL).map(|place| cubature.first_cell(place)).collect();
         while let Some(cell) = waiting.pop() {
-            cubature.squares -= cell.squares;
             for part in cubature.parts(cell) {
                 if part.place.level < LAST_LEVEL && must_split(part.place) {
                     waiting.push(part)
@@ -55,20 +56,37 @@ impl<'a, G: Fn(&[DVec3]) -> Vec<DVec3>> Cubature<'a, G> {
                 }
             }
         }
+        cubature.sum();
         cubature
     }
 
-    /// Splits the cell that matters most, where channels have these weights in the errors' squares; whether there was one left.
-    pub fn refine(&mut self, channel_weights: DVec3) -> bool {
-        let Some((_, index)) = self.worst.pop() else { return false };
-        // It stays in the list, without an error.
+    /// Sums cells anew. What a split changes is added to sums as long as cells are split, and before a near-mirror and a sun are resolved
+    /// they may be 1e16 times what is left in the end.
+    pub fn sum(&mut self) {
+        (self.integral, self.squares) =
+            self.cells.iter().fold((DVec3::ZERO, DVec3::ZERO), |(integral, squares), cell| {
+                (integral + cell.integral, squares + cell.squares)
+            });
+    }
+
+    /// Whether no cell can be split.
+    pub fn is_exhausted(&self) -> bool {
+        self.worst.is_empty()
+    }
+
+    /// Splits the cell that matters most, if one is left, where channels have these weights in the errors' squares.
+    pub fn refine(&mut self, channel_weights: DVec3) {
+        let Some((_, index)) = self.worst.pop() else { return };
+        // It stays in the list, as nothing.
         let cell = self.cells[index];
-        self.cells[index].squares = DVec3::ZERO;
+        (self.cells[index].integral, self.cells[index].squares) = (DVec3::ZERO, DVec3::ZERO);
+        self.integral -= cell.integral;
         self.squares = (self.squares - cell.squares).max(DVec3::ZERO);
         for part in self.parts(cell) {
+            self.integral += part.integral;
+            self.squares += part.squares;
             self.keep(part, channel_weights);
         }
-        true
     }
 
     /// How many cells there are.
@@ -85,8 +103,8 @@ impl<'a, G: Fn(&[DVec3]) -> Vec<DVec3>> Cubature<'a, G> {
         let values = self.values(place.nodes::<NODES>());
         let weights = self.light.weights(place);
         let values = values.as_flattened();
-        self.integral += weights.iter().zip(values).map(|(weight, value)| weight.as_dvec3() * *value).sum::<DVec3>();
-        Cell { place, change: DVec3::ZERO, squares: DVec3::ZERO }
+        let integral = weights.iter().zip(values).map(|(weight, value)| weight.as_dvec3() * *value).sum();
+        Cell { place, integral, change: DVec3::ZERO, squares: DVec3::ZERO }
     }
 
     /// Splits a cell: the estimate changes by what its polynomial misses at the new nodes, and that is the parts' error (F37).
@@ -99,19 +117,16 @@ impl<'a, G: Fn(&[DVec3]) -> Vec<DVec3>> Cubature<'a, G> {
         let mut part = 0;
         cell.place.parts().map(|place| {
             let (left, top) = (part % 2 * (NODES - 1), part / 2 * (NODES - 1));
-            let mut change = DVec3::ZERO;
+            let (mut integral, mut change) = (DVec3::ZERO, DVec3::ZERO);
             for (i, weight) in weights[part].iter().enumerate() {
                 let (row, column) = (top + i / NODES, left + i % NODES);
-                let term = *weight * (values[row][column] - interpolated[row][column]);
-                self.integral += term;
+                integral += *weight * values[row][column];
                 // What cancels here by chance may not do so within the part.
-                change += term.abs();
+                change += (*weight * (values[row][column] - interpolated[row][column])).abs();
             }
             let error = change.max(LEAST_LEFT * light[part] / whole_light * cell.change);
-            let squares = error * error;
-            self.squares += squares;
             part += 1;
-            Cell { place, change, squares }
+            Cell { place, integral, change, squares: error * error }
         })
     }
 

@@ -140,8 +140,8 @@ impl<'a> Integrator<'a> {
         };
         let mut cubature = Cubature::new(&self.light, f_cos, must_split);
         let scale = self.intensity / self.subpixels as f64;
-        let mut first_weight = None;
-        for split in 1.. {
+        let (mut first_weight, mut is_summed) = (None, true);
+        for split in 1_usize.. {
             // Polynomials may swing below zero, which radiance never is: by so much the estimate is wrong, whatever its cells say. A display
             // shows no difference between that and black.
             let estimate = scale * cubature.integral;
@@ -153,10 +153,17 @@ impl<'a> Integrator<'a> {
             let seen = display_error / radiance_error.max(DVec3::splat(f64::MIN_POSITIVE));
             let weights = seen * seen;
             let first_weight = *first_weight.get_or_insert(weights.max_element().max(f64::MIN_POSITIVE));
-            let done = rms(display_error) <= tolerance || cubature.len() >= MOST_CELLS;
-            if done || !cubature.refine(weights / first_weight) {
+            let is_done = rms(display_error) <= tolerance || cubature.len() >= MOST_CELLS || cubature.is_exhausted();
+            if is_done && is_summed {
                 let evaluations = (cubature.evaluations() * points.len()) as u64;
                 return Ok(PixelEstimate { radiance, radiance_error, display_error, evaluations });
+            }
+            is_summed = is_done || split.is_power_of_two();
+            if !is_done {
+                cubature.refine(weights / first_weight);
+            }
+            if is_summed {
+                cubature.sum();
             }
             if split % SPLITS_A_LOOK == 0 {
                 observer.check()?;

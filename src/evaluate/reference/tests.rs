@@ -376,3 +376,21 @@ fn turning_the_environment_takes_z_towards_x() {
     assert!((to_environment(90.0) * DVec3::X - DVec3::Z).length() < 1e-15);
     assert_eq!(to_environment(0.0), glam::DMat3::IDENTITY);
 }
+
+#[test]
+fn a_sun_beside_a_near_mirror_leaves_what_is_mirrored() {
+    // The mirrored direction is a node of the coarsest cells, some of which the sun is in, too.
+    for (sun, alpha) in [(1e3, 0.001), (1e4, 0.003), (1e6, 0.001), (1e6, 0.01)] {
+        let map = environment(64, 32, |column, row| [if (column, row) == (34, 17) { sun } else { 0.5 }; 3]);
+        let mirror = brdf("conductor", &format!("distribution = 'beckmann'\nalpha = {alpha}\neta = 1.0\nk = 100.0"));
+        let integrator = Integrator::new(&map, 1.0, [&mirror], 1);
+        let estimate = integrator.pixel(&[Point::new(DVec3::Z, DVec3::Z, 0)], 2e-4, DISPLAY);
+        // What the sun adds in the tail, if anything, is what the lobe is there.
+        let light = map.direction(34.0, 17.0);
+        let solid_angle = (PI / 32.0).powi(2) * (1.0 - light.y * light.y).sqrt();
+        let tail = mirror.evaluate(light, DVec3::Z).x * light.z * f64::from(sun) * solid_angle;
+        let found = estimate.radiance.x;
+        assert!((found - 0.5).abs() < 0.003 + 2.0 * tail, "{sun} {alpha}: {estimate:?}, tail {tail}");
+        assert!(rms(estimate.display_error) <= 2e-4, "{sun} {alpha}: {estimate:?}");
+    }
+}
