@@ -37,7 +37,7 @@ pub use microfacet::{Axes, Distribution, Roughness, Tap, fresnel_conductor, fres
 pub use models::custom::CustomBrdf;
 pub use models::layered::{Coat, base_files, base_files_of, change_base_files, resolve_base_files};
 pub use models::*;
-pub use parameters::{Domain, Parameter, Parameters, Spacing, as_number, channels, parameter, set_parameter};
+pub use parameters::{Domain, Parameter, Parameters, Scale, Spacing, as_number, channels, parameter, set_parameter};
 pub use record::{MaterialRecord, ThreadTableRecord};
 pub use seen::SeenBrdf;
 pub use symmetry::Symmetry;

@@ -32,9 +32,9 @@ pub struct Parameter {
 #[derive(Clone, Debug, PartialEq)]
 pub enum Domain {
     /// A number of this range.
-    Number(RangeInclusive<f64>, Spacing),
+    Number(RangeInclusive<f64>, Scale),
     /// Linear Rec. 709, each channel of this range.
-    Colour(RangeInclusive<f64>),
+    Colour(RangeInclusive<f64>, Scale),
     /// One of these words.
     Choice(Vec<String>),
 }
@@ -43,9 +43,47 @@ impl Domain {
     /// Something that it may be.
     fn middle(&self) -> Value {
         match self {
-            Self::Number(range, _) | Self::Colour(range) => (0.5 * (range.start() + range.end())).into(),
+            Self::Number(range, _) | Self::Colour(range, _) => (0.5 * (range.start() + range.end())).into(),
             Self::Choice(words) => words.first().map_or("", String::as_str).into(),
         }
+    }
+}
+
+/// How a slider, or a search, goes through what a number may be.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scale {
+    /// From where to where; numbers beyond are unusual, but good.
+    pub range: RangeInclusive<f64>,
+    /// In what steps.
+    pub spacing: Spacing,
+}
+
+impl Scale {
+    /// All of `range`; by factors, which know no 0, from a hundred thousandth of the end where it starts there.
+    pub fn new(range: RangeInclusive<f64>, spacing: Spacing) -> Self {
+        let (start, end) = range.into_inner();
+        let least = if spacing == Spacing::Logarithmic && start <= 0.0 { 1e-5 * end } else { start };
+        Self { range: least..=end, spacing }
+    }
+
+    /// By the same difference.
+    pub const fn linear(range: RangeInclusive<f64>) -> Self {
+        Self { range, spacing: Spacing::Linear }
+    }
+
+    /// By the same factor; `range` is above 0.
+    pub const fn logarithmic(range: RangeInclusive<f64>) -> Self {
+        Self { range, spacing: Spacing::Logarithmic }
+    }
+
+    /// The number at this part of the way, 0 to 1.
+    pub fn at(&self, part: f64) -> f64 {
+        let (start, end) = (*self.range.start(), *self.range.end());
+        let number = match self.spacing {
+            Spacing::Linear => start + (end - start) * part,
+            Spacing::Logarithmic => start * (end / start).powf(part),
+        };
+        number.clamp(start, end)
     }
 }
 
@@ -87,7 +125,19 @@ impl Parameters {
         spacing: Spacing,
         help: &'static str,
     ) -> Result<f64> {
-        let value = self.take(key, "a number", Domain::Number(range.clone(), spacing), help)?;
+        let scale = Scale::new(range.clone(), spacing);
+        self.number_on(key, range, scale, help)
+    }
+
+    /// The same, usually on this `scale`.
+    pub fn number_on(
+        &mut self,
+        key: &str,
+        range: RangeInclusive<f64>,
+        scale: Scale,
+        help: &'static str,
+    ) -> Result<f64> {
+        let value = self.take(key, "a number", Domain::Number(range.clone(), scale), help)?;
         in_range(key, as_number(&value), &range)
     }
 
@@ -99,7 +149,7 @@ impl Parameters {
         default: f64,
         help: &'static str,
     ) -> Result<f64> {
-        let domain = Domain::Number(range.clone(), Spacing::Linear);
+        let domain = Domain::Number(range.clone(), Scale::linear(range.clone()));
         self.read.push(Parameter { key: key.into(), help, domain, default: Some(default) });
         let value = self.table.remove(key).map_or(default, |value| as_number(&value));
         in_range(key, value, &range)
@@ -107,7 +157,21 @@ impl Parameters {
 
     /// The RGB colour `key`, each channel within `range`; a single number stands for a grey.
     pub fn colour(&mut self, key: &str, range: RangeInclusive<f64>, help: &'static str) -> Result<DVec3> {
-        let value = self.take(key, "three numbers [r, g, b]", Domain::Colour(range.clone()), help)?;
+        // Colours that may exceed 1 span orders of magnitude, as indices of refraction do.
+        let spacing = if *range.end() > 1.0 { Spacing::Logarithmic } else { Spacing::Linear };
+        let scale = Scale::new(range.clone(), spacing);
+        self.colour_on(key, range, scale, help)
+    }
+
+    /// The same, usually on this `scale`.
+    pub fn colour_on(
+        &mut self,
+        key: &str,
+        range: RangeInclusive<f64>,
+        scale: Scale,
+        help: &'static str,
+    ) -> Result<DVec3> {
+        let value = self.take(key, "three numbers [r, g, b]", Domain::Colour(range.clone(), scale), help)?;
         let [r, g, b] = channels(&value)
             .map_err(|count| Error::input(key, format!("has {count} values"), "give three, [r, g, b]"))?;
         Ok(DVec3::new(in_range(key, r, &range)?, in_range(key, g, &range)?, in_range(key, b, &range)?))

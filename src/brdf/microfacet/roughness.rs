@@ -152,7 +152,7 @@ impl Roughness {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::brdf::{Brdf, Domain};
+    use crate::brdf::{Brdf, Domain, Scale};
     use glam::dvec3;
 
     fn read(text: &str) -> Result<Roughness> {
@@ -185,7 +185,7 @@ mod tests {
         let parameters = Brdf::parameters("conductor", &table).unwrap();
         let rotation = parameters.iter().find(|parameter| parameter.key == ROTATION).expect("a rotation");
         assert_eq!(rotation.default, Some(0.0));
-        assert_eq!(rotation.domain, Domain::Number(-90.0..=90.0, Spacing::Linear));
+        assert_eq!(rotation.domain, Domain::Number(-90.0..=90.0, Scale::linear(-90.0..=90.0)));
     }
 
     #[test]

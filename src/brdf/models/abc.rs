@@ -13,7 +13,7 @@ use std::f64::consts::FRAC_1_PI;
 use glam::DVec3;
 
 use crate::brdf::microfacet::{fresnel_dielectric, v_cavities};
-use crate::brdf::{Model, Parameters, Spacing, hash_numbers};
+use crate::brdf::{Model, Parameters, Scale, Spacing, hash_numbers};
 use crate::error::Result;
 
 /// The model of Low, Kronander, Ynnerman and Unger.
@@ -44,9 +44,15 @@ impl Model for Abc {
     fn from_parameters(parameters: &mut Parameters) -> Result<Self> {
         Ok(Self {
             diffuse: parameters.colour("diffuse", 0.0..=1.0, "Albedo of the diffuse part, linear Rec. 709.")?,
-            a: parameters.colour("a", 0.0..=1e6, "Size of the lobe, A.")?,
-            b: parameters.number("b", 0.0..=1e9, Spacing::Logarithmic, "B: the lobe is as wide as sqrt(2 / B).")?,
-            c: parameters.number("c", 0.0..=100.0, Spacing::Logarithmic, "C: how the lobe falls.")?,
+            // Scales hold what Löw et al. (2012) fitted to 40 measured materials.
+            a: parameters.colour_on("a", 0.0..=1e6, Scale::logarithmic(0.1..=1e4), "Size of the lobe, A.")?,
+            b: parameters.number_on(
+                "b",
+                0.0..=1e9,
+                Scale::logarithmic(10.0..=1e7),
+                "B: the lobe is as wide as sqrt(2 / B).",
+            )?,
+            c: parameters.number_on("c", 0.0..=100.0, Scale::logarithmic(0.05..=5.0), "C: how the lobe falls.")?,
             ior: parameters.number("ior", 1.0..=100.0, Spacing::Logarithmic, "Index of refraction, against air.")?,
         })
     }

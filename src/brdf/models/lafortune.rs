@@ -11,7 +11,7 @@ use std::f64::consts::FRAC_1_PI;
 
 use glam::DVec3;
 
-use crate::brdf::{Model, Parameters, hash_numbers};
+use crate::brdf::{Model, Parameters, Scale, hash_numbers};
 use crate::error::{Error, Result};
 
 /// Lobes at most.
@@ -59,9 +59,11 @@ impl Model for Lafortune {
                 break;
             }
             let help = "C_x = C_y of the lobe: negative about the mirror direction, positive about the light.";
-            let c_xy = parameters.colour(&key("c_xy"), -2.0..=2.0, help)?;
-            let c_z = parameters.colour(&key("c_z"), 0.0..=2.0, "C_z of the lobe, along the normal.")?;
-            let exponent = parameters.colour(&key("exponent"), 0.0..=1e4, "Exponent of the lobe, of each channel.")?;
+            let c_xy = parameters.colour_on(&key("c_xy"), -2.0..=2.0, Scale::linear(-1.2..=1.2), help)?;
+            let help = "C_z of the lobe, along the normal.";
+            let c_z = parameters.colour_on(&key("c_z"), 0.0..=2.0, Scale::linear(0.0..=1.2), help)?;
+            let (help, usual) = ("Exponent of the lobe, of each channel.", Scale::logarithmic(1.0..=1e4));
+            let exponent = parameters.colour_on(&key("exponent"), 0.0..=1e4, usual, help)?;
             let reach = c_xy.abs().max(c_z);
             let log_peak = (reach.max(DVec3::splat(1e-9)).map(f64::ln) * exponent).max_element();
             if log_peak > MAX_PEAK.ln() {

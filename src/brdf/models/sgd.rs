@@ -14,7 +14,7 @@ use std::f64::consts::FRAC_1_PI;
 
 use glam::DVec3;
 
-use crate::brdf::{Model, Parameters, hash_numbers};
+use crate::brdf::{Model, Parameters, Scale, hash_numbers};
 use crate::error::Result;
 
 /// The model of Bagher, Soler and Holzschuch; all per channel.
@@ -72,18 +72,45 @@ impl Model for Sgd {
     }
 
     fn from_parameters(parameters: &mut Parameters) -> Result<Self> {
+        // Scales hold nearly all of what Bagher et al. (2012) fitted to 40 measured materials.
+        let (even, factors) = (Scale::linear, Scale::logarithmic);
         Ok(Self {
             diffuse: parameters.colour("diffuse", 0.0..=1.0, "Albedo of the diffuse part.")?,
-            specular: parameters.colour("specular", 0.0..=100.0, "Factor of the lobe.")?,
-            alpha: parameters.colour("alpha", 1e-6..=10.0, "Width of the lobe.")?,
-            p: parameters.colour("p", -10.0..=10.0, "Fall of the lobe: its power.")?,
-            f0: parameters.colour("f0", -100.0..=100.0, "Fresnel term: f0 - f1 at normal incidence.")?,
-            f1: parameters.colour("f1", -100.0..=100.0, "Fresnel term: its slope with the cosine.")?,
-            kappa: parameters.colour("kappa", 0.0..=1e6, "Factor of the distribution.")?,
-            lambda: parameters.colour("lambda", 0.0..=100.0, "Depth of the shadowing.")?,
-            c: parameters.colour("c", 0.0..=1e12, "Factor in the exponent of the shadowing.")?,
-            k: parameters.colour("k", 0.0..=1000.0, "Power in the exponent of the shadowing.")?,
-            theta_0: parameters.colour("theta_0", -10.0..=10.0, "Angle at which shadowing starts, in radians.")?,
+            specular: parameters.colour_on("specular", 0.0..=100.0, factors(1e-3..=10.0), "Factor of the lobe.")?,
+            alpha: parameters.colour_on("alpha", 1e-6..=10.0, factors(1e-5..=1.0), "Width of the lobe.")?,
+            p: parameters.colour_on("p", -10.0..=10.0, even(0.0..=1.5), "Fall of the lobe: its power.")?,
+            f0: parameters.colour_on(
+                "f0",
+                -100.0..=100.0,
+                factors(1e-4..=10.0),
+                "Fresnel term: f0 - f1 at normal incidence.",
+            )?,
+            f1: parameters.colour_on(
+                "f1",
+                -100.0..=100.0,
+                even(-1.0..=1.0),
+                "Fresnel term: its slope with the cosine.",
+            )?,
+            kappa: parameters.colour_on("kappa", 0.0..=1e6, factors(1.0..=1e5), "Factor of the distribution.")?,
+            lambda: parameters.colour_on("lambda", 0.0..=100.0, factors(1e-3..=10.0), "Depth of the shadowing.")?,
+            c: parameters.colour_on(
+                "c",
+                0.0..=1e12,
+                factors(1e-8..=1e2),
+                "Factor in the exponent of the shadowing.",
+            )?,
+            k: parameters.colour_on(
+                "k",
+                0.0..=1000.0,
+                factors(1.0..=1e3),
+                "Power in the exponent of the shadowing.",
+            )?,
+            theta_0: parameters.colour_on(
+                "theta_0",
+                -10.0..=10.0,
+                even(-1.0..=1.5),
+                "Angle at which shadowing starts, in radians.",
+            )?,
         })
     }
 

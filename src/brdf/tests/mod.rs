@@ -413,7 +413,7 @@ fn a_brdf_with_another_value_of_any_parameter_has_another_fingerprint() {
         let before = Brdf::from_parameters(&model, table.clone()).unwrap();
         for Parameter { key, domain, .. } in Brdf::parameters(&model, &table).unwrap() {
             let others: Vec<toml::Value> = match &domain {
-                Domain::Number(range, _) | Domain::Colour(range) => {
+                Domain::Number(range, _) | Domain::Colour(range, _) => {
                     vec![(range.start() + 0.37 * (range.end() - range.start())).into()]
                 }
                 Domain::Choice(words) => words.iter().map(|word| word.as_str().into()).collect(),
@@ -443,7 +443,9 @@ fn a_model_tells_what_it_reads() {
         for Parameter { key, domain, default, .. } in &parameters {
             assert!(default.is_some() || parameter(&table, key).is_some(), "{name}: {key}");
             let (outside, of) = match domain {
-                Domain::Number(range, _) | Domain::Colour(range) => (toml::Value::Float(2.0 * range.end() + 1.0), key),
+                Domain::Number(range, _) | Domain::Colour(range, _) => {
+                    (toml::Value::Float(2.0 * range.end() + 1.0), key)
+                }
                 Domain::Choice(words) => (toml::Value::String(words.concat()), key),
             };
             let mut wrong = table.clone();

@@ -1,6 +1,6 @@
 //! Which material, and the parameters of a model.
 use super::{group, on_change, source};
-use crate::brdf::{self, Brdf, Domain, Parameter, Spacing, as_number, channels};
+use crate::brdf::{self, Brdf, Domain, Parameter, Scale, Spacing, as_number, channels};
 use crate::scene::{MaterialSettings, MaterialSource, Scene};
 use crate::viewer::change::Change;
 use crate::viewer::input::Input;
@@ -95,6 +95,14 @@ fn parameters_of(settings: &MaterialSettings) -> Option<Vec<(Parameter, toml::Va
     Some(parameters.into_iter().filter_map(with_value).collect())
 }
 
+/// Decimals of a number: three digits of what goes by factors.
+fn decimals(number: f64, scale: &Scale) -> usize {
+    match scale.spacing {
+        Spacing::Linear => 3,
+        Spacing::Logarithmic => (2.0 - number.abs().max(*scale.range.start()).log10().floor()).max(3.0) as usize,
+    }
+}
+
 /// A row of the grid: the parameter's name, and what it is edited by.
 fn row(ui: &mut Ui, material: &str, parameter: &Parameter, value: &toml::Value, inputs: &mut Vec<Input>) {
     let Parameter { key, help, domain, .. } = parameter;
@@ -107,20 +115,18 @@ fn row(ui: &mut Ui, material: &str, parameter: &Parameter, value: &toml::Value, 
         ui.add(Label::new(name).truncate()).on_hover_text(format!("{key}: {help}"));
     });
     match domain {
-        Domain::Number(range, spacing) => {
+        Domain::Number(range, scale) => {
             let mut number = as_number(value);
-            let is_logarithmic = *spacing == Spacing::Logarithmic;
-            // A scale of factors has no 0: it starts a hundred thousandth of the way.
-            let smallest = if *range.start() > 0.0 { *range.start() } else { 1e-5 * range.end() };
             let slider = egui::Slider::new(&mut number, range.clone())
                 .update_while_editing(false)
-                .logarithmic(is_logarithmic)
-                .smallest_positive(smallest)
+                .logarithmic(scale.spacing == Spacing::Logarithmic)
+                // A scale of factors has no 0.
+                .smallest_positive(*scale.range.start())
                 .clamping(SliderClamping::Edits)
-                .max_decimals(3);
+                .max_decimals(decimals(as_number(value), scale));
             on_change(&ui.add(slider).on_hover_text(*help), inputs, || set(number.into()));
         }
-        Domain::Colour(range) => {
+        Domain::Colour(range, scale) => {
             let mut rgb = channels(value).unwrap_or_default();
             let array = |rgb: [f64; 3]| toml::Value::Array(rgb.map(Into::into).to_vec());
             ui.horizontal(|ui| {
@@ -128,11 +134,16 @@ fn row(ui: &mut Ui, material: &str, parameter: &Parameter, value: &toml::Value, 
                 ui.spacing_mut().item_spacing.x = 4.0;
                 ui.spacing_mut().interact_size.x = 28.0;
                 for channel in 0..3 {
+                    let speed = match scale.spacing {
+                        Spacing::Linear => 0.005,
+                        Spacing::Logarithmic => 0.01 * rgb[channel].abs().max(*scale.range.start()),
+                    };
+                    let decimals = decimals(rgb[channel], scale);
                     let drag = egui::DragValue::new(&mut rgb[channel])
                         .update_while_editing(false)
                         .range(range.clone())
-                        .speed(0.005)
-                        .max_decimals(3);
+                        .speed(speed)
+                        .max_decimals(decimals);
                     let response = ui.add_sized([34.0, 18.0], drag).on_hover_text(*help);
                     on_change(&response, inputs, || set(array(rgb)));
                 }
