@@ -15,7 +15,7 @@ use crate::pipeline::Wanted;
 use crate::progress::Observer;
 use crate::vulkan::Device;
 
-/// A picture and what it is of: good as the name of its file, without extension.
+/// A picture and what it is of, after which its file is named.
 pub type Named = (String, RgbImage);
 
 /// All materials of `cases`, each with its name, in front of the environment, built-in ones by family: a sheet for each environment and scene, called

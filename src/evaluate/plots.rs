@@ -12,7 +12,7 @@ use super::Row;
 use super::speed::{Growth, TimedFrame, Timings};
 use super::tables::{by_count, in_order, mean};
 use crate::error::{Error, Result};
-use crate::output::write_whole;
+use crate::output::{file_in, write_whole};
 
 const SIZE_PX: (u32, u32) = (960, 600);
 /// At the right, for names: the longest is about "environment, floor".
@@ -236,7 +236,7 @@ fn counts(all: impl Iterator<Item = u32>) -> Vec<f64> {
 pub fn write(charts: &[Chart], folder: &Path) -> Result<Vec<PathBuf>> {
     std::fs::create_dir_all(folder).map_err(|cause| Error::unwritable(folder, cause))?;
     let write = |chart: &Chart| {
-        let path = folder.join(format!("{}.svg", chart.name));
+        let path = file_in(folder, &chart.name, "svg");
         let svg = chart.svg().map_err(|cause| Error::unwritable(&path, cause))?;
         write_whole(&path, svg.as_bytes())?;
         Ok(path)

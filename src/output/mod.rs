@@ -15,7 +15,7 @@ pub(crate) use exr_file::parse_exr;
 pub use exr_file::{ExrHeader, write_exr};
 pub use png_file::write_png;
 pub(crate) use primaries::Primaries;
-pub use whole_file::{check_all_writable, check_not_read, check_writable, write_whole};
+pub use whole_file::{check_all_writable, check_not_read, check_writable, file_in, file_name, write_whole};
 
 /// The file formats of a picture, told apart by the extension of the file's name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -40,18 +40,18 @@ pub fn check_all_writable<'a>(paths: impl IntoIterator<Item = &'a PathBuf>) -> R
     Ok(())
 }
 
-/// Says at once if a file is to be `written` that the same command has `read`: it would be lost.
+/// Says at once if a file is to be `written` that was `read`: it would be lost.
 pub fn check_not_read<'a>(
-    written: impl IntoIterator<Item = &'a PathBuf>,
+    written: impl IntoIterator<Item = &'a (impl AsRef<Path> + ?Sized + 'a)>,
     read: impl IntoIterator<Item = &'a PathBuf>,
 ) -> Result<()> {
-    let file = |path: &PathBuf| match target(path) {
+    let file = |path: &Path| match target(path) {
         Target::File(file) => Some(file),
         Target::Stream => None,
     };
-    let read: Vec<_> = read.into_iter().filter_map(file).collect();
-    match written.into_iter().find(|path| file(path).is_some_and(|file| read.contains(&file))) {
-        Some(path) => Err(Error::in_file(path, "is read by the same command", "give what is written another name")),
+    let read: Vec<_> = read.into_iter().filter_map(|path| file(path)).collect();
+    match written.into_iter().map(AsRef::as_ref).find(|path| file(path).is_some_and(|file| read.contains(&file))) {
+        Some(path) => Err(Error::in_file(path, "is also read, and would be lost", "give what is written another name")),
         None => Ok(()),
     }
 }
@@ -61,12 +61,23 @@ fn names_a_folder(path: &Path) -> bool {
     path.to_string_lossy().ends_with(std::path::is_separator)
 }
 
+/// The file of this name and extension in `folder`. Names of materials may hold what names of files may not, on any system: that becomes `_`.
+pub fn file_in(folder: &Path, name: &str, extension: &str) -> PathBuf {
+    folder.join(format!("{}.{extension}", file_name(name)))
+}
+
+/// `name` as a part of a file's.
+pub fn file_name(name: &str) -> String {
+    name.replace(|character: char| "/\\:*?\"<>|".contains(character) || character.is_control(), "_")
+}
+
 /// Writes `bytes` to `path`: into a temporary file in the same folder first, then renamed, so that whoever looks sees
-/// the old file or the whole new one, and a failure leaves nothing behind. Devices and pipes are written to as they are.
+/// the old file or the whole new one, and a failure leaves nothing behind. Devices and pipes are written to as they are, and so is what the
+/// program was given open, such as /dev/stdout.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
     let failed = |cause: io::Error| Error::unwritable(path, cause);
     match target(path) {
-        Target::Stream => OpenOptions::new().write(true).open(path).and_then(|mut stream| stream.write_all(bytes)),
+        Target::Stream => write_to_stream(path, bytes),
         Target::File(file) => {
             let mut temporary = temporary_beside(path, &file)?;
             // Errors of the file itself do not repeat the temporary file's name.
@@ -76,6 +87,15 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
         }
     }
     .map_err(failed)
+}
+
+/// Writes behind what is there: a file that standard output was sent to may hold more.
+fn write_to_stream(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    match descriptor(path) {
+        // What is printed later follows.
+        Some(1) => io::stdout().write_all(bytes).and_then(|()| io::stdout().flush()),
+        _ => OpenOptions::new().append(true).open(path).and_then(|mut stream| stream.write_all(bytes)),
+    }
 }
 
 /// Gives the `new` file the permissions of the `old` one, whose place it takes, if there is one.
@@ -100,12 +120,24 @@ pub(crate) fn make_way(path: &Path) -> Result<()> {
 enum Target {
     /// A file, or nothing yet; links are followed, so that they stay.
     File(PathBuf),
-    /// A device or a pipe, such as /dev/stdout: nothing that a file may be put in the place of.
+    /// A device, a pipe, or what the program was given open, such as /dev/stdout: nothing that a file may be put in the place of.
     Stream,
+}
+
+/// The number of what the program was given open, if `path` leads to that, as /dev/stdout does.
+fn descriptor(path: &Path) -> Option<u32> {
+    let within_descriptors = |path: &PathBuf| {
+        let folder = folder_of(path).canonicalize().ok()?;
+        let is_of_system = folder.starts_with("/proc") || folder.starts_with("/dev");
+        let number = path.file_name()?.to_str()?.parse().ok()?;
+        (is_of_system && folder.ends_with("fd")).then_some(number)
+    };
+    links(path).find_map(|path| within_descriptors(&path))
 }
 
 fn target(path: &Path) -> Target {
     match path.metadata() {
+        _ if descriptor(path).is_some() => Target::Stream,
         Ok(metadata) if !metadata.is_file() && !metadata.is_dir() => Target::Stream,
         Ok(_) => Target::File(path.canonicalize().unwrap_or_else(|_| path.to_owned())),
         Err(_) => {
@@ -118,10 +150,15 @@ fn target(path: &Path) -> Target {
     }
 }
 
-/// Where `path` points to if it is a link to a file that is not there yet, over as many links as Linux follows; else itself.
+/// Where `path` points to if it is a link to a file that is not there yet; else itself.
 fn linked(path: &Path) -> PathBuf {
+    links(path).last().unwrap_or_default()
+}
+
+/// `path`, and where it leads, link by link: over as many as Linux follows.
+fn links(path: &Path) -> impl Iterator<Item = PathBuf> {
     let next = |path: &PathBuf| path.read_link().ok().map(|link| folder_of(path).join(link));
-    std::iter::successors(Some(path.to_owned()), next).take(40).last().unwrap_or_default()
+    std::iter::successors(Some(path.to_owned()), next).take(40)
 }
 
 fn folder_of(file: &Path) -> &Path {
@@ -246,6 +283,45 @@ mod tests {
         let system = File::create(&path).unwrap_err();
         let error = write_whole(&path, b"new").unwrap_err();
         assert!(matches!(error, Error::Input { .. }) && error.to_string().contains(&format!("({system})")), "{error}");
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn what_the_program_was_given_open_is_written_behind_what_is_there() {
+        use std::os::fd::AsRawFd;
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name);
+        std::fs::write(path("lines"), "old\n").unwrap();
+        let open = OpenOptions::new().append(true).open(path("lines")).unwrap();
+        let name = PathBuf::from(format!("/dev/fd/{}", open.as_raw_fd()));
+        std::os::unix::fs::symlink(&name, path("link")).unwrap();
+        for (place, line) in [(&name, "first\n"), (&path("link"), "second\n")] {
+            check_writable(place).unwrap();
+            write_whole(place, line.as_bytes()).unwrap();
+        }
+        assert_eq!(std::fs::read_to_string(path("lines")).unwrap(), "old\nfirst\nsecond\n");
+        assert!(path("link").is_symlink());
+        // A file without a name is written to, too, and gets none.
+        std::fs::remove_file(path("lines")).unwrap();
+        write_whole(&name, b"third\n").unwrap();
+        assert_eq!(names(folder.path()), ["link"]);
+        assert_eq!(open.metadata().unwrap().len(), 23);
+        let numbers =
+            ["/dev/stdout", "/dev/stderr", "/proc/self/fd/7", "/dev/null", "fd/1"].map(Path::new).map(descriptor);
+        assert_eq!(numbers, [Some(1), Some(2), Some(7), None, None]);
+    }
+
+    #[test]
+    fn a_file_that_is_named_after_anything_is_in_its_folder() {
+        let folder = Path::new("pictures");
+        for (name, file) in [
+            ("gold", "gold.png"),
+            ("/merl/a b.binary", "_merl_a b.binary.png"),
+            ("..", "...png"),
+            ("v1.2\n", "v1.2_.png"),
+        ] {
+            assert_eq!(file_in(folder, name, "png"), folder.join(file));
+        }
     }
 
     #[cfg(target_os = "linux")]

@@ -58,7 +58,7 @@ fn what_a_command_reads_it_does_not_write() {
         ("bench gallery --plot out --compare coat.toml --json coat.toml", "coat.toml"),
         ("bench shaders scene.toml --json scene.toml", "scene.toml"),
     ] {
-        refuses(&folder, arguments, &[&format!("{name}: is read by the same command")]);
+        refuses(&folder, arguments, &[&format!("{name}: is also read, and would be lost")]);
     }
 }
 

@@ -157,7 +157,8 @@ pub fn named_materials(flag: &str, texts: &[String]) -> Result<Vec<(String, Mate
             source => materials.push((stem(Path::new(text)), source)),
         }
     }
-    once(flag, materials.iter().map(|(name, _)| name).collect())?;
+    // Their pictures and plots are named after them, too.
+    once(flag, materials.iter().map(|(name, _)| output::file_name(name)).collect())?;
     Ok(materials)
 }
 
@@ -276,6 +277,28 @@ pub fn check_folder(folder: &Path) -> Result<()> {
         let problem = "is named like a file, and what is written is a folder of them";
         return Err(Error::in_file(folder, problem, "name a folder, or make one of this name"));
     }
-    // A folder that is not there yet has to be made.
-    output::check_writable(&if folder.exists() { folder.join("plot.svg") } else { folder.to_owned() })
+    // One that is not there yet has to be made; its name may end in a separator.
+    let to_make = || folder.components().collect();
+    output::check_writable(&if folder.exists() { folder.join("plot.svg") } else { to_make() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_folder_may_be_named_that_is_not_there_but_not_where_none_can_be() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name);
+        std::fs::write(path("file"), "").unwrap();
+        std::fs::create_dir(path("there.svg")).unwrap();
+        for name in ["new", "new/", "there.svg", "there.svg/new/"] {
+            check_folder(&path(name)).unwrap();
+        }
+        for name in ["file", "file/new", "absent/new", "plot.svg"] {
+            let error = check_folder(&path(name)).unwrap_err().to_string();
+            assert!(error.contains(name.split('/').next().unwrap()), "{error}");
+        }
+        assert!(!path("new").exists());
+    }
 }

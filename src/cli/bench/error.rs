@@ -87,12 +87,20 @@ impl BenchError {
         let mut measured = Measured::default();
         let result = self.truth.sweep(reference::TOLERANCE, &sweep, &device, &memo, &progress, &mut measured);
         progress.finish();
-        // What took hours is not thrown away because it was interrupted; bad input leaves no files behind.
-        if !matches!(result, Err(Error::Input { .. })) && !measured.rows.is_empty() {
-            write(&measured.rows, Some(measured.reference_error), &self.output)?;
+        match result {
+            Ok(()) => write(&measured.rows, Some(measured.reference_error), &self.output),
+            Err(error) => unfinished(error, &measured, &self.output),
         }
-        Ok(result?)
     }
+}
+
+/// Writes what was `measured` before this error: what took hours is not thrown away because it was interrupted. Bad input leaves no files
+/// behind.
+pub(super) fn unfinished(error: Error, measured: &Measured, output: &OutputArguments) -> anyhow::Result<()> {
+    if !matches!(error, Error::Input { .. }) && !measured.rows.is_empty() {
+        write(&measured.rows, Some(measured.reference_error), output)?;
+    }
+    Err(error.into())
 }
 
 /// Prints the tables of `rows`, and writes what `output` asks for.

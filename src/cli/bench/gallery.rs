@@ -2,7 +2,6 @@
 use super::arguments::{
     CasesArguments, Defaults, OutputArguments, QUICK_TOLERANCE, TruthArguments, files_of_materials, named_materials,
 };
-use crate::cli::print;
 use crate::cli::progress::TerminalProgress;
 use clap::value_parser;
 use std::path::Path;
@@ -93,13 +92,15 @@ impl BenchGallery {
         }
         progress.begin("methods");
         let mut measured = Measured::default();
-        self.truth.sweep(QUICK_TOLERANCE, &sweep, &device, &memo, &progress, &mut measured)?;
+        let compared = self.truth.sweep(QUICK_TOLERANCE, &sweep, &device, &memo, &progress, &mut measured);
         progress.finish();
-        sheets.extend(gallery::comparison_sheets(&measured));
-        sheets.extend(gallery::side_by_side_sheets(&measured));
+        // Of methods that were not all measured there is the table alone.
+        if compared.is_ok() {
+            sheets.extend(gallery::comparison_sheets(&measured));
+            sheets.extend(gallery::side_by_side_sheets(&measured));
+        }
         write_pictures(&sheets, folder)?;
-        self.output.json.write(&measured.rows)?;
-        Ok(print(tables::text(&tables::error_tables(&measured.rows)))?)
+        self.output.json.report(compared, &measured.rows, tables::error_tables)
     }
 }
 
@@ -108,7 +109,7 @@ fn write_pictures(pictures: &[Named], folder: &Path) -> Result<()> {
     std::fs::create_dir_all(folder).map_err(|cause| Error::unwritable(folder, cause))?;
     for (name, picture) in pictures {
         let rgba: Vec<u8> = picture.pixels().flat_map(|pixel| [pixel[0], pixel[1], pixel[2], 255]).collect();
-        output::write_png(&folder.join(format!("{name}.png")), picture.width(), picture.height(), &rgba, false)?;
+        output::write_png(&output::file_in(folder, name, "png"), picture.width(), picture.height(), &rgba, false)?;
     }
     Ok(())
 }

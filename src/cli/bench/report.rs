@@ -98,13 +98,21 @@ impl BenchReport {
         let memo = self.cases.memo();
         let progress = TerminalProgress::of("errors", "done")?;
         let mut measured = Measured::default();
-        self.truth.sweep(QUICK_TOLERANCE, &sweep, &device, &memo, &progress, &mut measured)?;
         let mut report = Report { facts: facts(&device), ..Report::default() };
-        progress.begin("times");
-        speed::run(&speed, &device, &memo, &progress, &mut report.timings)?;
-        progress.begin("materials");
-        let sheets = gallery::material_sheets(&shown, estimator, &device, &memo, &progress)?;
+        let mut measure = || {
+            self.truth.sweep(QUICK_TOLERANCE, &sweep, &device, &memo, &progress, &mut measured)?;
+            progress.begin("times");
+            speed::run(&speed, &device, &memo, &progress, &mut report.timings)?;
+            progress.begin("materials");
+            gallery::material_sheets(&shown, estimator, &device, &memo, &progress)
+        };
+        let sheets = measure();
         progress.finish();
+        let sheets = match sheets {
+            Ok(sheets) => sheets,
+            // Of what is not whole there are the errors alone, as `bench error` leaves them.
+            Err(error) => return error::unfinished(error, &measured, &self.output),
+        };
         let light = format!("{}, {}", shown.environments[0].0, shown.scenes[0].0);
         let caption = format!("{light}; method {}, {highest} threads or samples", variant.name());
         report.materials = sheets.into_iter().map(|(_, picture)| (caption.clone(), picture)).collect();
@@ -163,8 +171,10 @@ fn facts(device: &Device) -> Vec<(String, String)> {
     let processor = format!("{}, {} logical cores", processor.unwrap_or("unknown"), system.cpus().len());
     let memory = format!("{:.0} GiB", system.total_memory() as f64 / f64::from(1 << 30));
     let description = device.description();
-    let arguments = std::env::args()
+    // Names of files need not be UTF-8.
+    let arguments = std::env::args_os()
         .skip(1)
+        .map(|argument| argument.to_string_lossy().into_owned())
         .map(|argument| if argument.contains(char::is_whitespace) { format!("'{argument}'") } else { argument });
     let command = ["threadlight".to_owned()].into_iter().chain(arguments).collect::<Vec<_>>().join(" ");
     [

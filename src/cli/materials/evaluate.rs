@@ -30,8 +30,14 @@ impl Evaluate {
         let brdf = self.named.load()?;
         let parse = if self.directions { of_vectors } else { of_angles };
         let mut out = std::io::BufWriter::new(std::io::stdout().lock());
-        let mut input = std::io::stdin().lock();
+        let mut input = std::io::BufReader::new(std::io::stdin());
         for number in 1.. {
+            // Whoever waits for an answer before the next line has it.
+            let answered = if input.buffer().is_empty() { out.flush() } else { Ok(()) };
+            // Where nobody listens any more, nothing more is read.
+            if answered.is_err() {
+                return Ok(unless_unheard(answered)?);
+            }
             let Some(line) = next_line(&mut input).map_err(|error| within_line(error, number))? else { break };
             if line.trim().is_empty() || line.trim_start().starts_with('#') {
                 continue;
@@ -39,7 +45,6 @@ impl Evaluate {
             let (w_i, w_o) = parse(&line).map_err(|error| within_line(error, number))?;
             let f = brdf.evaluate(w_i, w_o);
             let printed = writeln!(out, "{} {} {}", f.x, f.y, f.z);
-            // Where nobody listens any more, nothing more is read.
             if printed.is_err() {
                 return Ok(unless_unheard(printed)?);
             }
