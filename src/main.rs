@@ -15,6 +15,9 @@ use threadlight::low_level::vulkan::VulkanError;
 fn main() -> ExitCode {
     #[cfg(unix)]
     outlive_file_limits();
+    if let Err(cause) = cli::signals::listen() {
+        say(format_args!("threadlight: Ctrl-C has no handler: {cause}"));
+    }
     let arguments = match cli::Arguments::try_parse() {
         Ok(arguments) => arguments,
         Err(error) if is_mistake(&error) => return fail(2, &cli::mistake(&error)),

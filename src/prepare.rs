@@ -340,9 +340,9 @@ pub fn view_of(scene: &Scene, (centre, radius): (DVec3, f64)) -> Result<View> {
 }
 
 impl Prepared {
-    /// Centre and radius of a sphere that holds all objects.
-    pub fn bounding_sphere(&self) -> (DVec3, f64) {
-        bounding_sphere(&world_spheres(&self.meshes, &self.objects))
+    /// Centre and radius of a sphere around each object, in world space.
+    pub fn spheres(&self) -> Vec<(DVec3, f64)> {
+        world_spheres(&self.meshes, &self.objects)
     }
 
     /// Gives objects the tangents that their materials need, and no others: to be called when materials were changed.
@@ -455,7 +455,7 @@ fn check_size(mesh: &str, (center, radius): (DVec3, f64)) -> Result<()> {
 }
 
 /// A sphere around `spheres`: centre of their box, and the radius that reaches the farthest.
-fn bounding_sphere(spheres: &[(DVec3, f64)]) -> (DVec3, f64) {
+pub fn bounding_sphere(spheres: &[(DVec3, f64)]) -> (DVec3, f64) {
     let low = spheres.iter().fold(DVec3::INFINITY, |low, (center, radius)| low.min(*center - *radius));
     let high = spheres.iter().fold(DVec3::NEG_INFINITY, |high, (center, radius)| high.max(*center + *radius));
     let middle = (low + high) / 2.0;

@@ -181,6 +181,27 @@ fn repeated_frames_stop_between_two() {
 
 #[test]
 #[cfg(unix)]
+fn a_program_that_waits_for_its_input_has_answered_what_it_read_and_ends_when_it_is_told_to() {
+    use std::io::{BufRead, Write};
+    use std::process::Stdio;
+    let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
+    for signal in ["INT", "TERM"] {
+        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_threadlight"));
+        command.args(["materials", "evaluate", "clay"]).stdin(Stdio::piped()).stdout(Stdio::piped());
+        let mut child = command.spawn().unwrap();
+        let mut input = child.stdin.take().unwrap();
+        let mut answers = std::io::BufReader::new(child.stdout.take().unwrap()).lines();
+        for _ in 0..2 {
+            input.write_all(b"30 30 180\n").unwrap();
+            assert_eq!(answers.next().unwrap().unwrap().split(' ').count(), 3);
+        }
+        std::process::Command::new("kill").args(["-s", signal, &child.id().to_string()]).status().unwrap();
+        assert_eq!(child.wait().unwrap().code(), Some(130), "{signal}");
+    }
+}
+
+#[test]
+#[cfg(unix)]
 fn an_interrupted_rendering_ends_soon_and_leaves_no_file() {
     let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
     let folder = tempfile::tempdir().unwrap();

@@ -239,6 +239,44 @@ fn a_picture_that_is_saved_while_it_is_a_draft_is_that_of_the_scene_that_is_save
 }
 
 #[test]
+fn a_viewer_that_is_told_to_end_keeps_what_was_edited() {
+    let Some(viewer) = Viewer::new() else { return };
+    for (signal, exposure) in [("INT", 0.5), ("TERM", 0.25)] {
+        let edit = format!("{{\"set\": {{\"exposure\": {exposure}}}}}");
+        let replay = format!("\"wait\"\n{edit}\n{{\"save_scene\": \"edited.toml\"}}\n");
+        viewer.write("replay.jsonl", replay);
+        let arguments = [&SMALL[..], &["--threads", "1", "--replay", "replay.jsonl"]].concat();
+        let child = viewer.start(&[&arguments[..], &["--environment", "white", "--material", "clay"]].concat());
+        let start = Instant::now();
+        while !viewer.path("edited.toml").exists() {
+            assert!(start.elapsed() < Duration::from_secs(120), "nothing is edited");
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        let sent = Command::new("kill").args(["-s", signal, &child.id().to_string()]).status().expect("a signal");
+        let output = child.wait_with_output().expect("an end");
+        assert!(sent.success() && output.status.code() == Some(130), "{signal}: {:?}", output.status);
+        let log = String::from_utf8_lossy(&output.stderr).into_owned();
+        let kept = log.lines().find_map(|line| line.split("is kept: threadlight view ").nth(1)).expect(&log);
+        let read = |path: &Path| std::fs::read_to_string(path).expect("a scene");
+        assert_eq!(read(Path::new(kept)), read(&viewer.path("edited.toml")));
+        assert!(read(Path::new(kept)).contains(&format!("exposure = {exposure}")));
+        std::fs::remove_file(viewer.path("edited.toml")).expect("a scene");
+    }
+}
+
+#[test]
+fn a_file_that_the_scene_is_made_of_is_not_written_over() {
+    let Some(viewer) = Viewer::new() else { return };
+    viewer.write("m.toml", "model = 'lambert'\nreflectance = 0.5");
+    let replay = "\"wait\"\n{\"save_scene\": \"m.toml\"}\n{\"save_scene\": \"other.toml\"}\n\"quit\"";
+    let arguments = ["--threads", "1", "--environment", "white", "--material", "m.toml"];
+    let ended = viewer.play(&[&SMALL[..], &arguments].concat(), replay);
+    assert!(!ended.success && ended.log.iter().any(|line| line.contains("m.toml: is also read")), "{:#?}", ended.log);
+    assert!(std::fs::read_to_string(viewer.path("m.toml")).expect("a material").contains("lambert"));
+    assert!(viewer.path("other.toml").exists());
+}
+
+#[test]
 fn a_broken_file_is_told_and_changes_nothing() {
     let Some(viewer) = Viewer::new() else { return };
     viewer.write("broken.binary", b"not a table");

@@ -10,6 +10,7 @@ mod progress;
 mod render;
 mod rendered;
 mod scene_flags;
+pub mod signals;
 mod threads;
 #[cfg(feature = "viewer")]
 mod view;

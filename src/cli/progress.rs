@@ -1,5 +1,5 @@
-//! The progress bar of a long computation, and the ways out of it: Ctrl-C, and SIGTERM, which schedulers and `timeout` send.
-use super::say;
+//! The progress bar of a long computation, which a signal cancels.
+use super::{say, signals};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -17,24 +17,14 @@ impl TerminalProgress {
         Self::of(name, "parts")
     }
 
-    /// A bar called `name` that counts `units`, hidden until something happens. Only one bar can be made.
+    /// A bar called `name` that counts `units`, hidden until something happens.
     pub fn of(name: &'static str, units: &str) -> anyhow::Result<Self> {
         let cancelled = Arc::new(AtomicBool::new(false));
         let flag = cancelled.clone();
-        ctrlc::set_handler(move || {
-            // A second Ctrl-C is for those who do not want to wait for the first.
-            if flag.swap(true, Ordering::Relaxed) {
-                std::process::exit(130);
-            }
+        signals::next_does(move || {
+            flag.store(true, Ordering::Relaxed);
             say(format_args!("stopping after what runs now; Ctrl-C again stops at once"));
-        })?;
-        #[cfg(unix)]
-        {
-            use signal_hook::{consts::SIGTERM, flag};
-            // In this order a second SIGTERM ends the program, and the first one does not.
-            flag::register_conditional_shutdown(SIGTERM, 128 + SIGTERM, cancelled.clone())?;
-            flag::register(SIGTERM, cancelled.clone())?;
-        }
+        });
         let style =
             ProgressStyle::with_template(&format!("{{prefix}} {{wide_bar}} {{pos}}/{{len}} {units}, {{eta}} left"))?;
         let bar = ProgressBar::no_length().with_style(style).with_prefix(name);

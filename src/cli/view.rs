@@ -1,6 +1,6 @@
 //! `threadlight view`: a window to look at a scene and change it.
-use super::none_of;
 use super::scene_flags::{MachineFlags, SceneFlags};
+use super::{none_of, signals};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::value_parser;
 use std::path::PathBuf;
@@ -21,10 +21,10 @@ Examples:
 In the window:
   drag                 turn the camera              F, Home   frame the objects, reset the view
   right drag, Shift    move it                      T         turntable
-  wheel, pinch         zoom                         + - 0     exposure
+  wheel                zoom                         + - 0     exposure
   Ctrl + drag          turn the environment         [ ]       half, twice the threads
   drop a file          material, environment,       B         background
-                       mesh or scene                Escape    close the message
+  (not on Wayland)     mesh or scene                Escape    close the message
   Ctrl + Z             undo                         Ctrl + Y  redo (or Ctrl + Shift + Z)";
 
 /// Opens a window to look at a scene, change it, and save picture and scene. Flags override the scene file.
@@ -77,7 +77,7 @@ impl ViewArguments {
             (Some(_), false) => Record::All,
             (Some(_), true) => Record::AllAndErrors,
         };
-        let Ended { messages, stats, failures, missing_screenshot } = viewer::run(ViewerSettings {
+        let settings = ViewerSettings {
             scene,
             cache: self.machine.cache(),
             device: self.machine.device,
@@ -88,7 +88,9 @@ impl ViewArguments {
             replay: replay.into_iter().map(|(_, input)| input).collect(),
             replay_limit: Duration::from_secs(self.replay_limit),
             record,
-        })?;
+        };
+        let Ended { messages, stats, failures, missing_screenshot } =
+            viewer::run(settings, |cancel| signals::next_does(move || cancel.cancel()))?;
         if let Some((path, stats)) = self.stats.as_deref().zip(stats) {
             output::write_whole(path, serde_json::to_string_pretty(&stats)?.as_bytes())?;
         }

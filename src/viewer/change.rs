@@ -8,7 +8,7 @@ use crate::scene::{
     Background, Camera, EXPOSURE, EnvironmentSource, GAMMA, INTENSITY, MAX_SAMPLES, MAX_SIZE_PX, MAX_SUBPIXELS,
     MaterialSource, MeshSource, Pattern, Scene, ShadingSettings, Source, within,
 };
-use std::path::Path;
+use std::path::PathBuf;
 
 /// A change of the scene, as the panel, a key or a dropped file makes it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -64,14 +64,12 @@ pub enum Change {
 }
 
 impl Change {
-    /// The file that it names: its contents may be others than when it was last named.
-    pub fn file(&self) -> Option<&Path> {
+    /// The files that it names, and those that they name: their contents may be others than when they were last named.
+    pub fn files(&self) -> Vec<PathBuf> {
         match self {
-            Self::Material(MaterialSource::File(path))
-            | Self::OneMaterial { source: MaterialSource::File(path), .. }
-            | Self::Environment(Source::File(path))
-            | Self::Mesh(Source::File(path)) => Some(path),
-            _ => None,
+            Self::Material(source) | Self::OneMaterial { source, .. } => source.files(),
+            Self::Environment(Source::File(path)) | Self::Mesh(Source::File(path)) => vec![path.clone()],
+            _ => Vec::new(),
         }
     }
 

@@ -61,7 +61,7 @@ impl Viewer {
     /// From where and how what is shown is looked at, at full resolution; none while nothing is.
     pub fn shown_view(&self) -> Option<View> {
         let loaded = self.loaded.as_ref()?;
-        view_of(self.session.shown(), loaded.prepared.bounding_sphere()).ok()
+        view_of(self.session.shown(), loaded.sphere).ok()
     }
 
     /// Gives the picture this size, in pixels.
@@ -190,7 +190,7 @@ impl Viewer {
 
     /// How the scene that is shown is looked at.
     pub(super) fn view(&self, loaded: &Loaded) -> Result<View> {
-        let mut view = view_of(self.session.shown(), loaded.prepared.bounding_sphere())?;
+        let mut view = view_of(self.session.shown(), loaded.sphere)?;
         // Others have yet to be compiled.
         view.subpixels = loaded.renderer.view.subpixels;
         Ok(view)
@@ -200,6 +200,7 @@ impl Viewer {
     pub(super) fn save_picture(&mut self, path: &Path) -> Result<()> {
         Format::of(path)?;
         output::check_writable(path)?;
+        output::check_not_read([path], &self.session.wanted().files())?;
         let (path, scene) = (path.to_owned(), self.session.wanted().clone());
         self.to_save.push(UnsavedPicture { path, scene, key: self.wanted });
         self.save_finished(self.is_loading() || self.request_after_frame);
@@ -236,7 +237,7 @@ impl Viewer {
     fn save_as(&mut self, path: &Path, scene: &Scene, loaded: &Loaded) -> Result<()> {
         let format = Format::of(path)?;
         let mut renderer = (*loaded.renderer).clone();
-        renderer.view = view_of(scene, loaded.prepared.bounding_sphere())?;
+        renderer.view = view_of(scene, loaded.sphere)?;
         check_size(&self.device, &renderer.view)?;
         let wanted = Wanted { radiance: format == Format::Exr, display: format == Format::Png, geometry: false };
         let rendering = renderer.render(wanted, 1)?;

@@ -14,6 +14,7 @@ use super::orbit::{Bounds, Orbit, environment_turn_deg};
 use super::plots::Plotter;
 use super::session::{Edit, Session};
 use crate::memo::{Key, Memo};
+use crate::output;
 use crate::passes::Area;
 use crate::pipeline::DeviceScene;
 use crate::prepare::{Prepared, view_of};
@@ -208,6 +209,7 @@ impl Viewer {
             Input::SavePicture(path) => self.save_picture(path),
             Input::SaveScene(path) => {
                 Scene::FILES.format_of(path)?;
+                output::check_not_read([path], &self.session.wanted().files())?;
                 self.session.wanted().save(path)?;
                 self.tell_saved(path);
                 Ok(())
@@ -285,8 +287,9 @@ impl Viewer {
 
     /// Makes a change; what it needs is loaded in the background.
     pub(super) fn change(&mut self, change: &Change) -> Result<()> {
-        if let Some(path) = change.file() {
-            self.memo.look_again(path);
+        let files = change.files();
+        files.iter().for_each(|path| self.memo.look_again(path));
+        if !files.is_empty() {
             self.forget_errors(self.changes + 1);
         }
         let before = self.session.wanted().clone();
@@ -308,7 +311,7 @@ impl Viewer {
     pub(super) fn move_camera(&mut self, act: impl FnOnce(&mut Orbit)) -> Result<()> {
         // What is still being loaded is to be seen by its own camera, or framed.
         let Some(loaded) = self.loaded.as_ref().filter(|_| self.session.shows_wanted_objects()) else { return Ok(()) };
-        let (centre, radius) = loaded.prepared.bounding_sphere();
+        let (centre, radius) = loaded.sphere;
         let view = view_of(self.session.shown(), (centre, radius))?;
         let mut orbit = Orbit::new(&view.camera, Bounds { centre, radius });
         act(&mut orbit);

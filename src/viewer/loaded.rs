@@ -3,9 +3,10 @@ use super::session::Edit;
 use crate::error::{Error, Result};
 use crate::memo::{Key, Round};
 use crate::pipeline::DeviceScene;
-use crate::prepare::{Prepared, view_of};
+use crate::prepare::{Prepared, bounding_sphere, view_of};
 use crate::scene::Scene;
 use crate::vulkan::Device;
+use glam::DVec3;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -17,6 +18,10 @@ pub type Made = Result<Loaded, (Error, Vec<Edit>)>;
 pub struct Loaded {
     /// In memory.
     pub prepared: Arc<Prepared>,
+    /// Centre and radius of a sphere around each of its objects, in world space.
+    pub spheres: Arc<[(DVec3, f64)]>,
+    /// The same around all of them.
+    pub sphere: (DVec3, f64),
     /// On the device.
     pub renderer: Arc<DeviceScene>,
     /// What it was made of.
@@ -45,7 +50,10 @@ impl Loaded {
         let renderer = Arc::new(DeviceScene::new(device, &prepared, round)?);
         let files = prepared.scene.files().into_iter();
         let files = files.filter_map(|path| round.memo().file_key(&path).ok().map(|key| (path, key))).collect();
-        Ok(Self { prepared: Arc::new(prepared), renderer, key, change, files })
+        // Of every vertex, so not found anew for each frame.
+        let spheres = prepared.spheres();
+        let sphere = bounding_sphere(&spheres);
+        Ok(Self { prepared: Arc::new(prepared), spheres: spheres.into(), sphere, renderer, key, change, files })
     }
 
     /// Whether some of its threads only stand in for those that are being made.
@@ -58,7 +66,7 @@ impl Loaded {
     /// # Errors
     /// Objects that no camera can frame.
     pub fn seen_as(&self, scene: Scene) -> Result<Prepared> {
-        let view = view_of(&scene, self.prepared.bounding_sphere())?;
+        let view = view_of(&scene, self.sphere)?;
         Ok(Prepared { scene, view, ..(*self.prepared).clone() })
     }
 }

@@ -317,6 +317,25 @@ mod tests {
     }
 
     #[test]
+    fn what_a_file_is_over_is_read_again_with_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let [base, coat] = ["base.toml", "coat.toml"].map(|name| folder.path().join(name));
+        let write_base = |reflectance: f64| {
+            std::fs::write(&base, format!("model = 'lambert'\nreflectance = {reflectance}")).unwrap();
+        };
+        write_base(0.2);
+        std::fs::write(&coat, "model = 'layered'\nbase = 'base.toml'\ncoat = { alpha = 0.3, ior = 1.5 }").unwrap();
+        let mut viewer = viewer(MaterialSource::File(coat.clone()));
+        let seen =
+            |viewer: &Viewer| viewer.loaded.as_ref().expect("a picture").prepared.materials[0].brdf.fingerprint();
+        let before = seen(&viewer);
+        write_base(0.6);
+        viewer.change(&Change::Material(MaterialSource::File(coat))).unwrap();
+        wait(&mut viewer);
+        assert_ne!(seen(&viewer), before);
+    }
+
+    #[test]
     fn a_draft_that_cannot_be_finished_is_told_once_and_stays() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("m.toml");

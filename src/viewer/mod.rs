@@ -58,7 +58,7 @@ use input::Input;
 use latency::{Record, Stats};
 use std::path::PathBuf;
 use std::time::Duration;
-use winit::event_loop::EventLoop;
+use winit::event_loop::{EventLoop, EventLoopProxy};
 
 /// What the viewer is started with.
 #[derive(Clone, Debug, Default)]
@@ -97,22 +97,34 @@ pub struct Ended {
     pub missing_screenshot: Option<PathBuf>,
 }
 
-/// Opens a window and runs until it is closed.
+/// Ends a viewer from another thread.
+pub struct Cancel(EventLoopProxy<window::Wake>);
+
+impl Cancel {
+    /// Ends it, as [`Error::Cancelled`].
+    pub fn cancel(&self) {
+        // One that has ended needs no more.
+        let _ = self.0.send_event(window::Wake::Cancel);
+    }
+}
+
+/// Opens a window and runs until it is closed, or cancelled by what `take_cancel` is given.
 ///
 /// # Errors
-/// No window system, no device that presents to it, a scene that cannot be loaded; a device or a window system that fails: then the scene is
-/// kept if it was edited, and the log says where.
-pub fn run(settings: ViewerSettings) -> Result<Ended> {
+/// No window system, no device that presents to it, a scene that cannot be loaded; cancelled, or a device or a window system that fails: then
+/// the scene is kept if it was edited, and the log says where.
+pub fn run(settings: ViewerSettings, take_cancel: impl FnOnce(Cancel)) -> Result<Ended> {
     let folder = settings.cache.clone().unwrap_or_else(std::env::temp_dir);
     let mut event_loop = EventLoop::<window::Wake>::with_user_event();
     // Tests run on threads of their own.
     #[cfg(all(test, target_os = "linux"))]
     winit::platform::x11::EventLoopBuilderExtX11::with_any_thread(&mut event_loop, true);
     let event_loop = event_loop.build()?;
+    take_cancel(Cancel(event_loop.create_proxy()));
     let mut app = window::App::new(settings, event_loop.create_proxy());
     let ended = event_loop.run_app(&mut app);
     let window::App { result, messages, stats, edited, failures, missing_screenshot, .. } = app;
-    let fails = ended.is_err() || matches!(result, Err(Error::Vulkan(_)));
+    let fails = ended.is_err() || matches!(result, Err(Error::Vulkan(_) | Error::Cancelled));
     if let Some(scene) = edited.filter(|_| fails) {
         keep(&scene, &folder.join("edited.toml"));
     }
@@ -122,7 +134,7 @@ pub fn run(settings: ViewerSettings) -> Result<Ended> {
     Ok(Ended { messages, stats, failures, missing_screenshot })
 }
 
-/// Keeps a `scene` whose viewer fails.
+/// Keeps a `scene` whose viewer fails or is cancelled.
 fn keep(scene: &Scene, path: &std::path::Path) {
     // Early on nothing was kept yet, and there is no folder.
     let folder = path.parent().map_or(Ok(()), std::fs::create_dir_all);

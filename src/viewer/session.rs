@@ -50,7 +50,7 @@ impl Session {
     /// Whether something that is not shown yet names the file at `path`.
     pub fn asks_for(&self, path: &Path) -> bool {
         self.pending.iter().any(|(_, edit)| match edit {
-            Edit::Change(change) => change.file() == Some(path),
+            Edit::Change(change) => change.files().iter().any(|file| file == path),
             Edit::Scene(scene) => scene.files().iter().any(|file| file == path),
         })
     }

@@ -34,10 +34,16 @@ pub struct Surface {
 }
 
 impl Surface {
-    /// What of `prepared` is seen in column `x` and row `y` of its picture from `view` (pixel centres have halves); none for the background.
-    pub fn under(prepared: &Prepared, view: &View, x: f64, y: f64) -> Option<Self> {
+    /// What of `prepared`, whose objects are within these `spheres`, is seen in column `x` and row `y` of its picture from `view` (pixel
+    /// centres have halves); none for the background.
+    pub fn under(prepared: &Prepared, spheres: &[(DVec3, f64)], view: &View, x: f64, y: f64) -> Option<Self> {
         let direction = view.camera.ray(x - 0.5, y - 0.5, view.width, view.height);
-        let hits = prepared.objects.iter().filter_map(|object| {
+        let meets = |&(centre, radius): &(DVec3, f64)| {
+            // Rounding is far below a thousandth.
+            (centre - view.camera.eye).reject_from(direction).length() <= 1.001 * radius
+        };
+        let near = prepared.objects.iter().zip(spheres).filter(|(_, sphere)| meets(sphere));
+        let hits = near.filter_map(|(object, _)| {
             let to_object = object.to_world.inverse();
             let origin = to_object.transform_point3(view.camera.eye);
             let along = to_object.transform_vector3(direction);
@@ -197,9 +203,10 @@ mod tests {
     #[test]
     fn the_surface_under_the_cursor_is_that_of_the_sphere() {
         let prepared = sphere(Method::Uniform);
-        assert_eq!(Surface::under(&prepared, &prepared.view, 1.0, 1.0), None);
+        let under = |x: f64| Surface::under(&prepared, &prepared.spheres(), &prepared.view, x, 240.0);
+        assert_eq!(under(1.0), None);
         // In the middle the normal points at the eye.
-        let middle = Surface::under(&prepared, &prepared.view, 320.0, 240.0).unwrap();
+        let middle = under(320.0).unwrap();
         assert!(middle.theta_o_rad < 0.01 && middle.material == 0, "{middle:?}");
         let to_eye = prepared.view.camera.eye.normalize();
         let turned = DMat3::from_rotation_y(-90_f64.to_radians()) * to_eye;
@@ -208,7 +215,7 @@ mod tests {
         // Towards the rim the view angle grows, and the eye stays where it is.
         let mut before = 0.0;
         for x in (330..600).step_by(20) {
-            let Some(surface) = Surface::under(&prepared, &prepared.view, f64::from(x), 240.0) else { break };
+            let Some(surface) = under(f64::from(x)) else { break };
             assert!(surface.theta_o_rad > before && surface.theta_o_rad < FRAC_PI_2);
             before = surface.theta_o_rad;
             let ray = prepared.view.camera.ray(f64::from(x) - 0.5, 239.5, 640, 480);
@@ -248,7 +255,7 @@ mod tests {
     fn insets_draw_without_a_window() {
         let prepared = sphere(Method::Fitted);
         let threads = &prepared.materials[0].threads.as_ref().unwrap();
-        let surface = Surface::under(&prepared, &prepared.view, 400.0, 240.0);
+        let surface = Surface::under(&prepared, &prepared.spheres(), &prepared.view, 400.0, 240.0);
         let shapes = |surface: Option<&Surface>| {
             let context = egui::Context::default();
             let output = context.run(Default::default(), |context| {

@@ -26,9 +26,14 @@ use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoopProxy};
 use winit::keyboard::ModifiersState;
 use winit::window::{Window, WindowId};
 
-/// Something is new: a result of background work, or progress.
+/// What wakes the window from another thread.
 #[derive(Debug)]
-pub struct Wake;
+pub enum Wake {
+    /// Something is new: a result of background work, or progress.
+    New,
+    /// It is to end.
+    Cancel,
+}
 
 /// A window that cannot be drawn on is tried again after this time.
 const RETRY: Duration = Duration::from_millis(100);
@@ -151,7 +156,7 @@ impl App {
         let proxy = self.proxy.clone();
         let mut viewer = Viewer::new(scene.clone(), &device, Memo::new(cache.as_deref()), move || {
             // A loop that has ended needs no waking.
-            let _ = proxy.send_event(Wake);
+            let _ = proxy.send_event(Wake::New);
         });
         viewer.record(self.settings.record);
         let frames_left = frames.or(screenshot.is_some().then_some(1));
@@ -407,7 +412,8 @@ impl Open {
                 self.redraw();
             }
             WindowEvent::Occluded(hidden) => {
-                self.is_minimised = *hidden;
+                // A script's frames are drawn behind other windows, too.
+                self.is_minimised = *hidden && self.script.frames_left.is_none();
                 self.redraw();
             }
             WindowEvent::ModifiersChanged(modifiers) => self.modifiers = modifiers.state(),
@@ -463,7 +469,10 @@ impl ApplicationHandler<Wake> for App {
         }
     }
 
-    fn user_event(&mut self, event_loop: &ActiveEventLoop, Wake: Wake) {
+    fn user_event(&mut self, event_loop: &ActiveEventLoop, wake: Wake) {
+        if matches!(wake, Wake::Cancel) {
+            return self.end(event_loop, Err(Error::Cancelled));
+        }
         let Some(open) = &mut self.open else { return };
         match open.viewer.take_loaded() {
             Ok(true) => open.redraw(),

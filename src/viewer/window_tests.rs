@@ -62,7 +62,7 @@ fn play() -> Result<Ended> {
         result,
         lasts: result == Call::ERROR_DEVICE_LOST,
     };
-    let (ended, calls) = with_fault(Some(fault), || run(settings));
+    let (ended, calls) = with_fault(Some(fault), || run(settings, drop));
     let shows = calls.iter().enumerate().filter(|(_, call)| **call == "vkQueuePresentKHR").map(|(at, _)| at + 1);
     let armed = std::iter::once(0).chain(shows).nth(shown).expect("so many pictures");
     assert!(calls[armed..].contains(&of), "no call of {of} after {shown} pictures");

@@ -8,9 +8,12 @@ use crate::viewer::threads_seen::{self, Surface, in_picture};
 use egui::{TextureHandle, TextureOptions, Ui};
 use std::path::Path;
 
-/// The environment's thumbnail as it was last uploaded, with its environment, intensity and display.
+/// What is kept from frame to frame.
 #[derive(Default)]
 pub struct State {
+    /// What is under the cursor.
+    surface: Option<Surface>,
+    /// The environment's thumbnail as it was last uploaded, with its environment, intensity and display.
     thumbnail: Option<(Key, f64, Display, TextureHandle)>,
 }
 
@@ -19,12 +22,17 @@ impl State {
         let Some(loaded) = viewer.loaded() else { return };
         group(ui, "Threads", |ui| {
             let prepared = &loaded.prepared;
-            let surface = viewer.shown_view().and_then(|view| {
-                let scale = ui.ctx().pixels_per_point();
-                let [x, y] = viewer.cursor?.map(|pixels| pixels as f32 / scale);
-                let place = in_picture(egui::pos2(x, y), on_screen(ui.ctx(), viewer.area), [view.width, view.height])?;
-                Surface::under(prepared, &view, place.x, place.y)
-            });
+            // While something is dragged it stays: a large mesh takes longer to look through than a frame has.
+            if !ui.input(|input| input.pointer.any_down()) {
+                self.surface = viewer.shown_view().and_then(|view| {
+                    let scale = ui.ctx().pixels_per_point();
+                    let [x, y] = viewer.cursor?.map(|pixels| pixels as f32 / scale);
+                    let size = [view.width, view.height];
+                    let place = in_picture(egui::pos2(x, y), on_screen(ui.ctx(), viewer.area), size)?;
+                    Surface::under(prepared, &loaded.spheres, &view, place.x, place.y)
+                });
+            }
+            let surface = self.surface.filter(|surface| surface.material < prepared.materials.len());
             let material = &prepared.materials[surface.map_or(0, |surface| surface.material)];
             match surface {
                 Some(surface) => {
