@@ -250,7 +250,8 @@ pub fn geometry_cache<'a>(
 ) -> ImageHandle {
     let [width, height] = view.cache_size();
     let mut geometry = graph.kept_image("geometry", ImageDesc { format: GEOMETRY_FORMAT, width, height });
-    let mut depth = graph.image("depth", ImageDesc { format: DEPTH_FORMAT, width, height });
+    // Nothing looks at it later, but a moving picture would allocate it anew in each frame.
+    let mut depth = graph.kept_image("depth", ImageDesc { format: DEPTH_FORMAT, width, height });
     let pass = graph.raster("geometry_cache", &cache.pipeline);
     pass.color(&mut geometry, [0; 4]).depth(&mut depth, 0.0).within(region.subpixels(view)).draw(cache.draws(view));
     geometry

@@ -22,6 +22,13 @@ pub struct DeviceLight {
     pub(super) finest_level: f32,
 }
 
+impl DeviceLight {
+    /// Whether small bright sources are shaded by the BRDF.
+    pub(super) fn has_sources(&self) -> bool {
+        self.sources.is_some()
+    }
+}
+
 /// Whether `method` can draw by the light of an `environment` on this device, if it does so.
 ///
 /// # Errors

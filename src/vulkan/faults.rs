@@ -89,6 +89,7 @@ mod tests {
         *messages = instance.messages();
         let device = CompilingDevice::new(&instance, None)?;
         device.compile(&compiled::TONE_MAP, &[])?;
+        device.compile(&compiled::SHADE_FITTED, &[])?;
         device.compile_graphics(PAIR[0], PAIR[1], &STATE).map(drop)
     }
 

@@ -47,7 +47,10 @@ impl CompilingDevice {
             vk::PhysicalDevicePipelineExecutablePropertiesFeaturesKHR::default().pipeline_executable_info(true);
         // Graphics pipelines of the renderer have no render pass.
         let mut dynamic_rendering = vk::PhysicalDeviceDynamicRenderingFeatures::default().dynamic_rendering(true);
+        // No device without it is chosen.
+        let features = vk::PhysicalDeviceFeatures::default().image_cube_array(true);
         let info = vk::DeviceCreateInfo::default()
+            .enabled_features(&features)
             .queue_create_infos(&queues)
             .enabled_extension_names(&extensions)
             .push_next(&mut tells)

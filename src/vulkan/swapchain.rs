@@ -112,10 +112,13 @@ impl Swapchain {
             device: device.description().name.clone(),
             feature: "VK_KHR_swapchain".to_owned(),
         })?;
-        let free = (0..frames).map(|_| semaphore(device, "image is free")).collect::<Result<_>>()?;
-        let format = Self::FORMATS[0];
+        let (free, format) = (Vec::new(), Self::FORMATS[0]);
         let mut swapchain =
             Self { current: None, surface, format, mode, free, next: 0, device: device.clone(), functions };
+        // Those that are there are destroyed with it where another cannot be made.
+        for _ in 0..frames {
+            swapchain.free.push(semaphore(device, "image is free")?);
+        }
         swapchain.format = swapchain.available_format()?;
         swapchain.mode = swapchain.available(mode)?;
         Ok(swapchain)
