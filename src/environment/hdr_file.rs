@@ -1,4 +1,5 @@
-//! Reads environments from Radiance HDR files, by the rules of Radiance itself (`header.c`, `resolu.c` and `color.c` in its `src/common`).
+//! Reads environments from Radiance HDR files, by the rules of Radiance itself (`header.c`, `resolu.c` and `color.c` in its `src/common`), but
+//! that a value is its mantissa's, without the half step that `color.c` adds.
 use std::borrow::Cow;
 use std::path::Path;
 

@@ -58,9 +58,10 @@ fn repair(width: usize, height: usize, texels: &mut [[f32; 3]]) -> RepairCounts 
             continue;
         }
         // Minus infinity counts as infinite, and is then as black as any negative value.
-        counts.infinite += usize::from(texel.iter().any(|value| value.is_infinite() || *value > MOST_RADIANCE));
+        let is_infinite = texel.iter().any(|value| value.is_infinite() || *value > MOST_RADIANCE);
+        counts.infinite += usize::from(is_infinite);
         if texel.iter().all(|value| value.is_finite()) && texel.iter().any(|&value| value < 0.0) {
-            counts.negative += 1;
+            counts.negative += usize::from(!is_infinite);
             deficits.extend((0..3).filter(|&channel| texel[channel] < 0.0).map(|c| (index, c, -f64::from(texel[c]))));
         }
         *texel = texel.map(|value| value.clamp(0.0, largest));

@@ -16,7 +16,7 @@
 //! each of 19, 37 or 73 azimuths of w_o from the tangent, every 5 degrees; then those of the second azimuth follow those of the first. They
 //! are of the BRDF without its `rotation_deg`.
 //!
-//! Between rows albedos are blended linearly in theta_o, but between the two last in (90 deg - theta_o)^`rim_power`.
+//! Between rows albedos and weights are blended linearly in theta_o, but between the two last in (90 deg - theta_o)^`rim_power`.
 //!
 //! Fitted threads and Gaussians may be in several sets, of which thread k is of set k % sets. A sub-pixel with a sum of its own takes one set,
 //! with `sets` times the weights; a pixel whose sub-pixels share one sum takes all threads. If there are two tables, one after the other, the

@@ -2,7 +2,8 @@
 //!
 //! Filip and Vávra, "Template-Based Sampling of Anisotropic BRDFs" (2014). The file is 3 planes of 288 x 288 f64, little-endian, for red, green
 //! and blue: rows over light, columns over view, each of index phi + 48 theta with phi in steps of 7.5 degrees and theta in steps of 15
-//! degrees, from 0 to 75. (The database's own reader, as jdupuy/dj_brdf and asztr/UTIA-brdf restate it.)
+//! degrees, from 0 to 75. (The database's own reader, as asztr/UTIA-brdf restates it. jdupuy/dj_brdf has the same layout, but other values:
+//! the chapter on usage.)
 //!
 //! At nodes f is what the database's reader finds; values below 0 count as 0. Between them that reader is linear in the azimuth of the
 //! view where `goniometric.rs` is linear in the azimuth between light and view, and beyond 75 degrees it goes on in a straight line where

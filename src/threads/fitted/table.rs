@@ -129,7 +129,8 @@ impl FittedTable {
         self.row(row).iter().map(|packed| packed.kernel()).collect()
     }
 
-    /// The kernels for the view angle `theta_o` and its azimuth `phi_o` from the tangent (radians): between rows as shading has them.
+    /// The kernels for the view angle `theta_o` and its azimuth `phi_o` from the tangent (radians): between rows as shading has them, but that
+    /// weights change evenly between the two last ones, too.
     pub fn seen_from(&self, theta_o: f64, phi_o: f64) -> Vec<Kernel> {
         let (low, high, t) = rows_around(theta_o, self.rows);
         if self.azimuths == 1 {
