@@ -10,7 +10,7 @@ use crate::passes::View;
 use crate::prepare::Prepared;
 
 /// Changes whenever the same question gets another answer.
-const VERSION: u32 = 7;
+const VERSION: u32 = 8;
 
 /// Integrates equation (1) for every pixel of a picture.
 pub struct Integrate<'a> {

@@ -6,6 +6,7 @@ use crate::viewer::change::Change;
 use crate::viewer::input::Input;
 use crate::viewer::interaction::Viewer;
 use egui::{Label, RichText, SliderClamping, Ui};
+use std::ops::RangeInclusive;
 
 /// Width of the names of parameters, in points.
 const NAME_WIDTH: f32 = 88.0;
@@ -95,11 +96,23 @@ fn parameters_of(settings: &MaterialSettings) -> Option<Vec<(Parameter, toml::Va
     Some(parameters.into_iter().filter_map(with_value).collect())
 }
 
-/// Decimals of a number: three digits of what goes by factors.
+/// Decimals that a number is set to: three digits of what goes by factors.
 fn decimals(number: f64, scale: &Scale) -> usize {
     match scale.spacing {
         Spacing::Linear => 3,
         Spacing::Logarithmic => (2.0 - number.abs().max(*scale.range.start()).log10().floor()).max(3.0) as usize,
+    }
+}
+
+/// A number in as few characters as three digits of it take.
+fn shown(number: f64, decimals: RangeInclusive<usize>, scale: &Scale) -> String {
+    let size = number.abs();
+    match scale.spacing {
+        Spacing::Logarithmic if size > 0.0 && !(0.01..1e5).contains(&size) => format!("{number:.2e}"),
+        Spacing::Logarithmic if size > 0.0 => {
+            format!("{number:.*}", (2.0 - size.log10().floor()).clamp(0.0, 4.0) as usize)
+        }
+        _ => egui::emath::format_with_decimals_in_range(number, decimals),
     }
 }
 
@@ -123,7 +136,8 @@ fn row(ui: &mut Ui, material: &str, parameter: &Parameter, value: &toml::Value, 
                 // A scale of factors has no 0.
                 .smallest_positive(*scale.range.start())
                 .clamping(SliderClamping::Edits)
-                .max_decimals(decimals(as_number(value), scale));
+                .max_decimals(decimals(as_number(value), scale))
+                .custom_formatter(|number, decimals| shown(number, decimals, scale));
             on_change(&ui.add(slider).on_hover_text(*help), inputs, || set(number.into()));
         }
         Domain::Colour(range, scale) => {
@@ -143,7 +157,8 @@ fn row(ui: &mut Ui, material: &str, parameter: &Parameter, value: &toml::Value, 
                         .update_while_editing(false)
                         .range(range.clone())
                         .speed(speed)
-                        .max_decimals(decimals);
+                        .max_decimals(decimals)
+                        .custom_formatter(|number, decimals| shown(number, decimals, scale));
                     let response = ui.add_sized([34.0, 18.0], drag).on_hover_text(*help);
                     on_change(&response, inputs, || set(array(rgb)));
                 }
@@ -168,5 +183,23 @@ fn row(ui: &mut Ui, material: &str, parameter: &Parameter, value: &toml::Value, 
             let response = egui::ComboBox::from_id_salt(key).selected_text(current).show_ui(ui, show).response;
             response.on_hover_text(*help);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn three_digits_of_a_number_are_shown_whatever_its_size() {
+        let factors = Scale::logarithmic(1e-8..=1e6);
+        let texts = [9.64e-8, 0.0228, 0.15, 1.5, 30.0, 4021.24, 2.66e8, 0.0].map(|number| {
+            let decimals = decimals(number, &factors);
+            shown(number, 0..=decimals, &factors)
+        });
+        assert_eq!(texts, ["9.64e-8", "0.0228", "0.150", "1.50", "30.0", "4021", "2.66e8", "0"]);
+        assert_eq!(shown(-0.5, 0..=3, &Scale::linear(-1.0..=1.0)), "-0.5");
+        // What is shown is what is read again.
+        assert_eq!(texts[0].parse(), Ok(9.64e-8));
     }
 }
