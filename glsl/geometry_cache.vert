@@ -4,7 +4,7 @@
 #include "geometry_cache.glsl"
 #include "has_tangents.glsl" // whether a material of the scene needs them
 
-layout(location = 0) in vec3 position;
+layout(location = 0) in vec3 position; // from the mesh's middle
 layout(location = 1) in vec3 normal;
 layout(location = 2) in vec3 tangent; // of texture coordinates; the normal of a mesh that has none
 
@@ -28,7 +28,8 @@ void main() {
 #if HAS_TANGENTS
     // Both are linear in the position, so what is interpolated is right within a triangle too.
     vec3 axis = object.tangent_axis.xyz;
-    vec3 along = object.tangent_axis.w == TANGENT_AROUND ? cross(axis, position) : axis;
+    vec3 at_middle = vec3(object.right_over_extent.w, object.up_over_extent.w, object.forward.w);
+    vec3 along = object.tangent_axis.w == TANGENT_AROUND ? at_middle + cross(axis, position) : axis;
     world_tangent = linear_part * (object.tangent_axis.w == TANGENT_OF_MESH ? tangent : along);
 #endif
     gl_Position = project(from_eye);

@@ -2,10 +2,12 @@
 mod common;
 
 use common::{Validated, model, ready, sphere};
+use glam::{UVec2, Vec3};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use threadlight::Method;
+use threadlight::low_level::geometry_texel::GeometryTexel;
 use threadlight::low_level::memo::{Asked, Memo, Origin};
 use threadlight::low_level::pipeline::{DeviceScene, Wanted};
 use threadlight::low_level::prepare::{key_of, prepare};
@@ -165,4 +167,41 @@ fn no_scene_file_holds_light_or_a_mesh_from_memory() {
         let error = scene.to_toml(None).unwrap_err().to_string();
         assert!(error.contains(what) && error.contains("defined by a program"), "{error}");
     }
+}
+
+#[test]
+fn a_mesh_far_from_its_own_origin_is_seen_as_near_it() {
+    let gpu = Validated::new();
+    let (positions, triangles, _) = sheet();
+    // On a grid that single precision has out there, too.
+    let positions: Vec<_> = positions.into_iter().map(|at| at.map(|x| (64.0 * x).round() / 64.0)).collect();
+    let seen = |shift: Vec3, rule: TangentRule| {
+        let moved = positions.iter().map(|at| (Vec3::from(*at) + shift).to_array()).collect();
+        let mesh = CustomMesh::new("sheet", moved, triangles.clone(), None, None).unwrap();
+        let brushed = model("model = 'conductor'\ndistribution = 'ggx'\nmetal = 'Al'\nalpha_x = 0.1\nalpha_y = 0.4");
+        let mut scene = sphere(brushed, "white", 1, (48, 36));
+        scene.shading.method = Method::Uniform;
+        scene.objects[0].mesh = mesh.into();
+        scene.objects[0].translate = -shift;
+        scene.objects[0].tangent = Some(rule);
+        let prepared = ready(&scene);
+        gpu.render(&prepared, Wanted { geometry: true, ..Wanted::default() }).geometry
+    };
+    let axis = Vec3::new(0.6, 0.0, 0.8);
+    for shift in [Vec3::new(1024.0, -4096.0, 0.0), Vec3::new(0.0, 65536.0, 131072.0)] {
+        assert!(seen(shift, TangentRule::Along(axis)) == seen(Vec3::ZERO, TangentRule::Along(axis)), "{shift}");
+        // Circles around an axis that far away are straight.
+        let around = seen(shift, TangentRule::Around(axis));
+        let straight = seen(Vec3::ZERO, TangentRule::Along(axis.cross(shift)));
+        let mut count = 0;
+        for (around, straight) in around.into_iter().zip(straight) {
+            let texels = [around, straight].map(|texel| GeometryTexel::unpack(UVec2::from_array(texel)));
+            let [Some(around), Some(straight)] = texels else { continue };
+            let apart = around.tangent.unwrap().distance(straight.tangent.unwrap());
+            assert!(apart < 1e-3, "{shift}: {around:?}, {straight:?}");
+            count += 1;
+        }
+        assert!(count > 1000, "{count}");
+    }
+    gpu.finish();
 }

@@ -22,7 +22,7 @@ const VERTEX_STRIDE: u32 = size_of::<[f32; 3]>() as u32;
 
 /// Distance of the near plane in units of the extent of what may be seen: with reversed, infinite depth it costs no precision to keep it
 /// nearer than any surface that a camera outside of the scene sees.
-const NEAR_PLANE: f64 = 1e-6;
+const NEAR_PLANE: f32 = 1e-6;
 
 /// What the vertex shader may be off by, of the size of what it adds: some ten roundings of 2^-24.
 const ROUNDING: f64 = 1e-6;
@@ -34,6 +34,7 @@ const TANGENT_OF_MESH: f32 = 3.0;
 
 /// The triangles of a mesh on the device.
 pub struct DeviceMesh {
+    /// Positions are from the middle of the bounding sphere.
     triangles: Triangles,
     /// Bounding sphere in object space: centre and radius.
     sphere: (DVec3, f64),
@@ -48,19 +49,18 @@ impl DeviceMesh {
     /// No device memory left.
     pub fn new(device: &Arc<Device>, name: &str, mesh: &Mesh) -> Result<Self> {
         let mesh = mesh.in_drawing_order();
+        let sphere = mesh.bounding_sphere();
+        let from_middle: Vec<_> =
+            mesh.positions.iter().map(|position| (position.as_dvec3() - sphere.0).as_vec3()).collect();
         let attribute = |name, bytes| VertexAttribute { name, stride: VERTEX_STRIDE, bytes };
         // What no tangent goes by takes no memory.
         let tangents = if mesh.tangents.is_empty() { &mesh.normals } else { &mesh.tangents };
         let attributes = [
-            attribute("positions", bytemuck::cast_slice(&mesh.positions)),
+            attribute("positions", bytemuck::cast_slice(&from_middle)),
             attribute("normals", bytemuck::cast_slice(&mesh.normals)),
             attribute("tangents", bytemuck::cast_slice(tangents)),
         ];
-        Ok(Self {
-            triangles: Triangles::new(device, name, &attributes, &mesh.indices)?,
-            sphere: mesh.bounding_sphere(),
-            bounds: mesh.bounds(),
-        })
+        Ok(Self { triangles: Triangles::new(device, name, &attributes, &mesh.indices)?, sphere, bounds: mesh.bounds() })
     }
 }
 
@@ -124,6 +124,7 @@ struct Push {
     tangent_axis: [f32; 4],
     tangent_turn: [f32; 2],
     material: u32,
+    near_plane: f32,
 }
 
 /// What its pipeline is besides shaders.
@@ -159,9 +160,9 @@ impl GeometryCache {
         let pack = |v: DVec3, w: f64| v.extend(w).as_vec4().to_array();
         let unit = self.extent(view);
         let draw = |object: &PlacedMesh| {
-            let DAffine3 { matrix3, translation } = object.to_world;
+            let middle = self.meshes[object.mesh].sphere.0;
             // Subtracted in double precision: far from the origin the difference is what counts.
-            let from_eye = translation - eye;
+            let (matrix3, from_eye) = (object.to_world.matrix3, object.to_world.transform_point3(middle) - eye);
             let row = |i: usize| pack(matrix3.row(i) / unit, from_eye[i] / unit);
             let tangent_axis = match object.tangent.map(|tangent| tangent.rule) {
                 None => [0.0; 4],
@@ -169,14 +170,19 @@ impl GeometryCache {
                 Some(TangentRule::Along(axis)) => axis.extend(TANGENT_ALONG).to_array(),
                 Some(TangentRule::Uv) => [0.0, 0.0, 0.0, TANGENT_OF_MESH],
             };
+            let at_middle = match object.tangent.map(|tangent| tangent.rule) {
+                Some(TangentRule::Around(axis)) => axis.as_dvec3().cross(middle),
+                _ => DVec3::ZERO,
+            };
             let push = Push {
                 to_eye: [0, 1, 2].map(row),
-                right_over_extent: pack(right / half_size.x, 0.0),
-                up_over_extent: pack(up / half_size.y, 0.0),
-                forward: pack(forward, NEAR_PLANE),
+                right_over_extent: pack(right / half_size.x, at_middle.x),
+                up_over_extent: pack(up / half_size.y, at_middle.y),
+                forward: pack(forward, at_middle.z),
                 tangent_axis,
                 tangent_turn: object.tangent.map_or(DVec2::X, PlacedTangent::turn).as_vec2().to_array(),
                 material: object.material,
+                near_plane: NEAR_PLANE,
             };
             (&self.meshes[object.mesh].triangles, push)
         };
@@ -195,12 +201,12 @@ impl GeometryCache {
     /// Where in the picture objects may be, in tiles of this size.
     pub fn region(&self, view: &View, tile_px: [u32; 2]) -> Region {
         let corners = self.seen(view).flat_map(|object| {
-            let (low, high) = self.meshes[object.mesh].bounds;
-            let DAffine3 { matrix3, translation } = object.to_world;
-            let from_eye = translation - view.camera.eye;
+            let &DeviceMesh { sphere: (middle, _), bounds: (low, high), .. } = &*self.meshes[object.mesh];
+            let from_eye = object.to_world.transform_point3(middle) - view.camera.eye;
+            let matrix3 = object.to_world.matrix3;
             (0..8).map(move |index| {
                 let corner = Vec3::select(BVec3::from([1, 2, 4].map(|bit| index & bit != 0)), high, low);
-                let turned = matrix3 * corner.as_dvec3();
+                let turned = matrix3 * (corner.as_dvec3() - middle);
                 Corner { from_eye: turned + from_eye, error: ROUNDING * (turned.length() + from_eye.length()) }
             })
         });
