@@ -6,6 +6,7 @@ use tempfile::TempDir;
 use threadlight::Method;
 use threadlight::low_level::evaluate::expected::{TrueSample, prepare_within};
 use threadlight::low_level::evaluate::metrics::{Comparable, Display, compare};
+use threadlight::low_level::evaluate::reference::TOLERANCE;
 use threadlight::low_level::evaluate::reference::{ReferenceSettings, reference};
 use threadlight::low_level::output::{ExrHeader, write_exr};
 use threadlight::low_level::pipeline::Wanted;
@@ -33,7 +34,7 @@ fn what_is_expected_is_within_a_factor_of_two_of_what_is_measured() {
     let (gpu, folder) = (Validated::new(), TempDir::new().unwrap());
     let mut scene = glossy(&folder);
     let truth = reference(&ready(&scene), &gpu.device, &ReferenceSettings::default(), &gpu.round()).unwrap();
-    let sample = TrueSample::new(&ready(&scene), &gpu.device, &gpu.round()).unwrap();
+    let sample = TrueSample::new(&ready(&scene), &gpu.device, TOLERANCE, &gpu.round()).unwrap();
     for (method, threads) in [(Method::Fitted, 1), (Method::Fitted, 6), (Method::Paper, 8), (Method::Importance, 16)] {
         (scene.shading.method, scene.shading.threads) = (method, Some(threads));
         let rendering = gpu.render(&ready(&scene), RADIANCE);
@@ -55,7 +56,7 @@ fn the_fewest_threads_that_are_within_an_error_are_chosen() {
         scene.shading.threads = Some(threads);
         let prepared = ready(&scene);
         let rendering = gpu.render(&prepared, RADIANCE);
-        TrueSample::new(&prepared, &gpu.device, &gpu.round()).unwrap().expected_rms(&rendering.radiance)
+        TrueSample::new(&prepared, &gpu.device, TOLERANCE, &gpu.round()).unwrap().expected_rms(&rendering.radiance)
     };
     let errors = [1, 2, 3].map(expected_of);
     let most = 1.01 * errors[2];

@@ -22,14 +22,15 @@ pub struct TrueSample {
     pixels: Vec<usize>,
     truth: Comparable,
     display: Display,
+    covered_part: f64,
 }
 
 impl TrueSample {
-    /// The reference at a few hundred pixels of `prepared`, whatever its method and threads; as `device` rasterises them.
+    /// The reference at a few hundred pixels of `prepared`, whatever its method and threads, to this tolerance; as `device` rasterises them.
     ///
     /// # Errors
     /// Whatever Vulkan refuses, or cancelled.
-    pub fn new(prepared: &Prepared, device: &Arc<Device>, round: &Round) -> Result<Self> {
+    pub fn new(prepared: &Prepared, device: &Arc<Device>, tolerance: f64, round: &Round) -> Result<Self> {
         let view = &prepared.view;
         let geometry = render_geometry(device, prepared, round)?;
         let observer = round.observer();
@@ -43,12 +44,19 @@ impl TrueSample {
         let covered: Vec<_> = (0..(view.width * view.height) as usize).filter(is_covered).collect();
         let pixels = spread(&covered, PIXELS);
         let radiance = |&pixel: &usize| {
-            let texel = integrator.texel(view, &geometry, place(pixel), TOLERANCE, observer)?;
+            let texel = integrator.texel(view, &geometry, place(pixel), tolerance, observer)?;
             Ok(texel.map_or([0.0; 4], |texel| texel.rgba))
         };
         let radiance = pixels.par_iter().map(radiance).collect::<Result<Vec<_>>>()?;
         let display = Display::of(view);
-        Ok(Self { truth: Comparable::from_radiance(pixels.len(), 1, &radiance, true, display), pixels, display })
+        let truth = Comparable::from_radiance(pixels.len(), 1, &radiance, true, display);
+        let covered_part = covered.len() as f64 / (f64::from(view.width) * f64::from(view.height));
+        Ok(Self { truth, pixels, display, covered_part })
+    }
+
+    /// The part of the picture that sees a surface.
+    pub fn covered_part(&self) -> f64 {
+        self.covered_part
     }
 
     /// The RMS of display values to be expected of a picture: that of the pixels that were looked at (F39). 0 where no surface is seen.
@@ -87,7 +95,8 @@ pub fn prepare_within(scene: &Scene, most: f64, device: &Arc<Device>, round: &Ro
         let renderer = DeviceScene::new(device, &alone, round)?;
         let sample = match &sample {
             Some(sample) => sample,
-            None => sample.insert(TrueSample::new(&alone, device, round)?),
+            // What it is off by itself is not to decide.
+            None => sample.insert(TrueSample::new(&alone, device, TOLERANCE.min(0.25 * most), round)?),
         };
         let rendering = renderer.render(Wanted { radiance: true, ..Wanted::default() }, 1)?;
         let rms = sample.expected_rms(&rendering.radiance);

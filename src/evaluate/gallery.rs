@@ -127,7 +127,7 @@ pub fn side_by_side_sheets(measured: &Measured) -> Vec<Named> {
         let best = in_order(here.clone().map(|(row, _)| &row.method)).into_iter().filter_map(best_of);
         let tile = |(row, picture): (&Row, &RgbImage)| {
             let Row { method, threads, gpu_ms, rms, .. } = row;
-            Tile { picture: picture.clone(), caption: format!("{method} {threads}: {gpu_ms:.0} ms, RMS {rms:.4}") }
+            Tile { picture: picture.clone(), caption: format!("{method} {threads}: {gpu_ms:.2} ms, RMS {rms:.4}") }
         };
         let truth = Tile { picture: reference.clone(), caption: "reference".to_owned() };
         let tiles = best.map(tile).chain([truth]).collect();

@@ -205,15 +205,29 @@ pub fn speed_charts(timings: &Timings) -> Vec<Chart> {
 fn growth_curves(growths: &[&Growth]) -> Vec<Curve> {
     let mut curves = Vec::new();
     for (style, what) in in_order(growths.iter().map(|growth| &growth.what)).into_iter().enumerate() {
-        let series: Vec<_> = growths.iter().filter(|growth| growth.what == *what).collect();
-        let quantities = in_order(series.iter().map(|growth| growth.quantity));
-        let ms = |quantity: u64| {
-            let here = series.iter().filter(|growth| growth.quantity == quantity);
-            mean(&here.map(|growth| growth.frame.gpu_ms).collect::<Vec<_>>())
+        let place = |growth: &Growth| {
+            let TimedFrame { material, environment, scene, .. } = &growth.frame;
+            [material, environment, scene].map(String::clone)
         };
-        let first = quantities[0];
-        let point = |&quantity: &u64| (quantity as f64 / first as f64, ms(quantity) / ms(first));
-        let points = quantities.iter().map(point).collect();
+        let all: Vec<_> = growths.iter().filter(|growth| growth.what == *what).collect();
+        // Each place by what it began with.
+        let relative = in_order(all.iter().map(|growth| place(growth))).into_iter().map(|here| {
+            let series: Vec<_> = all.iter().filter(|growth| place(growth) == here).collect();
+            let first = series[0];
+            let point = |growth: &&&&Growth| {
+                (growth.quantity as f64 / first.quantity as f64, growth.frame.gpu_ms / first.frame.gpu_ms)
+            };
+            series.iter().map(point).collect::<Vec<_>>()
+        });
+        let relative: Vec<_> = relative.collect();
+        let steps = relative.iter().map(Vec::len).max().unwrap_or_default();
+        let point = |step: usize| {
+            let here: Vec<_> = relative.iter().filter_map(|series| series.get(step)).collect();
+            let [x, y] = [|at: &&(f64, f64)| at.0, |at: &&(f64, f64)| at.1]
+                .map(|of| mean(&here.iter().map(of).collect::<Vec<_>>()));
+            (x, y)
+        };
+        let points = (0..steps).map(point).collect();
         curves.push(Curve { name: what.clone(), points, style, drawn: Drawn::Line });
     }
     let last = curves.iter().flat_map(|curve| &curve.points).map(|point| point.0).fold(1.0, f64::max);

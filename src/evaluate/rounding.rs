@@ -76,7 +76,7 @@ pub struct Rounded {
     /// Name of the scene.
     pub scene: String,
     /// Name of the method.
-    pub method: &'static str,
+    pub method: String,
     /// Threads or samples.
     pub count: u32,
     /// What was rounded.
@@ -109,7 +109,7 @@ pub fn run(
                     material: place.material.to_owned(),
                     environment: place.environment.to_owned(),
                     scene: place.scene.to_owned(),
-                    method: estimator.variant.method.name(),
+                    method: estimator.variant.name(),
                     count: estimator.count,
                     rounding: rounding.name(),
                     rms,
@@ -238,17 +238,18 @@ fn next_half_float(bits: u16, up: bool) -> u16 {
 
 /// The tables that `bench rounding` prints: for each method and count a row for each environment and rounding.
 pub fn tables(found: &[Rounded]) -> Section {
-    let mut estimators: Vec<_> = found.iter().map(|row| (row.method, row.count)).collect();
+    let mut estimators: Vec<_> = found.iter().map(|row| (row.method.as_str(), row.count)).collect();
     estimators.sort_unstable();
     estimators.dedup();
     let mut environments: Vec<&str> = found.iter().map(|row| row.environment.as_str()).collect();
     environments.sort_unstable();
     environments.dedup();
-    let of_estimator = |(method, count): (&'static str, u32)| {
+    let of_estimator = |(method, count): (&str, u32)| {
         let row = |environment: &str, rounding: &Rounding| {
             let name = rounding.name();
             let is_of = |row: &&Rounded| {
-                (row.method, row.count, row.environment.as_str(), &row.rounding) == (method, count, environment, &name)
+                (row.method.as_str(), row.count, row.environment.as_str(), &row.rounding)
+                    == (method, count, environment, &name)
             };
             let rows: Vec<_> = found.iter().filter(is_of).collect();
             let mean = mean(&rows.iter().map(|row| row.rms).collect::<Vec<_>>());

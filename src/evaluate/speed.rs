@@ -153,10 +153,16 @@ pub fn run(
         timings.frames.extend(take_turns(entrants, device, speed.repeat, &mut advance)?);
         for &variant in &speed.cases.methods {
             for (growing, what, steps) in SERIES {
+                let subpixels = place.prepared.view.subpixels;
+                let most = match growing {
+                    Growing::Subpixels => steps.iter().map(|&side| variant.method.max_count(side)).min(),
+                    _ => Some(variant.method.max_count(subpixels)),
+                };
+                let threads = most.map_or(speed.threads, |most| speed.threads.min(most));
                 let mut entrants = Vec::new();
                 for &step in steps {
                     let entrant = |place: &mut Place| {
-                        place.choose(Estimator { variant, count: growing.count(step, speed.threads) })?;
+                        place.choose(Estimator { variant, count: growing.count(step, threads) })?;
                         Entrant::new(device, place)
                     };
                     entrants.push(growing.at(step, place, entrant)?);
@@ -236,18 +242,18 @@ impl Entrant {
             let remedy = "point the camera at its objects, or leave the camera out";
             return Err(Error::input(place.scene, "shows no surface to shade", remedy));
         }
-        // As many pixels as the lookups suffice for.
         let threads = prepared.sampling.count;
-        let pixels = lookups.div_ceil(u64::from(threads)) as u32;
         let pyramid = round.ask(&BoxFilter { environment: &prepared.environment, face_size: None })?;
         let way_around = round.ask(&CheckDevice(device))?.way_around(device)?;
         let fitted = prepared.materials.iter().find_map(|material| material.threads.as_deref()?.fitted());
-        let rows = match fitted {
-            Some(table) => lookups_of(table, pyramid.face_size),
-            None => lookups_all_around(threads, pyramid.face_size),
+        let (rows, of_row) = match fitted {
+            Some(table) => (lookups_of(table, pyramid.face_size), table.for_subpixels().count as u32),
+            None => (lookups_all_around(threads, pyramid.face_size), threads),
         };
+        // As many pixels as the lookups suffice for.
+        let pixels = lookups.div_ceil(u64::from(of_row)) as u32;
         let cache = pipelines(&round, device)?;
-        let floor = BareLookups::new(device, &cache, &pyramid, [pixels, threads], &rows, way_around)?;
+        let floor = BareLookups::new(device, &cache, &pyramid, [pixels, of_row], &rows, way_around)?;
         time_bare_lookups(device, &floor)?;
         let triangles = |object: &PlacedMesh| prepared.meshes[object.mesh].1.indices.len() as u64 / 3;
         let frame = TimedFrame {

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::cases::{Cases, Place, Shard};
 use super::expected::TrueSample;
 use super::metrics::{Comparable, Metrics, check_size, compare};
+use super::reference::TOLERANCE;
 use super::reference_picture::ReferencePicture;
 use super::sheet::over_grey;
 use crate::error::Result;
@@ -154,7 +155,8 @@ pub fn run(
     }
     let total = sweep.row_count();
     observer.progress(0, total);
-    sweep.cases.for_each_place(memo, observer, &mut |place| {
+    let before = measured.rows.len();
+    let result = sweep.cases.for_each_place(memo, observer, &mut |place| {
         let (width, height, display) = (place.prepared.view.width, place.prepared.view.height, place.display);
         let comparable =
             |radiance: &[[f32; 4]]| Comparable::from_radiance(width as usize, height as usize, radiance, true, display);
@@ -165,7 +167,7 @@ pub fn run(
             measured.references.push((names, over_grey(&truth.radiance, width, height, display)));
         }
         let truth = comparable(&truth.radiance);
-        let sample = || TrueSample::new(place.prepared, device, &place.round());
+        let sample = || TrueSample::new(place.prepared, device, TOLERANCE, &place.round());
         let sample = sweep.expected.then(sample).transpose()?;
         for estimator in sweep.cases.estimators() {
             place.choose(estimator)?;
@@ -176,7 +178,10 @@ pub fn run(
             let rendering = renderer.render(wanted, sweep.repeat)?;
             let metrics = compare(&comparable(&rendering.radiance), &truth, !sweep.whole_picture)
                 .map_err(|error| error.within(format!("{} on {}", place.material, place.scene)))?;
-            let expected_rms = sample.as_ref().map(|sample| sample.expected_rms(&rendering.radiance));
+            // Beyond surfaces there is no error.
+            let part = |sample: &TrueSample| if sweep.whole_picture { sample.covered_part() } else { 1.0 };
+            let expected_rms =
+                sample.as_ref().map(|sample| part(sample).sqrt() * sample.expected_rms(&rendering.radiance));
             let settings = Some(sweep.settings(place.prepared));
             let shard = Some(sweep.cases.shard).filter(|shard| *shard != Shard::WHOLE);
             let combinations = shard.map(|_| sweep.cases.combination_count());
@@ -187,7 +192,12 @@ pub fn run(
             observer.progress(measured.rows.len(), total);
         }
         Ok(())
-    })
+    });
+    // A place that not all were measured at would be in the means of some.
+    let whole = (measured.rows.len() - before) / sweep.cases.estimators().len() * sweep.cases.estimators().len();
+    measured.rows.truncate(before + whole);
+    measured.pictures.truncate(before + whole);
+    result
 }
 
 impl Sweep {

@@ -192,7 +192,7 @@ fn compare(case: &str, method: &'static str, found: &[[f32; 4]], expected: &[Vec
     let largest = |of: Vec4| f64::from(of.truncate().max_element());
     let mean = pairs.iter().map(|(_, expected)| largest(*expected)).sum::<f64>() / pairs.len().max(1) as f64;
     let mut differences = Vec::new();
-    for (found, expected) in pairs.iter().filter(|(found, _)| found.is_finite()) {
+    for (found, expected) in pairs.iter().filter(|(found, expected)| found.is_finite() && expected.is_finite()) {
         let scale = largest(*expected).max(mean).max(least);
         let difference = (found.as_dvec4() - expected.as_dvec4()).truncate().abs().max_element();
         // Where all is black, black is expected.
