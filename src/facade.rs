@@ -11,7 +11,7 @@ use crate::progress::Observer;
 use crate::scene::{CustomMesh, EnvironmentSource, ImageSettings, MaterialSource, MeshSource, Scene, mesh};
 use crate::threads::{ThreadSettings, Threads};
 use crate::vulkan::{Device, Instance};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Renders scenes on one Vulkan device.
@@ -139,7 +139,7 @@ impl Picture {
         &self.rendering.radiance
     }
 
-    /// As a display shows it: clamp(exposure L, 0, 1)^(1/gamma), 8 bits each of red, green, blue and alpha.
+    /// As a display shows it: clamp(exposure L, 0, 1)^(1/gamma), 8 bits each of red, green, blue and alpha; colour is not multiplied by alpha.
     pub fn display(&self) -> &[u8] {
         &self.rendering.display
     }
@@ -199,6 +199,25 @@ impl Scene {
         self
     }
 }
+
+/// A path is a file's, whatever is built in.
+macro_rules! from_paths {
+    ($($source:ident),*) => {$(
+        impl From<&Path> for $source {
+            fn from(path: &Path) -> Self {
+                Self::File(path.to_owned())
+            }
+        }
+
+        impl From<PathBuf> for $source {
+            fn from(path: PathBuf) -> Self {
+                Self::File(path)
+            }
+        }
+    )*};
+}
+
+from_paths!(MaterialSource, EnvironmentSource, MeshSource);
 
 /// A built-in's name, or the path of a file.
 impl From<&str> for MaterialSource {

@@ -13,8 +13,10 @@ const AFTER_HEADER: usize = 8 + 25;
 /// The chunk that says "these values are sRGB, perceptual intent": length 1, name, intent 0, CRC-32.
 const SRGB_CHUNK: [u8; 13] = [0, 0, 0, 1, b's', b'R', b'G', b'B', 0, 0xae, 0xce, 0x1c, 0xe9];
 
-/// Deflate makes 1032 bytes of one, and a pixel takes one as a rule.
+/// Deflate makes 1032 bytes of one, and a pixel takes one or more, but for pictures of 1, 2 and 4 bits a pixel.
 const MAX_PIXELS_PER_BYTE: u64 = 1032;
+/// Where the bits of a channel stand: behind the signature (8), the chunk's length and name (8), width and height (8).
+const BITS: usize = 24;
 
 /// Writes a PNG of `width` x `height` pixels, rows from the top, straight alpha; without `alpha` only RGB.
 ///
@@ -43,7 +45,9 @@ pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<PictureFile> {
     };
     let decoder = PngDecoder::new(Cursor::new(bytes)).map_err(broken)?;
     let (width, height) = decoder.dimensions();
-    check_pixels(path, [u64::from(width) * u64::from(height)], bytes.len(), MAX_PIXELS_PER_BYTE)?;
+    let pixels_a_byte = bytes.get(BITS).map_or(1, |&bits| (8 / u64::from(bits.max(1))).max(1));
+    let most = MAX_PIXELS_PER_BYTE * pixels_a_byte;
+    check_pixels(path, [u64::from(width) * u64::from(height)], bytes.len(), most)?;
     let decoded = DynamicImage::from_decoder(decoder).map_err(broken)?;
     Ok(PictureFile {
         width: decoded.width(),
@@ -63,6 +67,20 @@ mod tests {
     fn crc(bytes: &[u8]) -> u32 {
         let step = |crc: u32| if crc & 1 == 1 { (crc >> 1) ^ 0xedb8_8320 } else { crc >> 1 };
         !bytes.iter().fold(u32::MAX, |crc, &byte| (0..8).fold(crc ^ u32::from(byte), |crc, _| step(crc)))
+    }
+
+    #[test]
+    fn a_black_picture_of_one_bit_a_pixel_is_read() {
+        // 640 x 480, as Pillow writes it.
+        let file = [
+            137, 80, 78, 71, 13, 10, 26, 10, 0, 0, 0, 13, 73, 72, 68, 82, 0, 0, 2, 128, 0, 0, 1, 224, 1, 0, 0, 0, 0,
+            29, 170, 225, 73, 0, 0, 0, 61, 73, 68, 65, 84, 120, 218, 237, 193, 1, 13, 0, 0, 0, 194, 160, 247, 79, 109,
+            14, 55, 160, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+            0, 0, 0, 0, 0, 0, 224, 207, 0, 151, 224, 0, 1, 75, 204, 27, 74, 0, 0, 0, 0, 73, 69, 78, 68, 174, 66, 96,
+            130,
+        ];
+        let picture = parse(Path::new("black.png"), &file).unwrap();
+        assert!((picture.width, picture.height) == (640, 480) && picture.rgba.iter().all(|texel| texel[0] == 0.0));
     }
 
     #[test]

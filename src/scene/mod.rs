@@ -331,7 +331,19 @@ impl Scene {
         if self.objects.is_empty() {
             return Err(Error::input("scene", "has no objects", "give it one at least"));
         }
-        let names: HashSet<_> = self.materials.iter().map(|material| material.name.as_str()).collect();
+        let mut names = HashSet::new();
+        if let Some(twice) = self.materials.iter().find(|material| !names.insert(material.name.as_str())) {
+            let problem = "is the name of two materials";
+            return Err(Error::input(format!("\"{}\"", twice.name), problem, "give each a name of its own"));
+        }
+        for object in &self.objects {
+            if let Some(TangentRule::Around(axis) | TangentRule::Along(axis)) = object.tangent
+                && !(axis.length() > 0.0 && axis.is_finite())
+            {
+                let problem = format!("goes by the axis {axis}, which has no direction");
+                return Err(Error::input(format!("tangent of {}", object.mesh), problem, "give it another"));
+            }
+        }
         match self.objects.iter().find(|object| !names.contains(object.material.as_str())) {
             None => Ok(()),
             Some(object) => {
@@ -432,7 +444,7 @@ mod tests {
     fn what_no_scene_file_can_say_no_program_can_set() {
         assert!(Scene::default().check().is_ok());
         type Set = fn(&mut Scene);
-        let wrong: [(&str, Set); 12] = [
+        let wrong: [(&str, Set); 15] = [
             ("width", |scene| scene.image.width = 0),
             ("height", |scene| scene.image.height = MAX_SIZE_PX + 1),
             ("subpixels", |scene| scene.image.subpixels = 0),
@@ -445,6 +457,9 @@ mod tests {
             ("no objects", |scene| scene.objects.clear()),
             ("\"gold\"", |scene| scene.materials.clear()),
             ("\"x\"", |scene| scene.objects[0].material = "x".into()),
+            ("\"gold\"", |scene| scene.materials.push(scene.materials[0].clone())),
+            ("tangent", |scene| scene.objects[0].tangent = Some(TangentRule::Around(Vec3::ZERO))),
+            ("tangent", |scene| scene.objects[0].tangent = Some(TangentRule::Along(Vec3::NAN))),
         ];
         for (name, set) in wrong {
             let mut scene = Scene::default();

@@ -73,14 +73,16 @@ impl MerlTable {
                     let cell = texels.len();
                     let stored = [stored(0, cell), stored(1, cell), stored(2, cell)];
                     let rgb = [stored[0] * SCALE[0], stored[1] * SCALE[1], stored[2] * SCALE[2]].map(|f| f as f32);
-                    if let Some(channel) = (0..3).find(|&channel| !rgb[channel].is_finite()) {
+                    // What is below the horizon means nothing.
+                    let is_above = horizon.is_above(phi_d);
+                    if let Some(channel) = (0..3).find(|&channel| is_above && !rgb[channel].is_finite()) {
                         let name = ["red", "green", "blue"][channel];
                         return Err(format!(
                             "holds {} in the {name} cell theta_h {theta_h}, theta_d {theta_d}, phi_d {phi_d}",
                             stored[channel]
                         ));
                     }
-                    let valid = stored.iter().all(|&value| value >= 0.0) && horizon.is_above(phi_d);
+                    let valid = is_above && stored.iter().all(|&value| value >= 0.0);
                     texels.push(if valid { Vec4::new(rgb[0], rgb[1], rgb[2], 1.0) } else { Vec4::ZERO });
                 }
             }
