@@ -155,8 +155,7 @@ pub fn run(
     }
     let total = sweep.row_count();
     observer.progress(0, total);
-    let before = measured.rows.len();
-    let result = sweep.cases.for_each_place(memo, observer, &mut |place| {
+    sweep.cases.for_each_place(memo, observer, &mut |place| {
         let (width, height, display) = (place.prepared.view.width, place.prepared.view.height, place.display);
         let comparable =
             |radiance: &[[f32; 4]]| Comparable::from_radiance(width as usize, height as usize, radiance, true, display);
@@ -192,12 +191,7 @@ pub fn run(
             observer.progress(measured.rows.len(), total);
         }
         Ok(())
-    });
-    // A place that not all were measured at would be in the means of some.
-    let whole = (measured.rows.len() - before) / sweep.cases.estimators().len() * sweep.cases.estimators().len();
-    measured.rows.truncate(before + whole);
-    measured.pictures.truncate(before + whole);
-    result
+    })
 }
 
 impl Sweep {
