@@ -36,7 +36,8 @@ pub fn counts() -> String {
         Some(format!("{} 1 to {} (default {})", method.name(), kind.max_count(), kind.default_count()))
     };
     let of_threads = Method::ALL.iter().filter_map(of_threads).collect::<Vec<_>>().join(", ");
-    let of_samples =
-        format!("samples per pixel of methods that have none, 1 to {MAX_SAMPLES} (default {DEFAULT_SAMPLES})");
+    let of_samples = format!(
+        "samples per pixel of methods that have none, 1 to {MAX_SAMPLES}, fewer of `ris` and with many sub-pixels (default {DEFAULT_SAMPLES}; `split_sum` has 1)"
+    );
     format!("Sample threads per pixel: {of_threads}; or {of_samples}")
 }

@@ -23,7 +23,7 @@ Examples:
 pub struct Threads {
     #[arg(help = nameable::material("Material"))]
     material: String,
-    /// Number of threads: 1 to 128 (fitted; 16 by default, of which anisotropic materials have 13) or 1 to 1024 (paper; 100 by default).
+    /// Number of threads: 1 to 128 (fitted; 16 by default, of which anisotropic materials have 13 in sets) or 1 to 1024 (paper; 100 by default).
     #[arg(long, value_name = "N")]
     count: Option<u32>,
     /// Whose threads: fitted, paper or gaussian.
@@ -32,7 +32,7 @@ pub struct Threads {
     /// Seed of everything random; the same seed gives the same threads.
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
-    /// Sub-pixels per axis of the pictures that they are for, 1 to 4: fitted threads are in as many sets.
+    /// Sub-pixels per axis of the pictures that they are for, 1 to 4: fitted threads are in as many sets as a pixel has of them, those of anisotropic materials in fewer.
     #[arg(long, value_name = "S", default_value_t = ImageSettings::default().subpixels, value_parser = subpixels())]
     subpixels: u32,
     /// Neither read nor write cached threads.

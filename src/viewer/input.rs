@@ -18,7 +18,7 @@
 //! | `{"compare": "reference"}`, `{"compare": {"shading": {"method": "paper", "threads": 64}}}` | compares the picture with the reference, or with another method or number of threads; `{"compare": null}` ends that |
 //! | `{"wipe": 0.5}` | drags the line between two compared pictures: 0 is the left edge, 1 the right one |
 //! | `{"heat_map": true}` | shows where the two differ in the place of the other picture, or no longer |
-//! | `"undo"`, `"redo"` | takes back what was last set or dropped, and does it again; the camera stays where it is |
+//! | `"undo"`, `"redo"` | takes back what was last set or dropped, and does it again; the camera stays where it is, but where a whole scene is taken back |
 //! | `"wait"` | waits until all background work is done and its frame drawn; an error after `--replay-limit` seconds |
 //! | `{"save_picture": "x.png"}`, `{"save_scene": "x.toml"}` | saves; a picture is waited for until its threads are finished, as `"wait"` does |
 //! | `"quit"` | closes the window |

@@ -48,7 +48,7 @@ pub struct BenchGallery {
     /// Draw all materials, and compare no methods.
     #[arg(long, conflicts_with_all = ["compare", "reference_tolerance", "reference_on", "json"])]
     materials_only: bool,
-    /// Threads or samples of the pictures of all materials, 1 to 1024.
+    /// Threads or samples of the pictures of all materials, 1 to 1024; fitted threads 1 to 128.
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = value_parser!(u32).range(1..=MAX_COUNT as i64))]
     threads: u32,
     #[command(flatten)]

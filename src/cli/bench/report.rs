@@ -33,6 +33,8 @@ things double (the paper's table 1); errors (tables 2 to 4) over samples and ove
 10 and 11); all materials, built-in ones too, by the first of the methods at the highest of the counts (figure 13); and every row. \
 Times are of the first material, environment and scene.
 
+--json and --plot write the errors, as those of `bench error` do.
+
 With --from, errors are those of earlier runs of `bench error --json`, such as all parts of one by --shard, and methods are shown side by side for the first material, \
 environment and scene only. Without DIR nothing is measured: the tables of these errors are printed, and --plot and --json write \
 what those of `bench error` write. Files that were not measured with the same settings, or that have the same row, are refused, and so \
@@ -50,7 +52,7 @@ pub struct BenchReport {
     from: Vec<PathBuf>,
     #[command(flatten)]
     cases: CasesArguments,
-    /// Threads or samples while other things double, 1 to 1024.
+    /// Threads or samples while other things double, 1 to 1024; of a method that can have fewer, its most.
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = value_parser!(u32).range(1..=MAX_COUNT as i64))]
     threads: u32,
     #[command(flatten)]

@@ -47,7 +47,7 @@ The plots are SVG, log-log: frame_over_threads.svg, and METHOD_cost_over_growth.
 pub struct BenchSpeed {
     #[command(flatten)]
     cases: CasesArguments,
-    /// Threads or samples while other things grow, 1 to 1024.
+    /// Threads or samples while other things grow, 1 to 1024; of a method that can have fewer, its most.
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = value_parser!(u32).range(1..=MAX_COUNT as i64))]
     threads: u32,
     /// Render this often; times are medians.
