@@ -164,22 +164,18 @@ impl GeometryCache {
             // Subtracted in double precision: far from the origin the difference is what counts.
             let (matrix3, from_eye) = (object.to_world.matrix3, object.to_world.transform_point3(middle) - eye);
             let row = |i: usize| pack(matrix3.row(i) / unit, from_eye[i] / unit);
-            let tangent_axis = match object.tangent.map(|tangent| tangent.rule) {
-                None => [0.0; 4],
-                Some(TangentRule::Around(axis)) => axis.extend(TANGENT_AROUND).to_array(),
-                Some(TangentRule::Along(axis)) => axis.extend(TANGENT_ALONG).to_array(),
-                Some(TangentRule::Uv) => [0.0, 0.0, 0.0, TANGENT_OF_MESH],
-            };
-            let at_middle = match object.tangent.map(|tangent| tangent.rule) {
-                Some(TangentRule::Around(axis)) => axis.as_dvec3().cross(middle),
-                _ => DVec3::ZERO,
+            let (axis, how, at_middle) = match object.tangent.map(|tangent| tangent.rule) {
+                None => (Vec3::ZERO, 0.0, DVec3::ZERO),
+                Some(TangentRule::Around(axis)) => (axis, TANGENT_AROUND, axis.as_dvec3().cross(middle)),
+                Some(TangentRule::Along(axis)) => (axis, TANGENT_ALONG, DVec3::ZERO),
+                Some(TangentRule::Uv) => (Vec3::ZERO, TANGENT_OF_MESH, DVec3::ZERO),
             };
             let push = Push {
                 to_eye: [0, 1, 2].map(row),
                 right_over_extent: pack(right / half_size.x, at_middle.x),
                 up_over_extent: pack(up / half_size.y, at_middle.y),
                 forward: pack(forward, at_middle.z),
-                tangent_axis,
+                tangent_axis: axis.extend(how).to_array(),
                 tangent_turn: object.tangent.map_or(DVec2::X, PlacedTangent::turn).as_vec2().to_array(),
                 material: object.material,
                 near_plane: NEAR_PLANE,
