@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// The keys of files' contents, as they were when they were looked at. Contents that were read for their key are kept until someone takes
-/// them or the round is over.
+/// them or [`Self::release`].
 #[derive(Default)]
 pub(super) struct Files(Mutex<Known>);
 

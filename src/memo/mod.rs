@@ -163,6 +163,11 @@ impl Memo {
         self.files.set_key(path, key);
     }
 
+    /// Contents that were read for their key are read again where they are needed.
+    pub fn let_go_of_files(&self) {
+        self.files.release();
+    }
+
     /// How many outputs are in memory.
     pub fn outputs_in_memory(&self) -> usize {
         let known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
@@ -288,7 +293,7 @@ impl<'r> Round<'r> {
 
     /// Keeps in memory what was asked for, for as long as this or a clone of it lives.
     pub fn held(&self) -> Held {
-        self.memo.files.release();
+        self.memo.let_go_of_files();
         Held(self.held.borrow().values().cloned().collect())
     }
 }

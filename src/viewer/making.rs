@@ -76,6 +76,11 @@ impl Viewer {
         let key = key_of(&scene, &self.memo).ok();
         self.wanted = key;
         if key.is_some() && self.requested == key {
+            // Files that were read for their key alone are not asked for.
+            self.memo.let_go_of_files();
+            if self.is_wanted(self.loaded.as_ref()) {
+                self.session.loaded(scene, self.changes);
+            }
             return;
         }
         let before = self.loaded.as_ref().map(|loaded| loaded.prepared.clone());
@@ -100,6 +105,11 @@ impl Viewer {
             let round = memo.round(task);
             loaded(prepare(&scene, &round)?, &round)
         });
+    }
+
+    /// Whether frames of what is `loaded` are of what is wanted.
+    fn is_wanted(&self, loaded: Option<&Loaded>) -> bool {
+        loaded.is_some_and(|loaded| loaded.key.is_some() && loaded.key == self.wanted)
     }
 
     /// Has `make` done in the background. Where that fails, so is finding out which edits are at fault: it may read large files again.
@@ -172,7 +182,11 @@ impl Viewer {
             let was_drafting = self.drafting_since.take().is_some();
             match result.unwrap_or_else(|error| Err((error, Vec::new()))) {
                 Ok(loaded) => {
-                    self.session.loaded(loaded.prepared.scene.clone(), loaded.change);
+                    // What was wanted since may be the same, from files of other names.
+                    match self.is_wanted(Some(&loaded)) {
+                        true => self.session.loaded(self.session.wanted().clone(), self.changes),
+                        false => self.session.loaded(loaded.prepared.scene.clone(), loaded.change),
+                    }
                     self.forget_errors(loaded.change);
                     let before = self.loaded.replace(loaded.clone());
                     self.is_compiled &= before.is_some_and(|before| before.renderer.shades_as(&loaded.renderer));
@@ -200,6 +214,7 @@ impl Viewer {
         }
         self.history.forget(&taken_back);
         self.latency.failed();
+        self.memo.let_go_of_files();
         if is_another_wanted {
             self.go_back();
         }
@@ -314,6 +329,38 @@ mod tests {
         let broken = Edit::Change(Change::Material(MaterialSource::File("broken.toml".into())));
         viewer.take_back(Error::input("broken.toml", "is broken", "mend it"), &[broken]).unwrap();
         assert_eq!(viewer.session.wanted().materials[0].name, "clay");
+        wait(&mut viewer);
+        assert_eq!(viewer.session.shown().materials[0].name, "clay");
+    }
+
+    #[test]
+    fn the_camera_moves_before_a_mesh_of_the_same_bytes_under_another_name() {
+        let folder = tempfile::tempdir().unwrap();
+        let [a, b] = ["a.obj", "b.obj"].map(|name| folder.path().join(name));
+        std::fs::write(&a, "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+        std::fs::copy(&a, &b).unwrap();
+        let mut viewer = viewer(MaterialSource::Builtin("clay".to_owned()));
+        viewer.change(&Change::Mesh(Source::File(a))).unwrap();
+        // When that is loaded, and while it is.
+        for is_loaded in [true, false] {
+            if is_loaded {
+                wait(&mut viewer);
+            } else {
+                viewer.frame_was_drawn();
+                viewer.change(&Change::Mesh(Source::Builtin("sphere".to_owned()))).unwrap();
+                wait(&mut viewer);
+                viewer.frame_was_drawn();
+                viewer.change(&Change::Mesh(Source::File(b.with_file_name("a.obj")))).unwrap();
+                assert!(viewer.is_loading());
+            }
+            viewer.change(&Change::Mesh(Source::File(b.clone()))).unwrap();
+            wait(&mut viewer);
+            assert!(viewer.session.pending().is_empty(), "{is_loaded}");
+            let before = viewer.session.wanted().camera;
+            viewer.move_camera(|orbit| orbit.turn(glam::dvec2(30.0, 0.0), 24.0)).unwrap();
+            let after = viewer.session.wanted().camera;
+            assert!(after.is_some() && after != before, "{is_loaded}");
+        }
     }
 
     #[test]
