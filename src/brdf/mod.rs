@@ -193,17 +193,20 @@ impl Brdf {
     /// about the normal there, at every view angle, and the square resolves narrow ones. Within about 1e-3 of the truth for
     /// roughness_alpha >= 0.001.
     pub fn albedo_from(&self, theta_o: f64, phi_o: f64) -> DVec3 {
-        const THETA_STEPS: usize = 768;
-        const PHI_STEPS: usize = 384;
+        self.albedo_in_steps(theta_o, phi_o, [768, 384])
+    }
+
+    /// [`Self::albedo_from`] by so many steps of theta_h and phi_h.
+    fn albedo_in_steps(&self, theta_o: f64, phi_o: f64, [theta_steps, phi_steps]: [usize; 2]) -> DVec3 {
         let w_o = (DVec2::from_angle(phi_o) * theta_o.sin()).extend(theta_o.cos());
         // A ring crosses an ellipse within its ratio in radians. GGX then leaves an error of 2 e^(-ratio phi_steps).
-        let phi_steps = PHI_STEPS.max((8.0 / LobeShape::of(self).narrowness).ceil() as usize);
+        let phi_steps = phi_steps.max((8.0 / LobeShape::of(self).narrowness).ceil() as usize);
         let mut sum = DVec3::ZERO;
-        for i in 0..THETA_STEPS {
-            let x = (i as f64 + 0.5) / THETA_STEPS as f64;
+        for i in 0..theta_steps {
+            let x = (i as f64 + 0.5) / theta_steps as f64;
             let (sin_theta_h, cos_theta_h) = (FRAC_PI_2 * x * x).sin_cos();
             // dw_h = sin(theta_h) dtheta_h dphi_h with dtheta_h = pi x dx.
-            let ring = sin_theta_h * PI * x / THETA_STEPS as f64 * (2.0 * PI / phi_steps as f64);
+            let ring = sin_theta_h * PI * x / theta_steps as f64 * (2.0 * PI / phi_steps as f64);
             for j in 0..phi_steps {
                 let direction = DVec2::from_angle(2.0 * PI * (j as f64 + 0.5) / phi_steps as f64);
                 let h = (direction * sin_theta_h).extend(cos_theta_h);

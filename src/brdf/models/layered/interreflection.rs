@@ -12,7 +12,6 @@
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use glam::{DVec2, DVec3, dvec3};
-use rayon::prelude::*;
 
 use super::coat::{Coat, Interface, at_cosine};
 use crate::brdf::{Brdf, Lambert, half_vector_width, lobe_radius};
@@ -87,10 +86,8 @@ impl Interreflection {
     fn over_any(base: &Brdf, coat: &Coat, interface: &Interface) -> Self {
         let angles = Angles::new(coat);
         let width = half_vector_width(base).min(lobe_radius(base, 0.0));
-        let shares: Vec<Shares> = (0..angles.count())
-            .into_par_iter()
-            .map(|i| Shares::seen_from(&angles, angles.cos_inside(i), base, coat, interface, width))
-            .collect();
+        let seen_from = |i: usize| Shares::seen_from(&angles, angles.cos_inside(i), base, coat, interface, width);
+        let shares = each_on_own_threads(angles.count(), &seen_from);
         let near = angles.near();
         let [red, green, blue] = [0, 1, 2].map(|channel| of_channel(&shares, &near, channel));
         let entering = |i: usize| {
@@ -108,6 +105,20 @@ impl Interreflection {
         haze.iter_mut().for_each(|haze| *haze *= scale);
         Self { lobe, haze }
     }
+}
+
+/// `f` of each index below `count`, in order. Not on rayon's threads: one of these that waits goes on with other work of the pool, which may be to
+/// evaluate this BRDF, and would then wait for itself.
+fn each_on_own_threads<T: Send>(count: usize, f: &(dyn Fn(usize) -> T + Sync)) -> Vec<T> {
+    let part = count.div_ceil(std::thread::available_parallelism().map_or(1, usize::from)).max(1);
+    std::thread::scope(|scope| {
+        let parts = (0..count).step_by(part).map(|first| first..(first + part).min(count));
+        let workers: Vec<_> = parts.map(|part| scope.spawn(move || part.map(f).collect::<Vec<_>>())).collect();
+        let join = |worker: std::thread::ScopedJoinHandle<Vec<T>>| {
+            worker.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+        };
+        workers.into_iter().flat_map(join).collect()
+    })
 }
 
 /// The integral of a table over 2 c dc, by the midpoint rule over sqrt(c).
