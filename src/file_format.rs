@@ -80,7 +80,7 @@ impl<T> FileKind<T> {
         let extension = path.extension().unwrap_or_default();
         self.formats.iter().find(|format| extension.eq_ignore_ascii_case(format.extension)).ok_or_else(|| {
             let problem = format!("is no known kind of {}", self.what);
-            Error::in_file(path, problem, format!("give {}", self.files_or_builtins()))
+            Error::in_file(path, problem, self.remedy_for(&path.to_string_lossy()))
         })
     }
 
@@ -102,15 +102,21 @@ impl<T> FileKind<T> {
         alternatives(self.formats.iter().map(|format| format!(".{}", format.extension)))
     }
 
-    /// The formats, and the names of what is built in.
-    pub fn files_or_builtins(&self) -> String {
+    /// What to give in the place of `name`, which is none of the formats and not built in.
+    pub fn remedy_for(&self, name: &str) -> String {
         let builtin = (self.builtin_names)();
-        if builtin.is_empty() {
-            self.names()
-        } else {
-            format!("{}, or a built-in: {}", self.names(), builtin.join(", "))
+        let files = format!("give {}", self.names());
+        match builtin.iter().find(|builtin| is_misspelt(name, builtin)) {
+            Some(near) => format!("write {near}, or {files}"),
+            None if builtin.is_empty() => files,
+            None => format!("{files}, or a built-in: {}", builtin.join(", ")),
         }
     }
+}
+
+/// Whether `given` is `word` but for a letter in four: others, of which one may begin as another, are farther from each other.
+pub(crate) fn is_misspelt(given: &str, word: &str) -> bool {
+    strsim::damerau_levenshtein(given, word) * 4 <= word.len() && !given.starts_with(word)
 }
 
 /// `a, b or c`.

@@ -6,6 +6,7 @@ use toml::{Table, Value};
 
 use super::Brdf;
 use crate::error::{Error, Result};
+use crate::file_format::is_misspelt;
 
 /// The parameters of one material that have not been read yet.
 pub struct Parameters {
@@ -242,11 +243,6 @@ impl Parameters {
     }
 }
 
-/// Whether `given` is `key` but for a letter in four: other parameters, of which one may begin as another, are farther from each other.
-fn is_misspelt(given: &str, key: &str) -> bool {
-    strsim::damerau_levenshtein(given, key) * 4 <= key.len() && !given.starts_with(key)
-}
-
 /// The error about a key in the table `key`.
 fn inside(error: Error, key: &str) -> Error {
     match error {
@@ -263,7 +259,7 @@ pub(super) fn take_model(table: &mut Table) -> Result<String> {
     match table.remove("model") {
         Some(Value::String(model)) => Ok(model),
         Some(_) => Err(Error::input("model", "is not a string", remedy())),
-        None => Err(Error::input("model", "is missing", remedy())),
+        None => Err(Error::input("model", "is missing, and without one it is no material", remedy())),
     }
 }
 

@@ -41,7 +41,7 @@ impl Environment {
             _ => Err(Error::input(
                 format!("environment `{name}`"),
                 "is not built in",
-                format!("give {}", Environment::FILES.files_or_builtins()),
+                Environment::FILES.remedy_for(name),
             )),
         }
     }

@@ -65,9 +65,9 @@ impl Pyramid {
     }
 
     /// Texels along the edge of a face, such that one at its middle, 2 / face_size rad, is no larger than a pixel at the equator,
-    /// 2 pi / width.
+    /// 2 pi / width and pi / height.
     pub fn face_size_for(environment: &Environment) -> usize {
-        let pixels = (environment.width as f64 / PI).ceil() as usize;
+        let pixels = (environment.width.max(2 * environment.height) as f64 / PI).ceil() as usize;
         pixels.next_power_of_two().clamp(1, MAX_FACE_SIZE)
     }
 
@@ -303,6 +303,15 @@ mod tests {
             let error = ((mean(&pyramid, level) - expected) / expected).abs().max_element();
             assert!(error < tolerance, "{}: level {level} misses {error:e} of the energy", environment.name);
         }
+    }
+
+    #[test]
+    fn a_map_of_more_rows_than_columns_is_as_sharp_as_its_rows() {
+        let horizon = environment(16, 512, |_, y| [f32::from(u8::from(y < 256)); 3]);
+        let up = |deg: f32| Vec3::new(0.1, deg.to_radians().tan(), 1.0).normalize();
+        let pyramid = Pyramid::box_filtered(&horizon);
+        let [above, below] = [1.5, -1.5].map(|deg| pyramid.lookup(up(deg), 0.0).x);
+        assert!(above > 0.95 && below < 0.05, "{above} {below}");
     }
 
     #[test]

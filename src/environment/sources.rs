@@ -2,6 +2,7 @@
 //!
 //! The tails of a lobe matter most under these, and tails are what few kernels fit worst. So they are cut out of what kernels look up,
 //! and shaded by the BRDF itself.
+use std::f64::consts::{PI, TAU};
 use std::ops::Range;
 
 use glam::{DMat2, DVec2, DVec3, Vec4, dvec2, dvec3};
@@ -210,13 +211,13 @@ impl Part {
         }
         let total = luminance(power);
         let centre = moment.try_normalize()?;
-        // The light of a pixel is a tent as wide as two: variance 1/6 of its area.
-        let pixel_variance = environment.solid_angle(pixels[0] / environment.width) / 6.0;
         let (x, y) = centre.any_orthonormal_pair();
-        let mut covariance = DMat2::from_diagonal(DVec2::splat(pixel_variance));
+        let mut covariance = DMat2::ZERO;
         for (direction, of_pixel) in pixels.iter().map(|&pixel| light(environment, pixel)) {
-            let away = dvec2(direction.dot(x), direction.dot(y));
-            covariance += (luminance(of_pixel) / total) * DMat2::from_cols(away * away.x, away * away.y);
+            for away in [direction].into_iter().chain(tent_of_pixel(environment, direction)) {
+                let away = dvec2(away.dot(x), away.dot(y));
+                covariance += (luminance(of_pixel) / total) * DMat2::from_cols(away * away.x, away * away.y);
+            }
         }
         let axes = principal_axes(covariance).map(|axis| axis.x * x + axis.y * y);
         Some(Self { source: LightSource { direction: centre, axes, power }, pixels })
@@ -254,6 +255,15 @@ impl Part {
         let part = |side: &[(f64, f64, usize)]| Self::new(environment, side.iter().map(|&(.., pixel)| pixel).collect());
         [one, other].into_iter().filter_map(part).collect()
     }
+}
+
+/// The light of a pixel is a tent as wide as two along its row and along its column: along both, as long as its standard deviation, in radians.
+fn tent_of_pixel(environment: &Environment, direction: DVec3) -> [DVec3; 2] {
+    let [of_column, of_row] = [TAU / environment.width as f64, PI / environment.height as f64];
+    // Along the parallel, as long as the sine of the angle to the pole. Of a tent of this half width the variance is a sixth of its square.
+    let along_row = dvec3(-direction.z, 0.0, direction.x);
+    let along_column = along_row.cross(direction).normalize();
+    [along_row * of_column / 6_f64.sqrt(), along_column * of_row / 6_f64.sqrt()]
 }
 
 /// How much is lost where light of this power and variance counts as one source. Not in proportion to its power: beside a narrow lobe dim edges
@@ -295,6 +305,23 @@ mod tests {
             let power = 1e6 * map.weight_solid_angle(row);
             assert!((found[0].power.x / power - 1.0).abs() < 1e-9);
             assert!(found[0].width_rad() < 0.03);
+        }
+    }
+
+    #[test]
+    fn a_lamp_of_one_pixel_is_as_long_and_as_wide_as_its_pixel() {
+        for (width, height, row) in [(1024, 512, 5), (1024, 512, 256), (256, 512, 300)] {
+            let map = environment(width, height, |x, y| [if (x, y) == (7, y) && y == row { 1e6 } else { 1.0 }; 3]);
+            let sources = SmallSources::of(&map);
+            let source = &sources.nodes[0].source;
+            let theta = PI * (row as f64 + 0.5) / height as f64;
+            let [along_column, along_row] = [PI / height as f64, TAU * theta.sin() / width as f64];
+            let expected = [along_column.max(along_row), along_column.min(along_row)];
+            for (axis, side) in source.axes.iter().zip(expected) {
+                assert!((axis.length() * 6_f64.sqrt() / side - 1.0).abs() < 1e-6, "{width} x {height}: {axis}, {side}");
+            }
+            let longer_is_vertical = source.axes[0].y.abs() > 0.5 * source.axes[0].length() * theta.sin();
+            assert_eq!(longer_is_vertical, along_column > along_row, "{width} x {height}, row {row}");
         }
     }
 

@@ -125,7 +125,7 @@ pub fn width_rad_of(face_size: usize) -> f64 {
 
 /// 1 - the mean cosine of a vMF kernel, 1 + 1 / kappa - coth(kappa). Mean cosines multiply under convolution.
 fn vmf_deficit(kappa: f64) -> f64 {
-    // Beyond 10, coth is 1 to the last bit of what is left.
+    // Beyond 10, coth is 1 to single precision.
     if kappa > 10.0 { 1.0 / kappa } else { 1.0 + 1.0 / kappa - 1.0 / kappa.tanh() }
 }
 

@@ -131,6 +131,9 @@ const FORMAT: FileFormat<Scene> = FileFormat {
 };
 
 fn parse_file(path: &Path, bytes: &[u8]) -> Result<Scene> {
+    if has_model(bytes) {
+        return Err(Error::in_file(path, "is a material, not a scene", "give it as the material of a scene's object"));
+    }
     parse(text(path, bytes)?, path.parent().unwrap_or(Path::new("")))
         .map_err(|problem| Error::in_file(path, problem, REMEDY))
 }

@@ -45,11 +45,7 @@ impl Mesh {
     pub fn builtin(name: &str) -> Result<Self> {
         match name {
             "sphere" => Ok(cube_sphere(SPHERE_CELLS)),
-            _ => Err(Error::input(
-                format!("mesh `{name}`"),
-                "is not built in",
-                format!("give {}", Self::FILES.files_or_builtins()),
-            )),
+            _ => Err(Error::input(format!("mesh `{name}`"), "is not built in", Self::FILES.remedy_for(name))),
         }
     }
 

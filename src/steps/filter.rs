@@ -11,14 +11,6 @@ use crate::threads::WithThreads;
 use crate::vulkan::{Device, DeviceKind};
 use std::sync::Arc;
 
-/// Texels along the edge of a face of the box-filtered pyramid that the blur begins with: that of its own would show on maps of few
-/// pixels, so their texels are a quarter as large.
-fn face_size_before_blur(environment: &Environment) -> usize {
-    const FEWEST: usize = 512;
-    let face_size = Pyramid::face_size_for(environment);
-    face_size.max((4 * face_size).min(FEWEST))
-}
-
 /// The box-filtered pyramid of an environment.
 pub struct BoxFilter<'a> {
     /// Of what.
@@ -124,7 +116,7 @@ impl Step for Part<'_> {
 pub struct Blur<'a> {
     /// Of what.
     pub environment: &'a Keyed<Environment>,
-    /// What makes it, if that is a GPU; else the processor does. Which does is not part of the key: they agree to 1e-5.
+    /// What makes it, if that is a GPU; else the processor does.
     pub device: Option<&'a Arc<Device>>,
 }
 
@@ -133,13 +125,16 @@ impl Step for Blur<'_> {
     const NAME: &'static str = "environment";
 
     fn key(&self, _: &Memo) -> Result<Key> {
-        Ok(Key::builder("blur").key(self.environment.key).number(vmf_file::FORMAT_VERSION).build())
+        // They round differently, each in its way.
+        let made_by = self.gpu().map_or(Vec::new(), |device| device.driver_id());
+        let of = Key::builder("blur").key(self.environment.key).number(self.face_size() as u64);
+        Ok(of.number(vmf_file::FORMAT_VERSION).bytes(&made_by).build())
     }
 
     fn make(&self, round: &Round) -> Result<VmfPyramid> {
-        let face_size = Some(face_size_before_blur(self.environment));
+        let face_size = Some(self.face_size());
         let source = round.ask(&BoxFilter { environment: self.environment, face_size })?;
-        match self.device.filter(|device| device.description().kind != DeviceKind::Cpu) {
+        match self.gpu() {
             Some(device) => vmf_pyramid(device, &*pipelines(round, device)?, &source, round.observer()),
             None => VmfPyramid::new(&source, round.observer()),
         }
@@ -147,6 +142,20 @@ impl Step for Blur<'_> {
 
     fn stored(&self) -> Option<Stored<'_, VmfPyramid>> {
         Some(Stored { extension: "pyramid", read: Box::new(vmf_file::read), write: Box::new(vmf_file::write) })
+    }
+}
+
+impl<'a> Blur<'a> {
+    /// Texels along the edge of a face of the box-filtered pyramid that it begins with: that of its own would show on maps of few pixels, so
+    /// their texels are a quarter as large.
+    fn face_size(&self) -> usize {
+        const FEWEST: usize = 512;
+        let face_size = Pyramid::face_size_for(self.environment);
+        face_size.max((4 * face_size).min(FEWEST))
+    }
+
+    fn gpu(&self) -> Option<&'a Arc<Device>> {
+        self.device.filter(|device| device.description().kind != DeviceKind::Cpu)
     }
 }
 

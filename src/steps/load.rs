@@ -146,7 +146,7 @@ fn load(memo: &Memo, source: &MaterialSource) -> Result<Brdf> {
     match source {
         MaterialSource::File(path) => Brdf::FILES.parse(path, &memo.file_bytes(path)?),
         MaterialSource::Builtin(name) => Brdf::builtin(name).ok_or_else(|| {
-            let remedy = format!("give {}", Brdf::FILES.files_or_builtins());
+            let remedy = Brdf::FILES.remedy_for(name);
             Error::input(format!("material \"{name}\""), "is neither built in nor a file", remedy)
         }),
         MaterialSource::Model { model, parameters } => Brdf::from_parameters(model, parameters.clone()),

@@ -22,7 +22,7 @@ pub(super) fn read(parameters: &mut Parameters) -> Result<Brdf> {
     match value.as_str() {
         Some(text) if is_file(text) => load_file(Path::new(text)).map_err(|error| error.within(KEY)),
         Some(name) => Brdf::builtin(name).ok_or_else(|| {
-            let remedy = format!("give {}", Brdf::FILES.files_or_builtins());
+            let remedy = Brdf::FILES.remedy_for(name);
             Error::input(KEY, format!("\"{name}\" is neither built in nor a file"), remedy)
         }),
         None => Err(Error::input(KEY, format!("is {value}"), format!("give {what}"))),
