@@ -1,5 +1,7 @@
 #version 450
 // The floor of shading: as many trilinear lookups in the environment's pyramid as a method makes, and nothing else.
+#extension GL_GOOGLE_include_directive : require
+#include "circle.glsl"
 
 layout(local_size_x = 64) in;
 
@@ -30,8 +32,8 @@ void main() {
     uint row = uint(float(group) / float(group_count) * float(push.row_count));
     // With rows they are points of a spiral over the hemisphere, which are as far from each other along it as across it.
     float turns = sqrt(float(push.pixel_count) / radians(360.0));
-    float turn = radians(360.0) * fract(turns * (float(pixel) / float(push.pixel_count)));
-    mat2 turned = mat2(cos(turn), sin(turn), -sin(turn), cos(turn));
+    vec2 turn = on_circle(fract(turns * (float(pixel) / float(push.pixel_count))));
+    mat2 turned = mat2(turn.x, turn.y, -turn.y, turn.x);
     vec3 sum = vec3(0.0);
     uint k = 0;
     do {

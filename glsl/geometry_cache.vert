@@ -19,9 +19,10 @@ void main() {
     vec3 from_eye = vec3(dot(object.to_eye[0], at), dot(object.to_eye[1], at), dot(object.to_eye[2], at));
     eye_position = from_eye;
     // Cofactors of the linear part: the normal matrix up to scale, right for mirrored and sheared objects too.
-    // Taken relative to the object's scale, whose square could leave the range of floats.
+    // Taken relative to the largest entry, since squares of any could leave the range of floats.
     mat3 linear_part = transpose(mat3(object.to_eye[0].xyz, object.to_eye[1].xyz, object.to_eye[2].xyz));
-    linear_part /= length(linear_part[0]);
+    vec3 largest = max(max(abs(linear_part[0]), abs(linear_part[1])), abs(linear_part[2]));
+    linear_part /= max(max(largest.x, largest.y), largest.z);
     mat3 cofactors = mat3(cross(linear_part[1], linear_part[2]), cross(linear_part[2], linear_part[0]),
                           cross(linear_part[0], linear_part[1]));
     world_normal = cofactors * normal;

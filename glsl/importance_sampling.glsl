@@ -52,7 +52,7 @@ SliceRows slice_rows(Surface surface, Material material, vec3 w_o) {
         rows.below += before * rows.next_azimuth;
         rows.above += before * rows.next_azimuth;
         rows.towards_next = folded.x - float(before);
-        rows.phi_o = vec2(cos(folded.x * AZIMUTH_STEP), sin(folded.x * AZIMUTH_STEP));
+        rows.phi_o = on_circle(folded.x * (AZIMUTH_STEP / radians(360.0)));
         rows.side = folded.y;
     }
     return rows;

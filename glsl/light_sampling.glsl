@@ -32,7 +32,8 @@ vec3 sample_light(uvec4 bits) {
     // Beyond the poles the pixel's row is clamped; folding the tent back there gives just that weight.
     float y = abs(float(pixel / uint(size.x)) + 0.5 + tent(u.w)) / float(size.y);
     y = y > 1.0 ? 2.0 - y : y;
-    vec2 around = on_circle(x);
+    // Half a pixel beyond the seam is on the other side of it.
+    vec2 around = on_circle(fract(x));
     float theta = radians(180.0) * y;
     return vec3(sin(theta) * around.y, cos(theta), -sin(theta) * around.x);
 }

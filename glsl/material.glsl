@@ -43,7 +43,8 @@ vec4 brdf_table_texel(vec3 texel_coordinate) {
 
 layout(set = 0, binding = 16) uniform sampler3D made_brdf_tables;
 
-// Texel (|cos phi_d|, 1 - tan(theta_d / 2), tan(theta_h / 2)) of the atlas of tables that were made, between texel centres trilinearly.
+// A texel of the atlas of tables that were made, between texel centres trilinearly: its axes are those of brdf/tabulated.glsl, or of
+// brdf/tabulated_anisotropic.glsl.
 vec4 made_table_texel(vec3 texel_coordinate) {
     return textureLod(made_brdf_tables, texel_coordinate / vec3(textureSize(made_brdf_tables, 0)), 0.0);
 }

@@ -13,7 +13,7 @@
 layout(local_size_x = TILE_PIXELS) in;
 
 layout(constant_id = 0) const uint SUBPIXELS = 2; // per axis
-layout(constant_id = 5) const uint HAS_TANGENTS = 0; // 0: no material of the scene needs them
+layout(constant_id = 5) const uint HAS_TANGENTS = 0; // 0: no material that it shades needs them
 // 0: pixels at edges, whose sub-pixels share nothing. A driver that masks lanes out would have each of them pay for what interior ones share.
 layout(constant_id = 7) const uint IS_INTERIOR = 1;
 layout(constant_id = 8) const uint HAS_ONE_MATERIAL = 0; // 1: the scene has no other

@@ -35,19 +35,31 @@ Surface mean_surface(uvec2 pixel) {
     return mean;
 }
 
+// How many sub-pixels of a pixel within one surface are sums of their own: of more than 2 x 2 one in each row and column, so that these are no
+// fewer threads each. Twin: sums_of_pixel in src/threads/fitted/sets.rs.
+uint sums_of_pixel(uint subpixels) {
+    return subpixels > 2 ? subpixels : subpixels * subpixels;
+}
+
+// Which sub-pixel sum j of these is. Twin: place_of_sum in src/threads/fitted/sets.rs.
+uvec2 place_of_sum(uint j, uint subpixels) {
+    // Of 4 x 4 they are in rows 1, 3, 0 and 2, of 3 x 3 in 1, 0 and 2.
+    return subpixels > 2 ? uvec2(j, (2 * j + 1) % (subpixels | 1)) : uvec2(j % subpixels, j / subpixels);
+}
+
 vec4 shade_pixel(uvec2 pixel, bool interior) {
     uint parts = SUBPIXELS * SUBPIXELS;
     Surface surface;
     if (interior) {
         surface = mean_surface(pixel);
         uvec2 texel = texelFetch(geometry, ivec2(pixel * SUBPIXELS), 0).xy;
-        parts = needs_subpixels(surface, material_of(texel)) ? parts : 1;
+        parts = needs_subpixels(surface, material_of(texel)) ? sums_of_pixel(SUBPIXELS) : 1;
     }
     bool shares = interior && parts == 1;
     vec4 sum = vec4(0.0);
     uint j = 0;
     do {
-        uvec2 place = pixel * SUBPIXELS + uvec2(j % SUBPIXELS, j / SUBPIXELS);
+        uvec2 place = pixel * SUBPIXELS + (interior ? place_of_sum(j, SUBPIXELS) : uvec2(j % SUBPIXELS, j / SUBPIXELS));
         uvec2 texel = texelFetch(geometry, ivec2(place), 0).xy;
         if (is_covered(texel)) {
             if (!shares) {

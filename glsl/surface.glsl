@@ -11,7 +11,7 @@ struct Surface {
     float theta_o;
     // Variance of the normal within the pixel along each axis, in rad^2, and a quarter of that of the view, where sub-pixels share one sum; else 0.
     float normal_variance;
-    // Cosine and sine of phi_o, the azimuth of w_o from the tangent; (1, 0) where no material of the scene needs it.
+    // Cosine and sine of phi_o, the azimuth of w_o from the tangent; (1, 0) where no material that is shaded needs it.
     vec2 phi_o;
 };
 

@@ -1,8 +1,8 @@
 // The tiles to shade, shared by the pass that lists them and those that go by that.
 // Twin of the layout: src/passes/classify.rs.
 //
-// Pixels are packed tile by tile rather than over the whole image, and listed in parts of a tile: then the pixels of a part are
-// the same, in the same order, in every run. On a CPU device the last bit of a lookup depends on the lookups of its neighbours.
+// Pixels are packed tile by tile rather than over the whole image, and listed in parts of a tile: then on a CPU device the pixels of a part are
+// the same, in the same order, in every run. There the last bit of a lookup depends on the lookups of its neighbours.
 
 // Pixels on the side of a tile, which is a workgroup of the pass that lists them.
 const uint TILE_SIDE = 8u;

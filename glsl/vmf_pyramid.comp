@@ -1,6 +1,6 @@
 #version 450
 // One level of the pyramid of vMF kernels: the environment convolved with a kernel, from a finer level of it.
-// Twin: src/environment/vmf_pyramid.rs, by functions of the same names.
+// Twin: src/environment/vmf_pyramid.rs.
 #extension GL_GOOGLE_include_directive : require
 #include "cube.glsl"
 
@@ -75,7 +75,8 @@ uvec2 cone_range(float x, float z, float sin_cone, uint size) {
     // The shadow of the cone is between these two directions.
     vec2 along = vec2(x, z) / shadow;
     float s = sin_cone / shadow;
-    float c = sqrt(1.0 - s * s);
+    // Divisions may err by so little that s is above 1.
+    float c = sqrt(max(1.0 - s * s, 0.0));
     // Behind the face a cone may reach beyond the opposite of its axis.
     float low = z < 0.0 && x < 0.0 ? -1.0 : face_place(vec2(along.x * c - along.y * s, along.y * c + along.x * s));
     float high = z < 0.0 && x >= 0.0 ? 1.0 : face_place(vec2(along.x * c + along.y * s, along.y * c - along.x * s));

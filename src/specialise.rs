@@ -1,6 +1,6 @@
 //! By which constants shaders are specialised for what a scene has: what it does not need is compiled out.
 use crate::light::{BlurredLight, KernelNeeds, sharp_from};
-use crate::passes::{MAX_SHADERS, ShaderOfMaterial, models_used};
+use crate::passes::{ShaderOfMaterial, models_used};
 use crate::prepare::{Prepared, PreparedMaterial};
 use crate::scene::Pattern;
 use crate::threads::Threads;
@@ -24,8 +24,8 @@ pub(crate) struct ShadersOfMaterials {
 }
 
 impl ShadersOfMaterials {
-    /// For `prepared`, under this light of fitted threads if its method looks that up.
-    pub fn new(prepared: &Prepared, light: Option<&BlurredLight>) -> Self {
+    /// For `prepared`, under this light of fitted threads if its method looks that up; so many at most.
+    pub fn new(prepared: &Prepared, light: Option<&BlurredLight>, most: usize) -> Self {
         let of_each = prepared.materials.iter().map(|material| {
             let constants = |needs| shade_constants(prepared, std::slice::from_ref(material), needs);
             // Drafts follow each other faster than shaders could be compiled for what each of them needs.
@@ -41,7 +41,7 @@ impl ShadersOfMaterials {
             }
         });
         let of_all = shade_constants(prepared, &prepared.materials, light.map(|light| light.needs));
-        Self::of(&of_each.collect::<Vec<_>>(), of_all)
+        Self::of(&of_each.collect::<Vec<_>>(), of_all, most)
     }
 
     /// What the shader of each class of pixels is specialised by: of interior pixels and of those at edges, shader by shader.
@@ -52,11 +52,11 @@ impl ShadersOfMaterials {
     }
 
     /// Where each material needs these constants, but those of all where cos theta_o is less, and all together need `of_all`; that is also the shader of
-    /// materials beyond [`MAX_SHADERS`].
-    fn of(of_each: &[(Constants, f32)], of_all: Constants) -> Self {
+    /// materials beyond the `most` that there may be.
+    fn of(of_each: &[(Constants, f32)], of_all: Constants, most: usize) -> Self {
         let mut constants: Vec<Constants> = Vec::new();
         for (needed, _) in of_each {
-            if constants.len() + 1 < MAX_SHADERS && !constants.contains(needed) {
+            if constants.len() + 1 < most && !constants.contains(needed) {
                 constants.push(needed.clone());
             }
         }
@@ -111,6 +111,7 @@ fn shade_constants(prepared: &Prepared, materials: &[PreparedMaterial], needs: O
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::passes::MAX_SHADERS;
 
     fn needing(models: u32) -> Constants {
         vec![("SUBPIXELS", 2), ("MODELS_USED", models)]
@@ -121,7 +122,7 @@ mod tests {
         let of = |models: &[u32]| {
             let all = models.iter().fold(0, |all, models| all | models);
             let of_each: Vec<_> = models.iter().map(|models| (needing(*models), ShaderOfMaterial::NEVER)).collect();
-            let shaders = ShadersOfMaterials::of(&of_each, needing(all));
+            let shaders = ShadersOfMaterials::of(&of_each, needing(all), MAX_SHADERS);
             let constants: Vec<_> = shaders.constants.iter().map(|constants| constants[1].1).collect();
             let of_materials: Vec<_> = shaders.of_materials.iter().map(|of_material| of_material.shader).collect();
             (constants, of_materials, shaders.of_mixed)
@@ -142,7 +143,7 @@ mod tests {
     fn a_material_that_needs_more_at_grazing_views_has_the_shader_for_all_there() {
         let of_each = [(needing(1), 0.2), (needing(1), ShaderOfMaterial::NEVER)];
         for materials in [&of_each[..1], &of_each] {
-            let shaders = ShadersOfMaterials::of(materials, needing(3));
+            let shaders = ShadersOfMaterials::of(materials, needing(3), MAX_SHADERS);
             assert_eq!((shaders.constants, shaders.of_mixed), (vec![needing(1), needing(3)], 1));
             let cosines = shaders.of_materials.iter().map(|of_material| (of_material.shader, of_material.cos_grazing));
             assert!(cosines.eq(materials.iter().map(|(_, cosine)| (0, *cosine))));

@@ -9,7 +9,7 @@
 #include "threads/rim.glsl"
 #include "vmf_pyramid.glsl"
 
-// What no kernel and no light of the scene needs is compiled out.
+// What no kernel of what is shaded and no light of the scene needs is compiled out.
 layout(constant_id = 2) const uint HAS_SOURCES = 1;          // 0: the environment has none
 layout(constant_id = 3) const uint HAS_MIRRORED_SOURCES = 1; // 0: no lobe mirrors them
 layout(constant_id = 4) const uint HAS_SHARP_KERNELS = 1;    // 0: no kernel is sharper than the pyramid

@@ -8,7 +8,7 @@ use super::tables::{Section, Table, in_order};
 use crate::error::Result;
 use crate::memo::{Memo, Round};
 use crate::method::Method;
-use crate::passes::{GEOMETRY_STATE, geometry_shaders};
+use crate::passes::{GEOMETRY_STATE, MAX_SHADERS, geometry_shaders};
 use crate::prepare::{Prepared, prepare};
 use crate::progress::Observer;
 use crate::scene::{Background, Scene};
@@ -112,7 +112,7 @@ fn shaders_of(prepared: &Prepared, round: &Round) -> Result<ShadersOfMaterials> 
         true => Some(blurred_light(round, None, environment, &prepared.shaded(), false)?),
         false => None,
     };
-    Ok(ShadersOfMaterials::new(prepared, light.as_ref()))
+    Ok(ShadersOfMaterials::new(prepared, light.as_ref(), MAX_SHADERS))
 }
 
 /// The columns of the table, by RADV's names: Mesa 22.3's, and what Mesa 25 calls the same.

@@ -26,6 +26,14 @@ const WIDEST_VARIANCE: f32 = 4e-3;
 /// How many shaders there can be at most: each is compiled twice and has two lists of pixels. glsl/classify.comp has room for 32.
 pub const MAX_SHADERS: usize = 16;
 
+/// How many of them a picture of `view` may have where shaders see buffers of so many bytes: the lists of all classes are in one.
+pub fn most_shaders(view: &View, max_buffer_bytes: u32) -> usize {
+    let [columns, rows] = [view.width, view.height].map(|side| u64::from(side.next_multiple_of(TILE_SIDE)));
+    // Interior and edge pixels of each shader have room for all parts of all tiles, of 4 bytes.
+    let bytes_a_shader = 2 * 4 * (columns * rows / PART_PIXELS);
+    (u64::from(max_buffer_bytes) / bytes_a_shader.max(1)).clamp(1, MAX_SHADERS as u64) as usize
+}
+
 /// What the pass counts: `Counted` in glsl/tiles.glsl. Its buffer goes on with the tiles of each class: interior and edge pixels of each shader.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
@@ -39,6 +47,9 @@ pub struct Counters {
     /// Those among them that are in edge pixels.
     pub covered_edge_subpixels: u32,
 }
+
+/// Pixels on the side of a tile: the same in glsl/tiles.glsl.
+const TILE_SIDE: u32 = 8;
 
 /// Pixels of a part of a tile, at most: the same in glsl/tiles.glsl.
 const PART_PIXELS: u64 = 8;

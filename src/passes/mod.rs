@@ -24,7 +24,8 @@ mod vmf_pyramid;
 pub use background::{Background, BackgroundMap, background};
 pub use bare_lookups::{BareLookup, BareLookups, bare_lookups};
 pub use classify::{
-    Classify, Counters, MAX_SHADERS, SMOOTH_DEG, ShaderOfMaterial, SmoothVariance, Tiles, classify, upload_shaders,
+    Classify, Counters, MAX_SHADERS, SMOOTH_DEG, ShaderOfMaterial, SmoothVariance, Tiles, classify, most_shaders,
+    upload_shaders,
 };
 pub use cube_borders::WayAround;
 pub use device_check::{Answers, Questions, Volume, ask};

@@ -150,16 +150,14 @@ mod tests {
     use super::*;
     use crate::brdf::{Brdf, SeenBrdf, luminance};
     use crate::shading::random::random_bits;
-    use crate::threads::test_materials;
+    use crate::threads::test_materials::{self, InSlices};
     use glam::{DVec3, UVec2, dvec3};
 
     /// The hard ones: a lobe of 0.3 degrees, a lobe on a diffuse base, a measured table.
-    fn materials() -> impl Iterator<Item = (&'static str, Brdf)> {
+    fn materials() -> impl Iterator<Item = &'static InSlices> {
         let hard = ["conductor 0.005", "plastic", "alumina-oxide"];
-        test_materials::all()
-            .into_iter()
-            .filter(move |(name, _)| hard.contains(name))
-            .chain(test_materials::anisotropic())
+        let is_hard = move |material: &&InSlices| hard.contains(&material.name) || !material.brdf.is_isotropic();
+        test_materials::in_slices().iter().filter(is_hard)
     }
 
     /// Azimuths of the view at which `brdf` is drawn from, in degrees: on rows, between them, and where its mirror image is seen.
@@ -187,11 +185,10 @@ mod tests {
     #[test]
     fn the_density_is_that_of_the_drawn_directions() {
         // The mean of g / p is the integral of g, for g of any shape: moments of the cosine lobe, wide against cells.
-        for (name, brdf) in materials() {
-            let table = SliceTable::new(&brdf);
-            for (theta_o_deg, phi_o_deg) in views(&brdf, &[0.0, 33.3, 70.6, 89.7]) {
+        for InSlices { name, brdf, table } in materials() {
+            for (theta_o_deg, phi_o_deg) in views(brdf, &[0.0, 33.3, 70.6, 89.7]) {
                 let w_o = view(theta_o_deg);
-                let rows = SliceRows::new(&table, w_o, Vec2::from_angle(phi_o_deg.to_radians()));
+                let rows = SliceRows::new(table, w_o, Vec2::from_angle(phi_o_deg.to_radians()));
                 let draws = 100_000;
                 let directions = drawn(&rows, w_o, draws);
                 let mirror = dvec3(-f64::from(w_o.x), 0.0, f64::from(w_o.z));
@@ -258,13 +255,12 @@ mod tests {
     #[test]
     fn directions_fall_where_the_density_says_by_the_chi_square_test() {
         use statrs::distribution::{ChiSquared, ContinuousCDF};
-        let all = [test_materials::all(), test_materials::anisotropic()].concat();
+        let all = test_materials::in_slices();
         assert!(all.len() >= 8);
-        for (name, brdf) in all {
-            let table = SliceTable::new(&brdf);
-            for (theta_o_deg, phi_o_deg) in views(&brdf, &[0.0, 33.3, 70.6]) {
+        for InSlices { name, brdf, table } in all {
+            for (theta_o_deg, phi_o_deg) in views(brdf, &[0.0, 33.3, 70.6]) {
                 let w_o = view(theta_o_deg);
-                let rows = SliceRows::new(&table, w_o, Vec2::from_angle(phi_o_deg.to_radians()));
+                let rows = SliceRows::new(table, w_o, Vec2::from_angle(phi_o_deg.to_radians()));
                 const DRAWS: u32 = 20_000;
                 let masses = bin_masses(&rows, w_o);
                 let mut counts = vec![0.0; masses.len()];
@@ -298,10 +294,9 @@ mod tests {
     #[test]
     fn f_cos_over_p_stays_near_the_albedo() {
         // What importance sampling is for: the spread of f cos / p, in a white furnace all of the noise, is small.
-        for (name, brdf) in materials() {
-            let table = SliceTable::new(&brdf);
-            for (theta_o_deg, phi_o_deg) in views(&brdf, &[0.0, 33.3, 70.6, 85.5]) {
-                let spread = spread(&brdf, &table, theta_o_deg, phi_o_deg);
+        for InSlices { name, brdf, table } in materials() {
+            for (theta_o_deg, phi_o_deg) in views(brdf, &[0.0, 33.3, 70.6, 85.5]) {
+                let spread = spread(brdf, table, theta_o_deg, phi_o_deg);
                 println!("{name}, {theta_o_deg}, {phi_o_deg}: standard deviation {spread:.3} of the mean");
                 assert!(spread < 0.35, "{name}, {theta_o_deg}, {phi_o_deg}: standard deviation {spread} of the mean");
             }
@@ -323,10 +318,10 @@ mod tests {
 
     #[test]
     fn rows_of_the_views_own_azimuth_leave_a_part_of_the_noise_of_the_mean_over_azimuths() {
-        for (name, brdf) in test_materials::anisotropic() {
-            let (own, mean) = (SliceTable::new(&brdf), SliceTable::of_mean(&brdf));
-            for (theta_o_deg, phi_o_deg) in views(&brdf, &[5.0, 33.3, 70.6]) {
-                let [own, mean] = [&own, &mean].map(|table| spread(&brdf, table, theta_o_deg, phi_o_deg));
+        for InSlices { name, brdf, table } in materials().filter(|material| !material.brdf.is_isotropic()) {
+            let mean = SliceTable::of_mean(brdf);
+            for (theta_o_deg, phi_o_deg) in views(brdf, &[5.0, 33.3, 70.6]) {
+                let [own, mean] = [table, &mean].map(|table| spread(brdf, table, theta_o_deg, phi_o_deg));
                 println!("{name}, {theta_o_deg}, {phi_o_deg}: {own:.3} of the mean, {mean:.3}");
                 assert!(own < 0.3 * mean, "{name}, {theta_o_deg}, {phi_o_deg}: {own} {mean}");
             }

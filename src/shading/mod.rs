@@ -14,6 +14,7 @@ use crate::prepare::{Prepared, PreparedMaterial};
 use crate::scene::Pattern;
 use crate::steps::{FitSplitSum, Tabulate, TabulateSlices, light};
 use crate::tangent::any_tangent;
+use crate::threads::fitted::{place_of_sum, sums_of_pixel};
 use crate::threads::{FittedTable, SliceTable, SplitSum, Threads};
 use glam::{Mat3, UVec2, Vec2, Vec3, Vec4};
 use low_discrepancy::Stream;
@@ -255,13 +256,19 @@ impl<'a> CpuShader<'a> {
                 return point.estimate().extend(1.0);
             }
         }
-        let points = texels.iter().enumerate().filter_map(|(j, texel)| {
-            let mut point = self.subpixel(pixel, j, *texel)?;
+        let subpixels = self.prepared.view.subpixels;
+        let places: Vec<u32> = match interior {
+            true => (0..sums_of_pixel(subpixels)).map(|j| place_of_sum(j, subpixels)).collect(),
+            false => (0..subpixels * subpixels).collect(),
+        };
+        let points = places.iter().enumerate().filter_map(|(j, &place)| {
+            let place = place as usize;
+            let mut point = self.subpixel(pixel, place, texels[place])?;
             let sets = point.fitted_threads().map_or(1, |table| table.sets);
             (point.first, point.stride) = ((j % sets) as u32, sets);
             Some(point)
         });
-        points.map(|point| point.estimate().extend(1.0)).sum::<Vec4>() / texels.len() as f32
+        points.map(|point| point.estimate().extend(1.0)).sum::<Vec4>() / places.len() as f32
     }
 
     /// The surface that is seen at a place in the picture, from 0 to 1. Twin of `surface_at` in glsl/shade.comp.

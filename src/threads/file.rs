@@ -171,7 +171,10 @@ fn decode(bytes: &[u8]) -> Result<Threads, String> {
     if !base.iter().all(|term| term.is_finite()) {
         return Err("has a header with a `base` that is not of finite numbers".into());
     }
-    if count == 0 || rows == 0 || !is_possible || expected != Some(payload.len()) {
+    if !(1..=kind.max_count()).contains(&count) {
+        return Err(format!("has {count} threads, where there are 1 to {}", kind.max_count()));
+    }
+    if rows == 0 || !is_possible || expected != Some(payload.len()) {
         return Err("has a header that does not fit its content".into());
     }
     let words: Vec<u32> = payload.as_chunks().0.iter().map(|&word| u32::from_le_bytes(word)).collect();

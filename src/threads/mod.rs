@@ -228,7 +228,7 @@ pub struct ThreadSettings {
     pub kind: ThreadKind,
     /// Number of threads m, 1 to [`ThreadKind::max_count`].
     pub count: usize,
-    /// Number of view angles, evenly spaced from 0 to just below 90 degrees; at least 1, the paper's is 90.
+    /// Number of view angles, evenly spaced from 0 to 90 degrees, but the last of them is 89.99; at least 1, the paper's is 90.
     pub rows: usize,
     /// Where the first row's points start.
     pub seed: u64,

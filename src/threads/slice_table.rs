@@ -76,13 +76,12 @@ fn tabulated<'a>(count: usize, slice: impl Fn(usize) -> Slice<'a> + Sync) -> Vec
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::threads::test_materials;
+    use crate::threads::test_materials::{self, InSlices};
 
     #[test]
     fn every_cdf_rises_from_0_to_1() {
-        for (name, brdf) in [test_materials::all(), test_materials::anisotropic()].concat() {
-            let table = SliceTable::new(&brdf);
-            let expected = match name {
+        for InSlices { name, table, .. } in test_materials::in_slices() {
+            let expected = match *name {
                 "brushed" => [19, AZIMUTH_ROWS],
                 "brushed aslant" => [37, AZIMUTH_ROWS],
                 "leaning" => [73, AZIMUTH_ROWS],

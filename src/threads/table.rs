@@ -73,7 +73,9 @@ impl ThreadTable {
     /// to the albedo than with a linear blend (F4). Beyond the last row that row holds.
     pub fn interpolate(&self, theta_o: f64, thread: usize) -> (DVec3, f64) {
         let (low, high, t) = rows_around(theta_o, self.rows);
-        interpolate(&self.row(low)[thread], &self.row(high)[thread], t)
+        let [a, b] = [low, high].map(|row| &self.row(row)[thread]);
+        let (p_a, p_b) = (f64::from(a.p), f64::from(b.p));
+        (a.direction().lerp(b.direction(), t).normalize(), p_a * (p_b / p_a).powf(t))
     }
 
     /// The buffer of the shader. Row by row: the albedo, then the threads as [`Sample::device_vector`].
@@ -110,10 +112,4 @@ impl ThreadTable {
         }
         Ok(Self { rows: 0, count: 0, seed: 0, material: String::new(), rim_power: EVEN, albedo, samples })
     }
-}
-
-/// Direction and pdf at the part `t` of the way from `a` to `b`, the same thread one row on.
-fn interpolate(a: &Sample, b: &Sample, t: f64) -> (DVec3, f64) {
-    let (p_a, p_b) = (f64::from(a.p), f64::from(b.p));
-    (a.direction().lerp(b.direction(), t).normalize(), p_a * (p_b / p_a).powf(t))
 }

@@ -4,6 +4,7 @@ use std::sync::LazyLock;
 
 use glam::{DVec3, dvec2};
 
+use super::slice_table::SliceTable;
 use crate::brdf::{Brdf, CustomBrdf, MerlTable};
 
 static NARROW: LazyLock<Brdf> = LazyLock::new(|| conductor("ggx", 0.005));
@@ -76,6 +77,22 @@ pub fn anisotropic() -> Vec<(&'static str, Brdf)> {
         ),
         ("leaning", Brdf::custom(Leaning)),
     ]
+}
+
+/// A material of [`all`] or [`anisotropic`] with its CDFs.
+pub struct InSlices {
+    pub name: &'static str,
+    pub brdf: Brdf,
+    pub table: SliceTable,
+}
+
+/// All of them. Made once: it takes seconds.
+pub fn in_slices() -> &'static [InSlices] {
+    static IN_SLICES: LazyLock<Vec<InSlices>> = LazyLock::new(|| {
+        let with_table = |(name, brdf): (&'static str, Brdf)| InSlices { name, table: SliceTable::new(&brdf), brdf };
+        [all(), anisotropic()].concat().into_iter().map(with_table).collect()
+    });
+    &IN_SLICES
 }
 
 /// The kinds of material that threads have to work for, by name.

@@ -42,7 +42,7 @@ pub(super) const MOST_MOVED: f64 = 0.06;
 const MOST_BETWEEN: f64 = 1.1;
 
 /// Test lights of a row: so many, and so many more for each thread. Of too few, many threads answer each alone and err between them: with
-/// 64 threads 1536 lights leave a tenth less error than 1200. Up to 16 threads have the same lights, which are made once for all of them.
+/// 64 threads 1536 lights leave a tenth less error than 1200. Up to 16 threads have the same lights.
 const FEWEST_LIGHTS: usize = 1000;
 const LIGHTS_A_THREAD: usize = 8;
 const FEWEST_THREADS: usize = 16;

@@ -42,7 +42,12 @@ fn light_width(scale: usize) -> f64 {
 /// Points of equal mass of the narrowest light in `direction`; some may be below the horizon.
 pub fn points_of_narrowest(direction: DVec3) -> Vec<DVec3> {
     const COUNT: usize = 200;
-    fibonacci_lattice(COUNT).map(|uv| vmf_direction(direction, light_kappa(0), uv.x, TAU * uv.y)).collect()
+    points_of(direction, light_kappa(0), COUNT)
+}
+
+/// So many points of equal mass of the kernel of this kappa in `direction`.
+fn points_of(direction: DVec3, kappa: f64, count: usize) -> Vec<DVec3> {
+    fibonacci_lattice(count).map(|uv| vmf_direction(direction, kappa, uv.x, TAU * uv.y)).collect()
 }
 
 /// Lights, how strongly each counts, and what a slice makes of them. A light has radiance vMF(w; direction, kappa), so unit power.
@@ -179,7 +184,7 @@ impl Quadrature {
         for scale in 0..SCALES {
             let kappa = light_kappa(scale);
             let peak = vmf_peak(kappa);
-            let offsets = kernel_points(kappa, self.light_points);
+            let offsets = points_of(DVec3::Z, kappa, self.light_points);
             for j in each * scale..each * (scale + 1) {
                 let (x, y) = directions[j].any_orthonormal_pair();
                 let points =
@@ -286,7 +291,7 @@ impl BaseAnswers {
         static INTEGRALS: OnceLock<Vec<Vec<CosineIntegrals>>> = OnceLock::new();
         let integrals = INTEGRALS.get_or_init(|| {
             let of_scale = |scale| {
-                let points = kernel_points(light_kappa(scale), 512);
+                let points = points_of(DVec3::Z, light_kappa(scale), 512);
                 (0..=STEPS).map(|i| cosine_integrals(2.0 * i as f64 / STEPS as f64 - 1.0, &points)).collect()
             };
             (0..SCALES).map(of_scale).collect()
@@ -321,9 +326,4 @@ fn cosine_integrals(z: f64, points: &[DVec3]) -> CosineIntegrals {
         }
     }
     sums.map(|sum| FRAC_1_PI * sum / points.len() as f64)
-}
-
-/// So many points of equal mass of the kernel of this kappa around z.
-fn kernel_points(kappa: f64, count: usize) -> Vec<DVec3> {
-    fibonacci_lattice(count).map(|uv| vmf_direction(DVec3::Z, kappa, uv.x, TAU * uv.y)).collect()
 }

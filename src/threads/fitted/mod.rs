@@ -37,7 +37,7 @@ mod validate;
 pub use draft::draft;
 pub use generate::generate;
 pub use giving_way::GivingWay;
-pub use sets::NEARLY_FLAT_RAD;
+pub use sets::{NEARLY_FLAT_RAD, place_of_sum, sums_of_pixel};
 pub(super) use sets::{count_and_sets, shared_deviation};
 pub use table::{FittedTable, PackedKernel, UnpackedKernel, UsedThreads};
 pub use validate::validation_error;

@@ -196,8 +196,8 @@ impl FittedTable {
         let kernels: Vec<_> = kernels.iter().copied().map(PackedKernel).collect();
         let albedo: Vec<[f32; 3]> = of_rows.iter().map(|&[r, g, b, _]| [r, g, b].map(f32::from_bits)).collect();
         let relative_error: Vec<f32> = of_rows.iter().map(|&[.., error]| f32::from_bits(error)).collect();
-        if !albedo.iter().flatten().chain(&relative_error).all(|value| value.is_finite()) {
-            return Err("holds a row that is not of finite numbers".into());
+        if !albedo.iter().flatten().chain(&relative_error).all(|value| (0.0..=f32::MAX).contains(value)) {
+            return Err("holds a row whose albedo or error is none".into());
         }
         if !kernels.iter().all(|kernel| kernel.is_usable()) {
             return Err("holds a thread whose level or weight is none".into());
