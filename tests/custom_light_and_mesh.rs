@@ -205,3 +205,32 @@ fn a_mesh_far_from_its_own_origin_is_seen_as_near_it() {
     }
     gpu.finish();
 }
+
+#[test]
+fn a_mesh_of_any_size_in_its_own_units_is_seen_as_one_of_usual_size() {
+    let gpu = Validated::new();
+    let (positions, triangles, _) = sheet();
+    // So wavy that facets and the normals between them are far apart.
+    let normals: Vec<_> = positions.iter().map(|at| Vec3::new(at[0], at[1], 1.0).normalize().to_array()).collect();
+    let seen = |size: f32| {
+        let scaled = positions.iter().map(|at| at.map(|x| x * size)).collect();
+        let mesh = CustomMesh::new("sheet", scaled, triangles.clone(), Some(normals.clone()), None).unwrap();
+        let mut scene = sphere(model("model = 'lambert'\nreflectance = 0.5"), "white", 1, (48, 36));
+        scene.shading.method = Method::Uniform;
+        scene.objects[0].mesh = mesh.into();
+        scene.objects[0].scale = 1.0 / size;
+        let geometry = gpu.render(&ready(&scene), Wanted { geometry: true, ..Wanted::default() }).geometry;
+        geometry.into_iter().map(|texel| GeometryTexel::unpack(UVec2::from_array(texel))).collect::<Vec<_>>()
+    };
+    let expected = seen(1.0);
+    for size in [1e-21, 1e-10, 1e10, 1e21] {
+        let mut count = 0;
+        for (found, expected) in seen(size).into_iter().zip(&expected) {
+            let (Some(found), Some(expected)) = (found, expected) else { continue };
+            assert!(found.normal.distance(expected.normal) < 1e-3, "{size}: {} {}", found.normal, expected.normal);
+            count += 1;
+        }
+        assert!(count > 1000, "{size}: {count}");
+    }
+    gpu.finish();
+}

@@ -23,12 +23,9 @@ fn a_device_without_semaphores_is_refused_and_nothing_of_it_is_left() {
         .envs([("VK_DRIVER_FILES", driver), ("VK_ICD_FILENAMES", driver)])
         .output()
         .expect("a process");
-    assert!(
-        test.status.success(),
-        "{}{}",
-        String::from_utf8_lossy(&test.stdout),
-        String::from_utf8_lossy(&test.stderr)
-    );
+    let said = String::from_utf8_lossy(&test.stdout);
+    // Of a name that there is not no test fails.
+    assert!(test.status.success() && said.contains("1 passed"), "{said}{}", String::from_utf8_lossy(&test.stderr));
 }
 
 #[test]

@@ -24,8 +24,8 @@ fn two_hundred_changes_do_not_grow_memory() {
         let alpha = 0.2 + 0.003 * f64::from(change);
         let parameters = format!("reflectance = [{alpha}, 0.5, 0.5]").parse().unwrap();
         scene.materials[0].source = MaterialSource::Model { model: "lambert".into(), parameters };
-        scene.environment.source = Source::Builtin(environments[change as usize / 10 % 2].into());
-        scene.shading.method = if change % 7 == 0 { Method::Cosine } else { Method::Paper };
+        scene.environment.source = Source::Builtin(environments[change as usize / 20 % 2].into());
+        scene.shading.method = if change % 15 == 0 { Method::Cosine } else { Method::Paper };
         scene.objects[0].scale = 1.0 + change as f32 / 100.0;
         let next = {
             let round = gpu.round();

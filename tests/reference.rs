@@ -2,7 +2,7 @@
 //! the project.
 mod common;
 
-use common::{EVERYTHING, Validated, model, ready, sphere};
+use common::{EVERYTHING, Validated, difference, model, ready, sphere};
 use glam::{DVec3, Vec3, Vec4};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
@@ -149,7 +149,7 @@ fn the_reference_has_the_background_and_the_display_values_of_other_pictures() {
     // Corners, where no sphere is.
     for pixel in [0, 31, 23 * 32, 24 * 32 - 1] {
         let [found, expected] = [&found, &expected].map(|picture| Vec4::from(picture.radiance[pixel]));
-        assert!((found / expected - 1.0).abs().max_element() < 0.01, "{found}, not {expected} at {pixel}");
+        assert!(difference(found / expected, Vec4::ONE) < 0.01, "{found}, not {expected} at {pixel}");
     }
     let whole = found.radiance;
     scene.image.background = Background::None;
@@ -160,7 +160,7 @@ fn the_reference_has_the_background_and_the_display_values_of_other_pictures() {
     let bare = ReferenceImage { radiance: found.radiance.clone(), ..ReferenceImage::default() };
     for (found, expected) in whole.into_iter().zip(bare.over_background(&over_environment)) {
         let [found, expected] = [found, expected].map(Vec4::from);
-        assert!((found / expected - 1.0).abs().max_element() < 0.01, "{found}, not {expected}");
+        assert!(difference(found / expected, Vec4::ONE) < 0.01, "{found}, not {expected}");
     }
     let expected = tone_map(&found.radiance, &prepared.view);
     assert_eq!(expected.len(), found.display.len());

@@ -1,9 +1,10 @@
 //! Anisotropic materials on the device: where their tangents go, against the CPU twin, and against what must not matter.
 mod common;
 
-use common::{EVERYTHING, Validated, model, pixels, ready, sphere, texels_of};
+use common::{EVERYTHING, Validated, difference, model, pixels, ready, sphere, texels_of};
 use glam::{DAffine3, DMat3, DVec3, EulerRot, Mat3, UVec2, Vec3, Vec4};
 use threadlight::Method;
+use threadlight::low_level::evaluate::reference::{ReferenceSettings, reference};
 use threadlight::low_level::evaluate::{Comparable, Display, compare};
 use threadlight::low_level::geometry_texel::GeometryTexel;
 use threadlight::low_level::output::write_exr;
@@ -180,7 +181,7 @@ fn the_shader_agrees_with_its_cpu_twin_on_long_lobes() {
             let found = Vec4::from(rendering.radiance[(pixel.y * 80 + pixel.x) as usize]);
             assert_eq!(found.w, expected.w, "{method}: coverage at {pixel}");
             compared += usize::from(expected.w > 0.0);
-            if (found - expected).abs().max_element() > MOST * expected.truncate().max_element() {
+            if difference(found, expected) > MOST * expected.truncate().max_element() {
                 off.push((pixel, found, expected));
             }
         }
@@ -207,6 +208,7 @@ fn a_white_furnace_shows_the_albedo_of_every_azimuth() {
         scene.image.subpixels = 1;
         let prepared = ready(&scene);
         let rendering = gpu.render(&prepared, EVERYTHING);
+        let mut compared = 0;
         for (pixel, texel, w_o) in seen(&prepared, &rendering).into_iter().step_by(17) {
             let mut surface = Surface::new(texel.normal, w_o);
             surface.set_tangent(texel.tangent.expect("a tangent"));
@@ -227,7 +229,10 @@ fn a_white_furnace_shows_the_albedo_of_every_azimuth() {
                 "{roughness} at {pixel}, {phi_o_deg}: {found}, not {between} between azimuths"
             );
             assert!(error(albedo) < most, "{roughness} at {pixel}, {phi_o_deg}: {found}, not {albedo}");
+            assert!(found.is_finite(), "{roughness} at {pixel}: {found}");
+            compared += 1;
         }
+        assert!(compared > 50, "{roughness}: {compared} pixels");
     }
     gpu.finish();
 }
@@ -244,7 +249,7 @@ fn turning_object_camera_and_light_together_changes_nothing() {
     let gpu = Validated::new();
     let material = brushed("alpha_x = 0.05; alpha_y = 0.3");
     let turn = |degrees: f64| {
-        let mut scene = scene(material.clone(), Method::Fitted, 8);
+        let mut scene = scene(material.clone(), Method::Fitted, 1);
         let (sin, cos) = degrees.to_radians().sin_cos();
         let camera = scene.camera.as_mut().unwrap();
         camera.eye =
@@ -289,10 +294,10 @@ fn a_lobe_as_long_as_wide_is_a_round_one_and_one_that_is_hardly_long_looks_like_
 fn sampling_has_the_reference_as_its_limit() {
     let gpu = Validated::new();
     let material = brushed("alpha_x = 0.1; alpha_y = 0.4; rotation_deg = 35");
-    let truth = threadlight::low_level::evaluate::reference::reference(
+    let truth = reference(
         &ready(&scene(material.clone(), Method::Mis, 1)),
         &gpu.device,
-        &Default::default(),
+        &ReferenceSettings { tolerance: 1e-3, ..ReferenceSettings::default() },
         &gpu.round(),
     );
     let truth = Rendering { radiance: truth.unwrap().radiance, ..Rendering::default() };
@@ -308,7 +313,7 @@ fn sampling_has_the_reference_as_its_limit() {
 #[test]
 fn a_pole_of_tangents_is_finite_and_no_tangent_is_ever_missing() {
     let gpu = Validated::new();
-    let mut scene = scene(brushed("alpha_x = 0.02; alpha_y = 0.5"), Method::Fitted, 4);
+    let mut scene = scene(brushed("alpha_x = 0.05; alpha_y = 0.3"), Method::Fitted, 1);
     // Straight down on the pole, where tangents around the axis have no direction.
     scene.camera = Some(Camera { eye: 4.0 * DVec3::Y, target: DVec3::ZERO, up: DVec3::Z, fov_y_deg: 2.0 });
     for rule in [TangentRule::Around(Vec3::Y), TangentRule::Along(Vec3::Y)] {

@@ -49,7 +49,9 @@ impl Viewer {
     fn threadlight(&self, arguments: &[&str]) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_threadlight"));
         command.args(arguments).current_dir(self.folder.path());
-        command.env("THREADLIGHT_CACHE", Path::new(env!("CARGO_TARGET_TMPDIR")).join("viewer"));
+        let of_run = std::env::var_os("THREADLIGHT_TEST_CACHE").map(PathBuf::from);
+        let cache = of_run.unwrap_or_else(|| Path::new(env!("CARGO_TARGET_TMPDIR")).join("viewer"));
+        command.env("THREADLIGHT_CACHE", cache);
         command.env("DISPLAY", &self.display.name).env_remove("WAYLAND_DISPLAY").env_remove("RUST_LOG");
         if let Ok(device) = std::env::var("THREADLIGHT_TEST_DEVICE") {
             command.args(["--device", &device]);
@@ -360,10 +362,13 @@ fn a_replay_goes_on_while_the_turntable_turns() {
     let Some(viewer) = Viewer::new() else { return };
     let replay = r#"{"key": "t"}
         "wait"
+        {"save_scene": "turned.toml"}
         {"key": "t"}
         "wait"
         "quit""#;
     viewer.play(&[&SMALL[..], &["--replay-limit", "120"]].concat(), replay).expect_success();
+    let turned = std::fs::read_to_string(viewer.path("turned.toml")).expect("a scene");
+    assert!(turned.contains("[camera]"), "{turned}");
 }
 
 #[test]
@@ -406,7 +411,7 @@ fn closing_takes_less_than_a_second_whatever_is_being_made() {
     let many_threads = "\"wait\"\n{\"set\": {\"threads\": 128}}\n{\"move\": [10, 10]}\n\"quit\"".to_owned();
     let drag = format!("\"wait\"\n{}\"quit\"", (0..10).map(alpha).collect::<String>());
     for (material, replay) in [("silver", many_threads), ("gold", drag)] {
-        let time = time_to_close(&viewer, &["--material", material], &replay);
+        let time = time_to_close(&viewer, &["--material", material, "--environment", "white"], &replay);
         println!("{material}: {time:?}");
         assert!(time < Duration::from_secs(1), "{time:?}: {replay}");
     }
@@ -458,7 +463,7 @@ fn nor_does_a_minimised_one_whose_turntable_turns() {
 fn a_window_goes_through_any_number_of_sizes() {
     let Some(viewer) = Viewer::new() else { return };
     let runs = std::env::var("THREADLIGHT_FAULT_RUNS").ok();
-    let count: u32 = runs.map_or(40, |runs| runs.parse().expect("THREADLIGHT_FAULT_RUNS has to be a number"));
+    let count: u32 = runs.map_or(20, |runs| runs.parse().expect("THREADLIGHT_FAULT_RUNS has to be a number"));
     let sizes =
         (0..count).map(|step| format!("{{\"resize\": [{}, {}]}}\n", 160 + step * 67 % 190, 240 + step * 41 % 120));
     let replay = format!("\"wait\"\n{}{{\"resize\": [160, 250]}}\n\"wait\"\n", sizes.collect::<String>());

@@ -340,6 +340,9 @@ fn moving_the_camera_does_not_begin_again_what_is_being_made() {
     wait(&mut viewer);
     assert_eq!(viewer.session.shown(), viewer.session.wanted());
     assert_eq!(viewer.session.shown().environment.source, Source::Builtin("studio".into()));
+    // What had begun again would have been made for the last of the rotations.
+    let made_for = viewer.loaded().expect("a scene").prepared.scene.environment.rotation_deg;
+    assert_eq!(made_for, 0.0);
     drop(viewer);
     gpu.finish();
 }

@@ -377,7 +377,9 @@ mod tests {
     #[test]
     fn every_name_has_candidates_and_others_are_refused() {
         for name in names() {
-            for Candidate { model, given } in candidates(name).unwrap() {
+            let candidates = candidates(name).unwrap();
+            assert!(!candidates.is_empty(), "{name}");
+            for Candidate { model, given } in candidates {
                 assert!(!Brdf::possible_parameters(&model, &given).unwrap().is_empty(), "{name}");
             }
         }

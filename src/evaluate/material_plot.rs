@@ -118,7 +118,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_builtin_material_is_drawn_with_its_three_panels() {
+    fn materials_are_drawn_with_their_three_panels() {
         for name in ["gold", "clay"] {
             let drawn = svg(&Brdf::builtin(name).unwrap(), name, Path::new("x.svg")).unwrap();
             assert!(

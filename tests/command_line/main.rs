@@ -7,7 +7,7 @@ mod text;
 use assert_cmd::Command;
 use serde_json::Value;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 use threadlight::low_level::output::{PictureFile, read_image};
 use threadlight::low_level::scene::{ImageSettings, MaterialSource, Method, Pattern, Scene, ShadingSettings, Source};
@@ -25,15 +25,17 @@ fn workplace() -> TempDir {
     folder
 }
 
-/// The program in `folder`, with its cache there and `arguments` separated by spaces.
+/// The program in `folder`, with `arguments` separated by spaces, and the cache of all tests if there is one.
 fn threadlight(folder: &TempDir, arguments: &str) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_threadlight"));
-    command.current_dir(folder).env("THREADLIGHT_CACHE", cache(folder)).env_remove("RUST_LOG");
+    let of_run = std::env::var_os("THREADLIGHT_TEST_CACHE").map(PathBuf::from);
+    let cache = of_run.unwrap_or_else(|| own_cache(folder));
+    command.current_dir(folder).env("THREADLIGHT_CACHE", cache).env_remove("RUST_LOG");
     command.args(arguments.split(' ').filter(|argument| !argument.is_empty()));
     command
 }
 
-fn cache(folder: &TempDir) -> std::path::PathBuf {
+fn own_cache(folder: &TempDir) -> PathBuf {
     folder.path().join("cache")
 }
 
@@ -43,6 +45,13 @@ fn render(folder: &TempDir, arguments: &str) -> Command {
     if let Some(device) = std::env::var_os("THREADLIGHT_TEST_DEVICE") {
         command.arg("--device").arg(device);
     }
+    command
+}
+
+/// The same with a cache that is its own.
+fn render_by_own_cache(folder: &TempDir, arguments: &str) -> Command {
+    let mut command = render(folder, arguments);
+    command.env("THREADLIGHT_CACHE", own_cache(folder));
     command
 }
 

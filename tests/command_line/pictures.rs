@@ -4,7 +4,10 @@ use super::*;
 #[test]
 fn the_built_in_scene_renders_without_validation_messages_and_with_sane_statistics() {
     let folder = workplace();
-    let said = printed(&mut render(&folder, "--size 96x72 --threads 8 --repeat 3 --stats stats.json -o image.png"));
+    let said = printed(&mut render_by_own_cache(
+        &folder,
+        "--size 96x72 --threads 8 --repeat 3 --stats stats.json -o image.png",
+    ));
     assert!(said.is_empty(), "{said}");
 
     let image = picture(&folder, "image.png");
@@ -58,10 +61,15 @@ fn the_built_in_scene_renders_without_validation_messages_and_with_sane_statisti
 fn the_same_command_gives_the_same_picture_with_any_state_of_the_cache() {
     let folder = workplace();
     for method in ["fitted", "paper"] {
-        for (name, flags) in [("cold", ""), ("warm", ""), ("none", "--no-cache")] {
+        let _ = fs::remove_dir_all(own_cache(&folder));
+        for (name, flags) in [("none", "--no-cache"), ("cold", ""), ("warm", "")] {
             for kind in ["png", "exr"] {
-                printed(&mut render(&folder, &format!("{SMALL} --method {method} {flags} -o {name}.{kind}")));
+                printed(&mut render_by_own_cache(
+                    &folder,
+                    &format!("{SMALL} --method {method} {flags} -o {name}.{kind}"),
+                ));
             }
+            assert_eq!(own_cache(&folder).exists(), name != "none", "{method}, {name}");
         }
         for name in ["warm", "none"] {
             assert!(bytes(&folder, "cold.png") == bytes(&folder, &format!("{name}.png")), "{method}, {name}");
@@ -70,17 +78,8 @@ fn the_same_command_gives_the_same_picture_with_any_state_of_the_cache() {
             assert!(cold.rgba == other.rgba, "{method}, {name}");
         }
     }
-    printed(&mut render(&folder, &format!("{SMALL} --method paper --seed 7 -o seed.exr")));
+    printed(&mut render_by_own_cache(&folder, &format!("{SMALL} --method paper --seed 7 -o seed.exr")));
     assert!(picture(&folder, "cold.exr").rgba != picture(&folder, "seed.exr").rgba, "the seed has no effect");
-}
-
-#[test]
-fn no_cache_leaves_no_cache() {
-    let folder = workplace();
-    for method in ["fitted", "paper"] {
-        printed(&mut render(&folder, &format!("{SMALL} --method {method} --no-cache -o image.png")));
-        assert!(!cache(&folder).exists(), "{method}");
-    }
 }
 
 #[test]
@@ -88,7 +87,7 @@ fn threads_and_pyramids_are_cached_and_damage_is_repaired() {
     let folder = workplace();
     let run = |name: &str| {
         let flags = format!("{SMALL} --method fitted --stats {name}.json -o {name}.png");
-        render(&folder, &flags).output().unwrap()
+        render_by_own_cache(&folder, &flags).output().unwrap()
     };
     let state = |name: &str| stats(&folder, &format!("{name}.json"))["thread_cache"].as_str().unwrap().to_owned();
     run("first");
@@ -96,7 +95,7 @@ fn threads_and_pyramids_are_cached_and_damage_is_repaired() {
     assert_eq!((state("first").as_str(), state("second").as_str()), ("miss", "hit"));
 
     // Cut the threads and overwrite the pyramid and the pipelines.
-    let files: Vec<_> = fs::read_dir(cache(&folder)).unwrap().map(|entry| entry.unwrap().path()).collect();
+    let files: Vec<_> = fs::read_dir(own_cache(&folder)).unwrap().map(|entry| entry.unwrap().path()).collect();
     assert!(files.len() >= 3, "{files:?}");
     for file in &files {
         let content = fs::read(file).unwrap();
@@ -286,10 +285,10 @@ fn the_environment_turns_with_the_rotation() {
 fn the_reference_tells_its_error_and_comes_from_the_cache_the_second_time() {
     let folder = workplace();
     let reference = "--size 24x18 --environment map.hdr --method reference --tolerance 5e-3";
-    printed(&mut render(&folder, &format!("{reference} --stats first.json -o first.exr")));
-    printed(&mut render(&folder, &format!("{reference} --stats second.json -o second.exr")));
-    printed(&mut render(&folder, &format!("{reference} --no-cache --stats third.json -o third.exr")));
-    printed(&mut render(&folder, &format!("{reference} -o image.png")));
+    printed(&mut render_by_own_cache(&folder, &format!("{reference} --stats first.json -o first.exr")));
+    printed(&mut render_by_own_cache(&folder, &format!("{reference} --stats second.json -o second.exr")));
+    printed(&mut render_by_own_cache(&folder, &format!("{reference} --no-cache --stats third.json -o third.exr")));
+    printed(&mut render_by_own_cache(&folder, &format!("{reference} -o image.png")));
     for (name, cache) in [("first", "miss"), ("second", "hit"), ("third", "miss")] {
         let stats = stats(&folder, &format!("{name}.json"));
         assert_eq!(stats["reference_cache"], cache);
@@ -305,21 +304,21 @@ fn the_reference_tells_its_error_and_comes_from_the_cache_the_second_time() {
 
     // Another question is another answer: nothing comes from the cache.
     for (index, change) in ["--rotation 10", "--material clay", "--exposure 2", "--subpixels 1"].iter().enumerate() {
-        printed(&mut render(&folder, &format!("{reference} {change} --stats {index}.json")));
+        printed(&mut render_by_own_cache(&folder, &format!("{reference} {change} --stats {index}.json")));
         assert_eq!(stats(&folder, &format!("{index}.json"))["reference_cache"], "miss", "{change}");
     }
     // A damaged file is noticed and replaced.
-    for entry in fs::read_dir(cache(&folder)).unwrap().map(|entry| entry.unwrap().path()) {
+    for entry in fs::read_dir(own_cache(&folder)).unwrap().map(|entry| entry.unwrap().path()) {
         if entry.to_string_lossy().ends_with(".reference.exr") {
             fs::write(&entry, &fs::read(&entry).unwrap()[..300]).unwrap();
         }
     }
-    render(&folder, &format!("{reference} --stats again.json -o again.exr")).assert().success();
+    render_by_own_cache(&folder, &format!("{reference} --stats again.json -o again.exr")).assert().success();
     assert_eq!(stats(&folder, "again.json")["reference_cache"], "miss");
     assert!(picture(&folder, "again.exr").rgba == first.rgba);
 
     // The same surface and background as other methods show, roughly.
-    printed(&mut render(&folder, "--size 24x18 --environment map.hdr --threads 8 -o paper.exr"));
+    printed(&mut render_by_own_cache(&folder, "--size 24x18 --environment map.hdr --threads 8 -o paper.exr"));
     let (paper, display) = (picture(&folder, "paper.exr"), picture(&folder, "image.png"));
     let mut differences = [0.0; 2];
     for (pixel, (truth, paper)) in first.rgba.iter().zip(&paper.rgba).enumerate() {

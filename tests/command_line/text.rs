@@ -139,6 +139,7 @@ fn an_anisotropic_material_is_evaluated_from_any_azimuth_and_plotted_but_not_exp
     assert!((by_angles[0] / by_angles[6] - 1.0).abs() > 0.1, "{by_angles:?}");
     let s = 0.75f64.sqrt();
     let (_, by_vectors, _) = evaluated(&folder, "brushed-steel --directions", &format!("0 -0.5 {s} 0 {s} 0.5\n"));
+    assert_eq!(by_vectors.len(), 3);
     for (a, b) in by_angles[6..].iter().zip(&by_vectors) {
         assert!((a - b).abs() < 1e-9 * a, "{a} {b}");
     }
@@ -167,11 +168,12 @@ fn a_material_is_exported_and_plotted() {
     threadlight(&folder, "materials export clay -o clay.binary").assert().success();
     let (_, own, _) = evaluated(&folder, "clay", "20 50 70\n");
     let (_, exported, _) = evaluated(&folder, "clay.binary", "20 50 70\n");
+    assert_eq!([own.len(), exported.len()], [3, 3]);
     for (a, b) in own.iter().zip(&exported) {
         assert!((a - b).abs() < 1e-6, "{a} {b}");
     }
-    threadlight(&folder, "materials plot gold -o gold.svg").assert().success();
-    assert!(String::from_utf8(bytes(&folder, "gold.svg")).unwrap().contains("</svg>"));
+    threadlight(&folder, "materials plot clay -o clay.svg").assert().success();
+    assert!(String::from_utf8(bytes(&folder, "clay.svg")).unwrap().contains("</svg>"));
     threadlight(&folder, "materials export clay -o clay.png").assert().code(2);
     threadlight(&folder, "materials export clay -o exported.threads").assert().success();
     threadlight(&folder, "threads clay -o made.threads").assert().success();
@@ -202,7 +204,7 @@ fn a_model_is_fitted_to_a_measured_file_and_what_is_written_is_a_material() {
     assert!(said.starts_with("lambert ") && said.contains("of that of black"), "{said}");
     let (_, own, _) = evaluated(&folder, "l.binary", "20 50 70\n");
     let (code, fitted, _) = evaluated(&folder, "fitted.toml", "20 50 70\n");
-    assert_eq!((code, fitted.len()), (Some(0), 3));
+    assert_eq!((code, own.len(), fitted.len()), (Some(0), 3, 3));
     for (a, b) in own.iter().zip(&fitted) {
         assert!((a / b - 1.0).abs() < 1e-3, "{a} {b}");
     }

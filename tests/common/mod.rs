@@ -1,6 +1,6 @@
 //! What the tests that render have in common.
 #![allow(dead_code)]
-use glam::{DVec3, UVec2, dvec3};
+use glam::{DVec3, UVec2, Vec4, dvec3};
 use std::f64::consts::{PI, TAU};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
@@ -98,6 +98,14 @@ pub const EVERYTHING: Wanted = Wanted { radiance: true, display: false, geometry
 /// The texels of the geometry cache that a pixel sees.
 pub fn texels_of(prepared: &Prepared, rendering: &Rendering, pixel: UVec2) -> Vec<UVec2> {
     texels_of_pixel(&prepared.view, &rendering.geometry, pixel)
+}
+
+/// How far `found` is from `expected`, in the channel that is farthest. Fails where that is no number: maxima of vectors pass over those.
+pub fn difference(found: impl Into<Vec4>, expected: Vec4) -> f32 {
+    let found = found.into();
+    let difference = (found - expected).abs();
+    assert!(difference.is_finite(), "{found}, not {expected}");
+    difference.max_element()
 }
 
 /// All pixels, row by row.

@@ -82,6 +82,7 @@ fn a_program_that_is_ended_at_any_moment_leaves_whole_files_and_the_next_run_the
         strays += let_time_pass(&folders);
     }
     println!("{ended:?}, {strays} temporary files left, a run takes {time:?}");
+    assert!(ended.keys().any(|(_, number)| number.is_some()), "each was done before");
     let _ = std::fs::remove_dir_all(place.path("cache"));
     assert!(place.threadlight(&arguments).status().unwrap().success());
     assert_eq!(names(&outputs), ["picture.png", "stats.json"]);
@@ -113,17 +114,21 @@ fn a_saved_scene_is_one_or_the_other_however_its_writer_is_killed() {
     let place = Place::new();
     let whole = [true, false].map(|is_long| scene(is_long).to_toml(Some(place.folder.path())).unwrap());
     let (mut random, mut strays, folders) = (Random(2), 0, [place.folder.path().to_owned()]);
+    let mut seen = 0;
     let name = module_path!().split_once("::").expect("a crate").1.to_owned() + "::scenes_are_saved_for_ever";
     for _ in 0..moments(20) {
         let mut command = place.command(std::env::current_exe().unwrap().to_str().expect("UTF-8"));
         let child = command.args(["--ignored", "--exact", &name]).stdout(Stdio::null()).spawn().unwrap();
         let status = end(child, "KILL", &mut random, Duration::from_millis(60), &folders);
         assert_eq!(status.signal(), Some(9));
-        let saved = std::fs::read_to_string(place.path("scene.toml"));
-        assert!(saved.as_ref().is_ok_and(|saved| whole.contains(saved)) || saved.is_err());
+        if let Ok(saved) = std::fs::read_to_string(place.path("scene.toml")) {
+            assert!(whole.contains(&saved), "{saved}");
+            seen += 1;
+        }
         strays += let_time_pass(&folders);
     }
-    println!("{strays} temporary files left");
+    println!("{seen} scenes, {strays} temporary files left");
+    assert!(seen > 0, "none was saved");
     scene(true).save(&place.path("scene.toml")).unwrap();
     assert!(temporary_files(place.folder.path()).is_empty() && names(place.folder.path()).len() == 2);
 }
@@ -132,19 +137,17 @@ fn a_saved_scene_is_one_or_the_other_however_its_writer_is_killed() {
 fn processes_that_share_an_empty_cache_all_make_the_same_picture() {
     let place = Place::new();
     let picture = place.picture();
-    for count in [2, 8] {
-        let _ = std::fs::remove_dir_all(place.path("cache"));
-        let outputs: Vec<_> = (0..count).map(|number| format!("{number}.png")).collect();
-        let start = |output: &String| {
-            let arguments = [&RENDER[..RENDER.len() - 1], &[output]].concat();
-            place.threadlight(&arguments).stderr(Stdio::piped()).spawn().unwrap()
-        };
-        let children: Vec<_> = outputs.iter().map(start).collect();
-        for (child, name) in children.into_iter().zip(&outputs) {
-            let output = child.wait_with_output().unwrap();
-            assert!(output.status.success() && said(&output).is_empty(), "{}", said(&output));
-            assert!(std::fs::read(place.path(name)).unwrap() == *picture, "{name} of {count}");
-        }
-        assert!(temporary_files(&place.cache()).is_empty() && names(&place.cache()).len() > 3);
+    let _ = std::fs::remove_dir_all(place.path("cache"));
+    let outputs: Vec<_> = (0..8).map(|number| format!("{number}.png")).collect();
+    let start = |output: &String| {
+        let arguments = [&RENDER[..RENDER.len() - 1], &[output]].concat();
+        place.threadlight(&arguments).stderr(Stdio::piped()).spawn().unwrap()
+    };
+    let children: Vec<_> = outputs.iter().map(start).collect();
+    for (child, name) in children.into_iter().zip(&outputs) {
+        let output = child.wait_with_output().unwrap();
+        assert!(output.status.success() && said(&output).is_empty(), "{}", said(&output));
+        assert!(std::fs::read(place.path(name)).unwrap() == *picture, "{name}");
     }
+    assert!(temporary_files(&place.cache()).is_empty() && names(&place.cache()).len() > 3);
 }
