@@ -60,7 +60,7 @@ impl Compare {
         let read = |path| -> Result<_> { Ok(Comparable::from_picture(&output::read_image(path)?, display)) };
         let (a, b) = (read(&self.a)?, read(&self.b)?);
         let names = format!("{} and {}", self.a.display(), self.b.display());
-        let metrics = compare(&a, &b, self.mask_background).map_err(|error| error.within(names))?;
+        let metrics = compare(&a, &b, self.mask_background).map_err(|error| error.within(&names))?;
         if let Some(path) = &self.difference {
             let (width, height, rgba) = difference_picture(&a, &b, self.mask_background);
             output::write_png(path, width, height, &rgba, false)?;
@@ -69,8 +69,8 @@ impl Compare {
             if self.json { serde_json::to_string_pretty(&metrics).context("--json")? + "\n" } else { table(&metrics) };
         print(text)?;
         if let Some(at_most) = self.at_most {
-            anyhow::ensure!(metrics.nan == 0, "{} values are NaN or infinite", metrics.nan);
-            anyhow::ensure!(metrics.rms <= at_most, "the RMS is {:.3e}, above {at_most:e}", metrics.rms);
+            anyhow::ensure!(metrics.nan == 0, "{names}: {} values are NaN or infinite", metrics.nan);
+            anyhow::ensure!(metrics.rms <= at_most, "{names}: the RMS is {:.3e}, above {at_most:e}", metrics.rms);
         }
         Ok(())
     }

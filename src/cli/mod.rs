@@ -114,16 +114,20 @@ pub fn unless_unheard(printed: io::Result<()>) -> io::Result<()> {
     printed.or_else(|cause| if cause.kind() == ErrorKind::BrokenPipe { Ok(()) } else { Err(cause) })
 }
 
-/// Sends the library's log to standard error; RUST_LOG overrides the flag.
+/// Sends the library's log to standard error; RUST_LOG overrides the flag, where it says anything.
 pub fn start_logging(verbose: u8) {
     let level = ["warn,winit=error", "threadlight=info", "threadlight=debug"][usize::from(verbose.min(2))];
-    let filter = tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| level.into());
+    let is_set = |name: &str| std::env::var_os(name).is_some_and(|value| !value.is_empty());
+    let asked = is_set("RUST_LOG").then(tracing_subscriber::EnvFilter::try_from_default_env);
+    let filter = asked.and_then(Result::ok).unwrap_or_else(|| level.into());
+    // As https://no-color.org has it.
+    let is_plain = is_set("NO_COLOR") || std::env::var_os("TERM").is_some_and(|name| name == "dumb");
     tracing_subscriber::fmt()
         .with_env_filter(filter)
         .with_writer(io::stderr)
         // It would tell of them on standard error, and end the program where that is what fails.
         .log_internal_errors(false)
-        .with_ansi(io::stderr().is_terminal())
+        .with_ansi(io::stderr().is_terminal() && !is_plain)
         .without_time()
         .with_target(false)
         .init();

@@ -39,7 +39,8 @@ Examples:
 pub struct Render {
     #[command(flatten)]
     scene: SceneFlags,
-    /// Takes as few threads as give an expected RMS of display values of at most X, instead of --threads.
+    /// Takes as few threads as give an expected RMS of display values of at most X, instead of --threads. It makes those of
+    /// each number that it tries, and the reference in some pixels: minutes where X is small.
     #[arg(long, value_name = "X", conflicts_with = "threads", value_parser = number(f64::MIN_POSITIVE..=1.0, "a positive number up to 1"))]
     error: Option<f64>,
     /// Method `reference` goes on until its estimated error of display values is below this: each pixel's on the

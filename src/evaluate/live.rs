@@ -36,7 +36,7 @@ pub struct LiveStep {
     pub value: toml::Value,
     /// From threads of the value before to those of this one.
     pub draft_ms: f64,
-    /// From nothing to finished threads, the scene read.
+    /// From nothing to finished threads of the material, the scene read.
     pub fit_ms: f64,
     /// Of the draft's picture.
     pub draft_rms: f64,
@@ -86,7 +86,7 @@ pub fn run(
     let inner = OnlyCancels(observer);
     let mut truths = Vec::new();
     for value in values {
-        truths.push(truth(&drag.scene_at(value)?, settings, device, &memo.round(&inner))?);
+        truths.push(truth(drag, value, settings, device, &memo.round(&inner))?);
         next()?;
     }
     // Threads are neither read from disk nor remembered: what is known needs no draft.
@@ -132,12 +132,21 @@ impl Drag {
     }
 }
 
-fn truth(scene: &Scene, settings: &ReferenceSettings, device: &Arc<Device>, round: &Round) -> Result<Truth> {
+fn truth(
+    drag: &Drag,
+    value: &toml::Value,
+    settings: &ReferenceSettings,
+    device: &Arc<Device>,
+    round: &Round,
+) -> Result<Truth> {
     // Threads are made, whatever is on disk.
     let nothing = Memo::default();
     let fits = nothing.round(round.observer());
-    let finished = prepare(scene, &fits)?;
-    let fit_ms = fits.asked(FitThreads::NAME).iter().map(|asked| asked.time.as_secs_f64() * 1e3).sum();
+    let finished = prepare(&drag.scene_at(value)?, &fits)?;
+    // Threads were asked for once a material. One that no object has is not among them.
+    let asked = finished.materials.iter().zip(fits.asked(FitThreads::NAME));
+    let of_dragged = asked.filter(|(material, _)| material.name == drag.material);
+    let fit_ms = of_dragged.map(|(_, asked)| asked.time.as_secs_f64() * 1e3).sum();
     let truth = reference(&finished, device, settings, round)?;
     let reference = comparable(&finished, &truth.radiance);
     let finished_rms = compare(&picture(&finished, device, round)?, &reference, true)?.rms;

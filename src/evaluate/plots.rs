@@ -203,37 +203,36 @@ pub fn speed_charts(timings: &Timings) -> Vec<Chart> {
 
 /// Relative time over relative quantity, a curve for each thing that grows, and what would be in proportion.
 fn growth_curves(growths: &[&Growth]) -> Vec<Curve> {
-    let mut curves = Vec::new();
-    for (style, what) in in_order(growths.iter().map(|growth| &growth.what)).into_iter().enumerate() {
-        let place = |growth: &Growth| {
-            let TimedFrame { material, environment, scene, .. } = &growth.frame;
-            [material, environment, scene].map(String::clone)
-        };
-        let all: Vec<_> = growths.iter().filter(|growth| growth.what == *what).collect();
-        // Each place by what it began with.
-        let relative = in_order(all.iter().map(|growth| place(growth))).into_iter().map(|here| {
-            let series: Vec<_> = all.iter().filter(|growth| place(growth) == here).collect();
-            let first = series[0];
-            let point = |growth: &&&&Growth| {
-                (growth.quantity as f64 / first.quantity as f64, growth.frame.gpu_ms / first.frame.gpu_ms)
-            };
-            series.iter().map(point).collect::<Vec<_>>()
-        });
-        let relative: Vec<_> = relative.collect();
-        let steps = relative.iter().map(Vec::len).max().unwrap_or_default();
-        let point = |step: usize| {
-            let here: Vec<_> = relative.iter().filter_map(|series| series.get(step)).collect();
-            let [x, y] = [|at: &&(f64, f64)| at.0, |at: &&(f64, f64)| at.1]
-                .map(|of| mean(&here.iter().map(of).collect::<Vec<_>>()));
-            (x, y)
-        };
-        let points = (0..steps).map(point).collect();
-        curves.push(Curve { name: what.clone(), points, style, drawn: Drawn::Line });
-    }
+    let curve = |(style, what): (usize, &String)| {
+        let growths: Vec<_> = growths.iter().copied().filter(|growth| growth.what == *what).collect();
+        Curve { name: what.clone(), points: mean_growth(&growths), style, drawn: Drawn::Line }
+    };
+    let mut curves: Vec<_> =
+        in_order(growths.iter().map(|growth| &growth.what)).into_iter().enumerate().map(curve).collect();
     let last = curves.iter().flat_map(|curve| &curve.points).map(|point| point.0).fold(1.0, f64::max);
     let points = vec![(1.0, 1.0), (last, last)];
     curves.push(Curve { name: "in proportion".to_owned(), points, style: GREY, drawn: Drawn::Dashed });
     curves
+}
+
+/// How many times as much there is and how many times the time it takes, step by step, of each place by what its series begins with; means over
+/// the places that have the step.
+fn mean_growth(growths: &[&Growth]) -> Vec<(f64, f64)> {
+    let place = |growth: &Growth| {
+        let TimedFrame { material, environment, scene, .. } = &growth.frame;
+        [material, environment, scene].map(String::clone)
+    };
+    let mut steps: Vec<(Vec<f64>, Vec<f64>)> = Vec::new();
+    for here in in_order(growths.iter().map(|growth| place(growth))) {
+        let series: Vec<_> = growths.iter().filter(|growth| place(growth) == here).collect();
+        let first = series[0];
+        steps.resize(steps.len().max(series.len()), Default::default());
+        for (growth, (quantities, times)) in series.iter().zip(&mut steps) {
+            quantities.push(growth.quantity as f64 / first.quantity as f64);
+            times.push(growth.frame.gpu_ms / first.frame.gpu_ms);
+        }
+    }
+    steps.iter().map(|(quantities, times)| (mean(quantities), mean(times))).collect()
 }
 
 /// Each number once, in rising order.

@@ -153,12 +153,8 @@ pub fn run(
         timings.frames.extend(take_turns(entrants, device, speed.repeat, &mut advance)?);
         for &variant in &speed.cases.methods {
             for (growing, what, steps) in SERIES {
-                let subpixels = place.prepared.view.subpixels;
-                let most = match growing {
-                    Growing::Subpixels => steps.iter().map(|&side| variant.method.max_count(side)).min(),
-                    _ => Some(variant.method.max_count(subpixels)),
-                };
-                let threads = most.map_or(speed.threads, |most| speed.threads.min(most));
+                let side = growing.most_subpixels(steps, place.prepared.view.subpixels);
+                let threads = speed.threads.min(variant.method.max_count(side));
                 let mut entrants = Vec::new();
                 for &step in steps {
                     let entrant = |place: &mut Place| {
@@ -206,6 +202,12 @@ impl Growing {
             place.prepared.meshes = meshes;
         }
         made
+    }
+
+    /// The most sub-pixels per axis of the series, in a view that has so many: a method may have fewer samples the more there are.
+    fn most_subpixels(self, steps: &[u32], of_view: u32) -> u32 {
+        let of_series = steps.iter().copied().max().filter(|_| self == Self::Subpixels);
+        of_series.unwrap_or(of_view)
     }
 
     /// How many of `threads` there are at a step of the series.

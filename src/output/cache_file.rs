@@ -17,6 +17,6 @@ pub(crate) fn keep_file(path: &Path, write: impl FnOnce() -> Result<()>) {
     if let Err(error) = made.and_then(|()| make_way(path)).and_then(|()| write())
         && USELESS.lock().unwrap_or_else(PoisonError::into_inner).insert(folder.to_owned())
     {
-        tracing::warn!("what takes time to make is not kept on disk: {error}");
+        tracing::warn!("what takes time to make is not kept on disk: {error} (THREADLIGHT_CACHE may name another)");
     }
 }

@@ -73,7 +73,7 @@ pub fn file_name(name: &str) -> String {
 
 /// Writes `bytes` to `path`: into a temporary file in the same folder first, then renamed, so that whoever looks sees
 /// the old file or the whole new one, and a failure leaves nothing behind. Devices and pipes are written to as they are, and so is what the
-/// program was given open, such as /dev/stdout.
+/// program was given open, such as /dev/stdout, and a file that is mounted by itself.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
     let failed = |cause: io::Error| Error::unwritable(path, cause);
     match target(path) {
@@ -83,7 +83,11 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
             // Errors of the file itself do not repeat the temporary file's name.
             let written =
                 keep_permissions(temporary.as_file(), &file).and_then(|()| temporary.as_file_mut().write_all(bytes));
-            written.and_then(|()| temporary.persist(&file).map(drop).map_err(|failed| failed.error))
+            written.and_then(|()| match temporary.persist(&file) {
+                // What is mounted by itself, as containers do with single files, cannot be replaced.
+                Err(failed) if failed.error.kind() == io::ErrorKind::ResourceBusy => std::fs::write(&file, bytes),
+                persisted => persisted.map(drop).map_err(|failed| failed.error),
+            })
         }
     }
     .map_err(failed)

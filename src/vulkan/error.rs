@@ -7,7 +7,9 @@ pub(crate) type Result<T> = std::result::Result<T, VulkanError>;
 #[derive(Debug, thiserror::Error)]
 pub enum VulkanError {
     /// The loader library is not on this machine.
-    #[error("no Vulkan loader: {cause}; install it (Debian, Ubuntu: apt-get install libvulkan1 mesa-vulkan-drivers)")]
+    #[error(
+        "no Vulkan loader: {cause}; install it (Debian, Ubuntu: apt-get install libvulkan1 mesa-vulkan-drivers; macOS: brew install vulkan-loader molten-vk)"
+    )]
     NoLoader {
         /// What the dynamic linker said.
         cause: String,

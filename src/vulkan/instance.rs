@@ -46,6 +46,20 @@ pub struct Instance {
 /// and NVIDIA's (580.159, with glibc 2.36) cannot be loaded more than 30 times in one process.
 static DRIVERS: OnceLock<(ash::Instance, ash::Entry)> = OnceLock::new();
 
+/// Where Homebrew and the SDK put the loader: macOS looks in neither.
+const LOADERS: &[&str] = if cfg!(target_os = "macos") {
+    &["/opt/homebrew/lib/libvulkan.dylib", "/usr/local/lib/libvulkan.dylib"]
+} else {
+    &[]
+};
+
+fn load() -> std::result::Result<ash::Entry, ash::LoadingError> {
+    // SAFETY: loads the system's Vulkan loader; it is unloaded after every object made through it (order of the fields of `Instance`).
+    let loaded = unsafe { ash::Entry::load() };
+    // SAFETY: the same of these.
+    LOADERS.iter().fold(loaded, |loaded, path| loaded.or_else(|_| unsafe { ash::Entry::load_from(path) }))
+}
+
 impl Instance {
     /// Loads the Vulkan loader and makes an instance, with core and synchronisation validation when `validate` is set.
     ///
@@ -69,9 +83,7 @@ impl Instance {
     }
 
     fn with_extensions(validate: bool, wanted: &[&CStr]) -> Result<Arc<Self>> {
-        // SAFETY: loads the system's Vulkan loader; it is unloaded after every object made through it (field order).
-        let entry =
-            unsafe { ash::Entry::load() }.map_err(|cause| VulkanError::NoLoader { cause: cause.to_string() })?;
+        let entry = load().map_err(|cause| VulkanError::NoLoader { cause: cause.to_string() })?;
         let offer = Offer::of(&entry, validate)?;
         if let Some(missing) = wanted.iter().find(|wanted| !offer.has(wanted)) {
             return Err(VulkanError::NoPresentation { extension: missing.to_string_lossy().into_owned() });

@@ -96,11 +96,16 @@ fn parameters_of(settings: &MaterialSettings) -> Option<Vec<(Parameter, toml::Va
     Some(parameters.into_iter().filter_map(with_value).collect())
 }
 
+/// Which decimal the third digit of a number above 0 is; below 0 where that is before the point.
+fn third_digit(size: f64) -> f64 {
+    2.0 - size.log10().floor()
+}
+
 /// Decimals that a number is set to: three digits of what goes by factors.
 fn decimals(number: f64, scale: &Scale) -> usize {
     match scale.spacing {
         Spacing::Linear => 3,
-        Spacing::Logarithmic => (2.0 - number.abs().max(*scale.range.start()).log10().floor()).max(3.0) as usize,
+        Spacing::Logarithmic => third_digit(number.abs().max(*scale.range.start())).max(3.0) as usize,
     }
 }
 
@@ -109,9 +114,7 @@ fn shown(number: f64, decimals: RangeInclusive<usize>, scale: &Scale) -> String 
     let size = number.abs();
     match scale.spacing {
         Spacing::Logarithmic if size > 0.0 && !(0.01..1e5).contains(&size) => format!("{number:.2e}"),
-        Spacing::Logarithmic if size > 0.0 => {
-            format!("{number:.*}", (2.0 - size.log10().floor()).clamp(0.0, 4.0) as usize)
-        }
+        Spacing::Logarithmic if size > 0.0 => format!("{number:.*}", third_digit(size).clamp(0.0, 4.0) as usize),
         _ => egui::emath::format_with_decimals_in_range(number, decimals),
     }
 }
