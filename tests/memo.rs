@@ -383,7 +383,7 @@ fn thirty_materials_take_less_than_200_mb_on_the_device() {
     let rendering = renderer.render(Wanted { display: true, ..Wanted::default() }, 1).unwrap();
     println!("{:.1} MB", 1e-6 * rendering.device_memory_bytes as f64);
     assert!((1_000_000..200_000_000).contains(&rendering.device_memory_bytes), "{}", rendering.device_memory_bytes);
-    drop(renderer);
+    drop((renderer, round));
     gpu.finish();
 }
 
