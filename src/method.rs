@@ -4,7 +4,7 @@
 //! `shading/methods.rs`.
 use crate::environment::Environment;
 pub use crate::scene::Method;
-use crate::scene::Pattern;
+use crate::scene::{Pattern, ShadingSettings};
 use crate::threads::ThreadKind;
 use crate::vulkan::{Shader, compiled};
 use crate::{Error, Result};
@@ -79,6 +79,13 @@ macro_rules! methods {
     };
 }
 include!("shading/methods.rs");
+
+impl ShadingSettings {
+    /// How many threads or samples: as many as are asked for, or as suit the method.
+    pub fn count(&self) -> u32 {
+        self.threads.unwrap_or(self.method.default_count())
+    }
+}
 
 impl Method {
     /// What it does, in a sentence.

@@ -141,7 +141,7 @@ pub fn prepare(scene: &Scene, round: &Round) -> Result<Prepared> {
 pub fn can_draft(scene: &Scene, before: &Prepared) -> bool {
     let method = scene.shading.method;
     fn source<'s>(scene: &'s Scene, name: &str) -> Option<&'s MaterialSource> {
-        scene.materials.iter().find(|material| material.name == name).map(|material| &material.source)
+        scene.material(name).map(|material| &material.source)
     }
     let was_edited = |name: &str| match source(scene, name) {
         Some(MaterialSource::Model { .. }) => before.materials.iter().any(|material| material.name == name),
@@ -149,7 +149,7 @@ pub fn can_draft(scene: &Scene, before: &Prepared) -> bool {
     };
     method == Method::Fitted
         && before.method == method
-        && before.sampling.count == scene.shading.threads.unwrap_or(method.default_count())
+        && before.sampling.count == scene.shading.count()
         && before.view.subpixels == scene.image.subpixels
         && scene.used_materials().into_iter().all(was_edited)
 }
@@ -207,7 +207,7 @@ type AskThreads<'a> = dyn Fn(Method, &PreparedMaterial, Sampling) -> Result<Opti
 fn prepare_by(scene: &Scene, round: &Round, ask_threads: &AskThreads) -> Result<Prepared> {
     scene.check()?;
     let method = scene.shading.method;
-    let count = scene.shading.threads.unwrap_or(method.default_count());
+    let count = scene.shading.count();
     check_count(method, count, scene.image.subpixels)?;
     let Variant { pattern, .. } = Variant::new(method, scene.shading.pattern);
     let sampling = Sampling { count, seed: scene.shading.seed, pattern };
@@ -222,7 +222,7 @@ fn prepare_by(scene: &Scene, round: &Round, ask_threads: &AskThreads) -> Result<
     let mut materials = Vec::new();
     for name in scene.used_materials() {
         // `check` has found every material that an object names.
-        let Some(settings) = scene.materials.iter().find(|material| material.name == name) else { continue };
+        let Some(settings) = scene.material(name) else { continue };
         let brdf = round.ask(&LoadMaterial(&settings.source)).map_err(|error| match settings.source {
             MaterialSource::Model { .. } => error.within(format!("material \"{name}\"")),
             _ => error,
@@ -236,7 +236,7 @@ fn prepare_by(scene: &Scene, round: &Round, ask_threads: &AskThreads) -> Result<
         method,
         sampling,
         view,
-        show_environment: scene.image.background == crate::scene::Background::Environment,
+        show_environment: !scene.image.has_alpha(),
         environment,
         meshes,
         objects,
@@ -253,9 +253,9 @@ fn prepare_by(scene: &Scene, round: &Round, ask_threads: &AskThreads) -> Result<
 /// A file that cannot be read, a model that there is not.
 pub fn key_of(scene: &Scene, memo: &Memo) -> Result<Key> {
     let method = scene.shading.method;
-    let count = scene.shading.threads.unwrap_or(method.default_count());
+    let count = scene.shading.count();
     let image = &scene.image;
-    let shows_environment = image.background == crate::scene::Background::Environment;
+    let shows_environment = !image.has_alpha();
     let variant = Variant::new(method, scene.shading.pattern);
     let mut key = Key::builder(&variant.name()).number(count).number(scene.shading.seed);
     key = key.number(image.subpixels).number(u64::from(shows_environment));
@@ -267,7 +267,7 @@ pub fn key_of(scene: &Scene, memo: &Memo) -> Result<Key> {
         key = key.bytes(bytemuck::bytes_of(&object.transform())).text(&format!("{:?}", object.tangent));
     }
     for name in used_materials {
-        let Some(material) = scene.materials.iter().find(|material| material.name == name) else { continue };
+        let Some(material) = scene.material(name) else { continue };
         key = key.key(LoadMaterial(&material.source).key(memo)?);
     }
     Ok(key.build())
@@ -442,11 +442,11 @@ fn world_spheres(meshes: &[NamedMesh], objects: &[PlacedMesh]) -> Vec<(DVec3, f6
 
 /// An error for objects so large, small or far off that single precision, in which the GPU computes, would not hold areas
 /// of their triangles.
-fn check_size(mesh: &str, (center, radius): (DVec3, f64)) -> Result<()> {
+fn check_size(mesh: &str, (centre, radius): (DVec3, f64)) -> Result<()> {
     const SMALLEST: f64 = 1e-9;
     const LARGEST: f64 = 1e9;
     let remedy = format!("scale and place it such that both are from {SMALLEST:e} to {LARGEST:e}");
-    let (reach, size) = (center.length() + radius, 2.0 * radius);
+    let (reach, size) = (centre.length() + radius, 2.0 * radius);
     // Written so that a NaN fails too.
     if size >= SMALLEST && reach <= LARGEST {
         return Ok(());
@@ -456,9 +456,9 @@ fn check_size(mesh: &str, (center, radius): (DVec3, f64)) -> Result<()> {
 
 /// A sphere around `spheres`: centre of their box, and the radius that reaches the farthest.
 pub fn bounding_sphere(spheres: &[(DVec3, f64)]) -> (DVec3, f64) {
-    let low = spheres.iter().fold(DVec3::INFINITY, |low, (center, radius)| low.min(*center - *radius));
-    let high = spheres.iter().fold(DVec3::NEG_INFINITY, |high, (center, radius)| high.max(*center + *radius));
+    let low = spheres.iter().fold(DVec3::INFINITY, |low, (centre, radius)| low.min(*centre - *radius));
+    let high = spheres.iter().fold(DVec3::NEG_INFINITY, |high, (centre, radius)| high.max(*centre + *radius));
     let middle = (low + high) / 2.0;
-    let reach = spheres.iter().map(|(center, radius)| center.distance(middle) + radius).fold(0.0, f64::max);
+    let reach = spheres.iter().map(|(centre, radius)| centre.distance(middle) + radius).fold(0.0, f64::max);
     (middle, reach)
 }

@@ -6,9 +6,9 @@ mod common;
 use common::{Validated, map, model, sphere};
 use glam::{DVec3, dvec3};
 use std::f64::consts::PI;
-use threadlight::low_level::evaluate::reference::ReferenceSettings;
+use threadlight::low_level::evaluate::reference::{ReferenceSettings, reference};
 use threadlight::low_level::evaluate::sweep::{self, Measured};
-use threadlight::low_level::evaluate::{Cases, Shard, Sweep, reference_picture};
+use threadlight::low_level::evaluate::{Cases, Shard, Sweep};
 use threadlight::low_level::memo::Round;
 use threadlight::low_level::method::Method;
 use threadlight::low_level::prepare::Prepared;
@@ -87,7 +87,7 @@ fn measure(gpu: &Validated, name: &str, material: &str, light: EnvironmentSource
     };
     let sweep = Sweep { cases, repeat: 1, whole_picture: false, expected: false, keep_pictures: false };
     let settings = ReferenceSettings { tolerance: 5e-4, ..ReferenceSettings::default() };
-    let truth = |prepared: &Prepared, round: &Round| reference_picture(prepared, &gpu.device, &settings, round);
+    let truth = |prepared: &Prepared, round: &Round| reference(prepared, &gpu.device, &settings, round);
     let mut measured = Measured::default();
     sweep::run(&sweep, &gpu.device, &gpu.memo, &truth, &(), &mut measured).unwrap();
     for (row, &(threads, bound)) in measured.rows.iter().zip(bounds) {

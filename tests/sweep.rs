@@ -4,8 +4,9 @@ mod common;
 use common::{Validated, model, ready, sphere};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use tempfile::TempDir;
+use threadlight::low_level::evaluate::reference::ReferenceImage;
 use threadlight::low_level::evaluate::sweep::{self, Measured};
-use threadlight::low_level::evaluate::{Cases, ReferencePicture, Shard, Sweep, gallery};
+use threadlight::low_level::evaluate::{Cases, Shard, Sweep, gallery};
 use threadlight::low_level::memo::Round;
 use threadlight::low_level::method::Method;
 use threadlight::low_level::output::{ExrHeader, write_exr};
@@ -44,7 +45,7 @@ fn sweep(folder: &TempDir) -> Sweep {
 }
 
 /// The picture with 16 threads of `paper`, as if it were the truth.
-fn sixteen_threads(gpu: &Validated, prepared: &Prepared) -> Result<ReferencePicture> {
+fn sixteen_threads(gpu: &Validated, prepared: &Prepared) -> Result<ReferenceImage> {
     // What is asked for has the material and the environment, but threads of any number.
     let settings = ThreadSettings { kind: ThreadKind::Paper, count: 16, ..ThreadSettings::default() };
     let material = &prepared.materials[0];
@@ -56,7 +57,7 @@ fn sixteen_threads(gpu: &Validated, prepared: &Prepared) -> Result<ReferencePict
     own.sampling.count = 16;
     own.method = Method::Paper;
     let rendering = gpu.render(&own, Wanted { radiance: true, ..Wanted::default() });
-    Ok(ReferencePicture { radiance: rendering.radiance, error_estimate: 1e-4 })
+    Ok(ReferenceImage { radiance: rendering.radiance, error_estimate: 1e-4, ..ReferenceImage::default() })
 }
 
 #[test]

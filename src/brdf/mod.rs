@@ -191,7 +191,7 @@ impl Brdf {
     ///
     /// Midpoint rule over the half vector, theta_h = 90 deg x^2 with x uniform: lobes about the mirror direction are lobes
     /// about the normal there, at every view angle, and the square resolves narrow ones. Within about 1e-3 of the truth for
-    /// roughness_alpha >= 0.001.
+    /// roughness_alpha >= 0.001; lobes about another direction that are narrower than about 3 degrees fall between its points.
     pub fn albedo_from(&self, theta_o: f64, phi_o: f64) -> DVec3 {
         self.albedo_in_steps(theta_o, phi_o, [768, 384])
     }

@@ -8,8 +8,8 @@ use serde::{Deserialize, Serialize};
 use super::cases::{Cases, Place, Shard};
 use super::expected::TrueSample;
 use super::metrics::{Comparable, Metrics, check_size, compare};
+use super::reference::ReferenceImage;
 use super::reference::TOLERANCE;
-use super::reference_picture::ReferencePicture;
 use super::sheet::over_grey;
 use crate::error::Result;
 use crate::memo::{Memo, Round};
@@ -146,7 +146,7 @@ pub fn run(
     sweep: &Sweep,
     device: &Arc<Device>,
     memo: &Memo,
-    reference: &dyn Fn(&Prepared, &Round) -> Result<ReferencePicture>,
+    reference: &dyn Fn(&Prepared, &Round) -> Result<ReferenceImage>,
     observer: &dyn Observer,
     measured: &mut Measured,
 ) -> Result<()> {

@@ -12,12 +12,8 @@ use exr::prelude::{
     LayerAttributes, ReadChannels, ReadLayers, Vec2, WritableImage,
 };
 
-use super::{Format, PictureFile, Primaries, check_pixels, write_whole};
+use super::{DEFLATED, Format, PictureFile, Primaries, check_pixels, write_whole};
 use crate::error::{Error, Result};
-
-/// What deflate makes of a byte at most. It is used for samples, which take at least two, so that chroma of a quarter of the pixels may
-/// count as if it had them all.
-const DEFLATED: u64 = 1032;
 
 /// DWA deflates four bytes for each block of 8 x 8 samples.
 const MAX_SAMPLES_PER_BYTE: u64 = 16 * DEFLATED;
@@ -323,9 +319,7 @@ impl<'a> Group<'a> {
     /// All of them, in the order of their prefixes.
     fn all(layer: &'a FlatLayer) -> impl Iterator<Item = Self> {
         let mut groups = BTreeMap::<String, [Option<&FlatChannel>; 5]>::new();
-        // Chroma of a luminance-chroma image has fewer samples.
-        let is_full = |channel: &&FlatChannel| channel.sample_data.len() == layer.size.0 * layer.size.1;
-        for channel in layer.channel_data.list.iter().filter(is_full) {
+        for channel in &layer.channel_data.list {
             let name = string(&channel.name);
             let (prefix, last) = name.rsplit_once('.').unwrap_or(("", &name));
             let is_called = |names: &&[&str]| names.iter().any(|name| last.eq_ignore_ascii_case(name));

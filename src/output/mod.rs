@@ -10,6 +10,9 @@ mod png_file;
 mod primaries;
 mod whole_file;
 
+/// What deflate makes of a byte at most. A sample takes a byte or more, and so do most pixels: it bounds how many there are.
+const DEFLATED: u64 = 1032;
+
 pub(crate) use cache_file::keep_file;
 pub(crate) use exr_file::parse_exr;
 pub use exr_file::{ExrHeader, write_exr};

@@ -5,7 +5,7 @@ use std::path::Path;
 use image::codecs::png::{PngDecoder, PngEncoder};
 use image::{DynamicImage, ExtendedColorType, ImageDecoder, ImageEncoder};
 
-use super::{Format, PictureFile, check_pixels, write_whole};
+use super::{DEFLATED, Format, PictureFile, check_pixels, write_whole};
 use crate::error::{Error, Result};
 
 /// The bytes of a PNG before its first optional chunk: signature (8) and the IHDR chunk (25).
@@ -13,8 +13,6 @@ const AFTER_HEADER: usize = 8 + 25;
 /// The chunk that says "these values are sRGB, perceptual intent": length 1, name, intent 0, CRC-32.
 const SRGB_CHUNK: [u8; 13] = [0, 0, 0, 1, b's', b'R', b'G', b'B', 0, 0xae, 0xce, 0x1c, 0xe9];
 
-/// Deflate makes 1032 bytes of one, and a pixel takes one or more, but for pictures of 1, 2 and 4 bits a pixel.
-const MAX_PIXELS_PER_BYTE: u64 = 1032;
 /// Where the bits of a channel stand: behind the signature (8), the chunk's length and name (8), width and height (8).
 const BITS: usize = 24;
 
@@ -46,7 +44,7 @@ pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<PictureFile> {
     let decoder = PngDecoder::new(Cursor::new(bytes)).map_err(broken)?;
     let (width, height) = decoder.dimensions();
     let pixels_a_byte = bytes.get(BITS).map_or(1, |&bits| (8 / u64::from(bits.max(1))).max(1));
-    let most = MAX_PIXELS_PER_BYTE * pixels_a_byte;
+    let most = DEFLATED * pixels_a_byte;
     check_pixels(path, [u64::from(width) * u64::from(height)], bytes.len(), most)?;
     let decoded = DynamicImage::from_decoder(decoder).map_err(broken)?;
     Ok(PictureFile {

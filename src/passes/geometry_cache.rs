@@ -78,11 +78,11 @@ pub struct PlacedMesh {
 }
 
 impl PlacedMesh {
-    /// Centre and radius of a sphere in world space that holds what the sphere around `center` in object space does.
-    pub fn placed_sphere(&self, (center, radius): (DVec3, f64)) -> (DVec3, f64) {
+    /// Centre and radius of a sphere in world space that holds what the sphere around `centre` in object space does.
+    pub fn placed_sphere(&self, (centre, radius): (DVec3, f64)) -> (DVec3, f64) {
         let m = self.to_world.matrix3;
         let scale = m.x_axis.length().max(m.y_axis.length()).max(m.z_axis.length());
-        (self.to_world.transform_point3(center), scale * radius)
+        (self.to_world.transform_point3(centre), scale * radius)
     }
 }
 
@@ -189,8 +189,8 @@ impl GeometryCache {
     fn seen(&self, view: &View) -> impl Iterator<Item = &PlacedMesh> {
         let (inwards, eye) = (inward_normals(view), view.camera.eye);
         self.objects.iter().filter(move |object| {
-            let (center, radius) = self.sphere(object);
-            may_be_within(center - eye, radius, &inwards)
+            let (centre, radius) = self.sphere(object);
+            may_be_within(centre - eye, radius, &inwards)
         })
     }
 
@@ -218,8 +218,8 @@ impl GeometryCache {
     /// huge scenes leave the range of single precision.
     fn extent(&self, view: &View) -> f64 {
         let far_side = |object: &PlacedMesh| {
-            let (center, radius) = self.sphere(object);
-            center.distance(view.camera.eye) + radius
+            let (centre, radius) = self.sphere(object);
+            centre.distance(view.camera.eye) + radius
         };
         let farthest = self.seen(view).map(far_side).fold(0.0, f64::max);
         // Nothing, and a single point at the eye, have no extent, and nothing to be seen in any unit.
@@ -236,11 +236,11 @@ fn inward_normals(view: &View) -> [DVec3; 5] {
     [left, right, below, above, forward]
 }
 
-/// Whether something of what is within this sphere, of which `center` is seen from the eye, may be on the inner side of all these planes.
-fn may_be_within(center: DVec3, radius: f64, inwards: &[DVec3; 5]) -> bool {
+/// Whether something of what is within this sphere, of which `centre` is seen from the eye, may be on the inner side of all these planes.
+fn may_be_within(centre: DVec3, radius: f64, inwards: &[DVec3; 5]) -> bool {
     // Bounds and vertices are in single precision.
-    let margin = 1e-5 * (center.length() + radius);
-    inwards.iter().all(|normal| center.dot(*normal) > -radius - margin)
+    let margin = 1e-5 * (centre.length() + radius);
+    inwards.iter().all(|normal| centre.dot(*normal) > -radius - margin)
 }
 
 /// Draws the objects that may be seen into the geometry cache. Outside of `region`, where they all are, it may hold anything.
@@ -303,12 +303,12 @@ mod tests {
         let inwards = inward_normals(&view);
         let [mut seen, mut left_out, mut needless] = [0; 3];
         for i in 0..2000 {
-            let center = eye + (0.1 + 0.01 * i as f64) * direction(i, 2000);
+            let centre = eye + (0.1 + 0.01 * i as f64) * direction(i, 2000);
             let radius = 0.002 * (i * 7 % 700) as f64;
-            let on_sphere = |j| center + radius * direction(j, 500);
-            let is_seen = is_on_picture(center) || (0..500).map(on_sphere).any(is_on_picture);
-            let is_drawn = may_be_within(center - eye, radius, &inwards);
-            assert!(is_drawn || !is_seen, "{center} {radius}");
+            let on_sphere = |j| centre + radius * direction(j, 500);
+            let is_seen = is_on_picture(centre) || (0..500).map(on_sphere).any(is_on_picture);
+            let is_drawn = may_be_within(centre - eye, radius, &inwards);
+            assert!(is_drawn || !is_seen, "{centre} {radius}");
             seen += usize::from(is_seen);
             left_out += usize::from(!is_drawn);
             needless += usize::from(is_drawn && !is_seen);

@@ -122,22 +122,22 @@ mod tests {
         for i in 0..3000 {
             // Boxes of all sizes all around.
             let part = |k: usize| (i * k % 997) as f64 / 997.0;
-            let center = 10.0 * DVec3::new(part(331) - 0.5, part(517) - 0.5, part(709) - 0.7);
+            let centre = 10.0 * DVec3::new(part(331) - 0.5, part(517) - 0.5, part(709) - 0.7);
             let half = DVec3::new(part(97), part(193), part(389)) * 3.0;
             let corner = |k: usize| {
-                center + half * DVec3::from([0, 1, 2].map(|axis| f64::from((k >> axis & 1) as u8) * 2.0 - 1.0))
+                centre + half * DVec3::from([0, 1, 2].map(|axis| f64::from((k >> axis & 1) as u8) * 2.0 - 1.0))
             };
             let region = Region::of_boxes(&view, TILE_PX, (0..8).map(corner).map(exact));
             let [left, top, width, height] = region.subpixels(&view).map(|subpixels| f64::from(subpixels) / 2.0);
             for k in 0..200 {
                 let at = |m: usize| (k * m % 199) as f64 / 99.0 - 1.0;
-                let Some(pixel) = pixel_of(&view, center + half * DVec3::new(at(3), at(17), at(71))) else { continue };
+                let Some(pixel) = pixel_of(&view, centre + half * DVec3::new(at(3), at(17), at(71))) else { continue };
                 if pixel.x < 0.0 || pixel.y < 0.0 || pixel.x >= 403.0 || pixel.y >= 203.0 {
                     continue;
                 }
                 seen += 1;
                 let is_within = pixel.x >= left && pixel.y >= top && pixel.x < left + width && pixel.y < top + height;
-                assert!(is_within, "{center} {half}: {pixel} is not in {region:?}");
+                assert!(is_within, "{centre} {half}: {pixel} is not in {region:?}");
             }
             let whole = Region::whole(&view, TILE_PX);
             if let Some(corners) = (0..8).map(|k| pixel_of(&view, corner(k))).collect::<Option<Vec<_>>>()
@@ -145,7 +145,7 @@ mod tests {
             {
                 // A tile, and the margin.
                 let low = corners.iter().copied().fold(DVec2::INFINITY, DVec2::min).min(DVec2::new(403.0, 203.0));
-                assert!(left + 9.0 >= low.x && top + 9.0 >= low.y, "{center} {half}: {region:?}");
+                assert!(left + 9.0 >= low.x && top + 9.0 >= low.y, "{centre} {half}: {region:?}");
                 tight += 1;
             }
         }

@@ -311,6 +311,11 @@ impl Scene {
         names
     }
 
+    /// The material of this name, if there is one.
+    pub fn material(&self, name: &str) -> Option<&MaterialSettings> {
+        self.materials.iter().find(|material| material.name == name)
+    }
+
     /// An error where a program has set what no scene file can say.
     ///
     /// # Errors

@@ -12,7 +12,6 @@
 //! | beyond it: threads fitted to the BRDF | [`fitted`] |
 //! | beyond it: how albedos rise or fall in the last degree | [`rim`] |
 //! | beside it: the split sum of engines | [`split_sum`] |
-//!
 use std::f64::consts::FRAC_PI_2;
 
 use glam::DVec3;

@@ -1,12 +1,12 @@
 //! Changes of the scene, as the panel, a key or a dropped file makes them.
 use serde::{Deserialize, Serialize};
 
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::method::Method;
 use crate::prepare::check_count;
 use crate::scene::{
-    Background, Camera, EXPOSURE, EnvironmentSource, GAMMA, INTENSITY, MAX_SAMPLES, MAX_SIZE_PX, MAX_SUBPIXELS,
-    MaterialSource, MeshSource, Pattern, Scene, ShadingSettings, Source, within,
+    Background, Camera, EnvironmentSource, MAX_SAMPLES, MAX_SIZE_PX, MaterialSource, MeshSource, Pattern, Scene,
+    Source, within,
 };
 use std::path::PathBuf;
 
@@ -117,35 +117,25 @@ impl Change {
             Self::OneMaterial { material, source } => changed.material_mut(material)?.source = source.clone(),
             Self::Parameter { material, key, value } => changed.set_parameter(material, key, value)?,
             Self::Environment(source) => environment.source = source.clone(),
-            Self::Rotation(degrees) => {
-                environment.rotation_deg = within("rotation", *degrees, &(f64::MIN..=f64::MAX))?;
-            }
-            Self::Intensity(factor) => environment.intensity = within("intensity", *factor, &INTENSITY)?,
+            Self::Rotation(degrees) => environment.rotation_deg = *degrees,
+            Self::Intensity(factor) => environment.intensity = *factor,
             Self::Mesh(source) => changed.use_mesh(source.clone()),
             Self::Method(method) => (shading.method, shading.threads) = (*method, None),
-            Self::Threads(count) => {
-                count.map(|count| within("threads", count, &(1..=MAX_SAMPLES))).transpose()?;
-                shading.threads = *count;
-            }
+            Self::Threads(count) => shading.threads = *count,
             Self::Pattern(pattern) => shading.pattern = *pattern,
             Self::Seed(seed) => shading.seed = *seed,
             Self::Size(width, height) => {
                 check_size([*width, *height])?;
                 (image.width, image.height) = (*width, *height);
             }
-            Self::Subpixels(side) => image.subpixels = within("subpixels", *side, &(1..=MAX_SUBPIXELS))?,
-            Self::Exposure(factor) => image.exposure = within("exposure", *factor, &EXPOSURE)?,
-            Self::Gamma(gamma) => image.gamma = within("gamma", *gamma, &GAMMA)?,
+            Self::Subpixels(side) => image.subpixels = *side,
+            Self::Exposure(factor) => image.exposure = *factor,
+            Self::Gamma(gamma) => image.gamma = *gamma,
             Self::Background(background) => image.background = *background,
-            Self::Camera(camera) => {
-                if let Some(camera) = camera {
-                    camera.validate().map_err(|problem| Error::input("camera", problem, "move the camera"))?;
-                }
-                changed.camera = *camera;
-            }
+            Self::Camera(camera) => changed.camera = *camera,
         }
-        let ShadingSettings { method, threads, .. } = changed.shading;
-        check_count(method, threads.unwrap_or(method.default_count()), changed.image.subpixels)?;
+        changed.check()?;
+        check_count(changed.shading.method, changed.shading.count(), changed.image.subpixels)?;
         *scene = changed;
         Ok(())
     }

@@ -57,8 +57,8 @@ impl Other {
     /// # Errors
     /// More threads or samples than its method can have.
     pub fn check(&self, scene: &Scene) -> Result<()> {
-        let &Self::Shading(ShadingSettings { method, threads, .. }) = self else { return Ok(()) };
-        check_count(method, threads.unwrap_or(method.default_count()), scene.image.subpixels)
+        let Self::Shading(shading) = self else { return Ok(()) };
+        check_count(shading.method, shading.count(), scene.image.subpixels)
     }
 }
 

@@ -169,8 +169,7 @@ impl Viewer {
         if let Err(error) = self.try_handle(input) {
             self.tell_error(&error);
         } else if self.changes > changes {
-            let is_loaded =
-                self.loaded.as_ref().is_some_and(|loaded| loaded.key.is_some() && loaded.key == self.wanted);
+            let is_loaded = self.is_wanted(self.loaded.as_ref());
             self.latency.asked(input, start, (!is_loaded).then_some(self.changes));
         }
     }
@@ -266,7 +265,7 @@ impl Viewer {
             "0" => self.change(&Change::Exposure(1.0)),
             "[" | "]" => {
                 let method = shading.method;
-                let count = shading.threads.unwrap_or(method.default_count());
+                let count = shading.count();
                 let count = if key == "[" { count / 2 } else { count.saturating_mul(2) };
                 let count = count.clamp(1, most_count(method, self.session.wanted()));
                 self.change(&Change::Threads(Some(count)))

@@ -108,7 +108,7 @@ impl Viewer {
     }
 
     /// Whether frames of what is `loaded` are of what is wanted.
-    fn is_wanted(&self, loaded: Option<&Loaded>) -> bool {
+    pub(super) fn is_wanted(&self, loaded: Option<&Loaded>) -> bool {
         loaded.is_some_and(|loaded| loaded.key.is_some() && loaded.key == self.wanted)
     }
 

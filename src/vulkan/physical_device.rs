@@ -99,7 +99,7 @@ pub fn describe_devices(instance: &Instance) -> Result<Vec<DeviceDescription>> {
     Ok(candidates(instance)?.into_iter().map(|candidate| candidate.description).collect())
 }
 
-/// Both.
+/// The devices that the loader offers, usable or not, each with what is needed to open it.
 pub(super) fn candidates(instance: &Instance) -> Result<Vec<Candidate>> {
     // SAFETY: plain query of a live instance.
     let physical_devices = unsafe { instance.raw.enumerate_physical_devices() };

@@ -86,11 +86,9 @@ impl Shader {
         VulkanError::Shader { shader: self.name.to_owned(), problem: problem.to_string() }
     }
 
-    /// Whether the shader declares a binding or a specialisation constant of that name: what no shader declares need not be made.
-    ///
-    /// # Errors
-    /// SPIR-V that cannot be read.
-    pub fn declares(&self, name: &str) -> Result<bool> {
+    /// Whether the shader declares a binding or a specialisation constant of that name.
+    #[cfg(test)]
+    pub(crate) fn declares(&self, name: &str) -> Result<bool> {
         let interface = self.reflect()?;
         Ok(interface.bindings.contains_key(name) || interface.constants.contains_key(name))
     }

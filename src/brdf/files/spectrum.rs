@@ -22,8 +22,8 @@ pub(super) fn rec709_weights(wavelengths_nm: &[f64]) -> Vec<DVec3> {
     let mut sum = DVec3::ZERO;
     // Steps of 1 nm, in which what is linear between other steps is summed as well as need be.
     for nm in VISIBLE_NM[0] as u32..=VISIBLE_NM[1] as u32 {
-        let [nm, response] = [f64::from(nm); 2];
-        let response = response_at(response);
+        let nm = f64::from(nm);
+        let response = response_at(nm);
         sum += response;
         let after = wavelengths_nm.partition_point(|&known| known <= nm);
         if after == 0 || after == wavelengths_nm.len() {

@@ -16,8 +16,8 @@
 //!
 //! Lambda is (e^(-x^2) / (x sqrt pi) - erfc(x)) / 2, Smith's. As printed, the paper's is without the exponential.
 //!
-//! Departures: Delta, a perfect mirror in the paper, is a Beckmann lobe of the width `specular_alpha`, as a mirror has no BRDF. For g above
-//! 20 the sum, a mean over Poisson's distribution, is taken by its moments, with an error of at most 1e-4 of its peak.
+//! Departures: Delta, a perfect mirror in the paper, is a lobe of Beckmann's facets of the alpha `specular_alpha` with Smith's shadowing, as a mirror has
+//! no BRDF. For g above 20 the sum, a mean over Poisson's distribution, is taken by its moments, with an error of at most 1e-4 of its peak.
 //!
 //! Rough surfaces (sigma_0 well above lambda) are those of geometrical optics: Beckmann's facets of alpha = 2 sigma_0 / tau. Smooth ones
 //! are mirrors. Reciprocal. Energy is at most 1.05 within the theory's range, tau above lambda and 2 sigma_0 / tau below about 0.6, with
@@ -28,7 +28,7 @@ use glam::{DVec3, dvec3};
 use lambert_w::lambert_w0;
 
 use crate::brdf::microfacet::metals::index_of_refraction;
-use crate::brdf::microfacet::{Distribution, fresnel_conductor};
+use crate::brdf::microfacet::{Distribution, Roughness, fresnel_conductor};
 use crate::brdf::{Model, Parameters, Spacing, hash_numbers};
 use crate::error::Result;
 
@@ -129,7 +129,9 @@ impl Model for HeTorrance {
         let visible = fresnel_conductor(w_o.dot(h), self.eta, self.k) * shadowing;
         let geometry = (sum.length_squared() / sum.z).powi(2);
         let over_cos = (w_i.z * w_o.z).recip();
-        let mirror = 0.25 * Distribution::Beckmann.density(h, self.specular_alpha) * over_cos;
+        // Without shadowing of its own it would reflect up to 3.7 times what it receives at 89.5 degrees.
+        let roughness = Roughness::isotropic(self.specular_alpha);
+        let mirror = Distribution::Beckmann.torrance_sparrow(w_i, w_o, h, roughness);
         let channel = |lambda_um: f64| {
             let g = (2.0 * PI * sigma_um / lambda_um * sum.z).powi(2).max(1e-300);
             let a = (PI * self.tau_um / lambda_um).powi(2) * (sum.x * sum.x + sum.y * sum.y);

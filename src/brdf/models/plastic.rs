@@ -11,7 +11,7 @@ use crate::error::Result;
 ///
 /// The base gets what the coat lets through on the way in and out, with F of the smooth interface (Shirley et al., "A
 /// Practitioner's Assessment of Light Reflection Models", 1997). It is reciprocal, its albedo is diffuse (1 - F(theta_o)), so
-/// `diffuse` is what one sees away from highlights, and energy is conserved, to 0.3 %, as the coat takes over towards grazing angles.
+/// `diffuse` is what one sees away from highlights. Energy is at most 1.003; a rough coat loses light towards grazing angles.
 /// Simply adding diffuse / pi would differ by 4 to 8 % at small angles and reflect more than 1 at grazing ones.
 #[derive(Clone, Copy, Debug)]
 pub struct Plastic {

@@ -84,6 +84,7 @@ fn the_ends_of_ranges_reflect_more_than_they_receive_by_what_is_said() {
         ("principled", "base_colour = 0; metallic = 0; roughness = 0.5; sheen = 1; sheen_roughness = 0.5", 0.91),
         ("oren_nayar", "reflectance = 1; sigma_deg = 18", 1.05),
         ("he_torrance", "diffuse = 0; sigma_um = 0.1; tau_um = 2; specular_alpha = 0.01; eta = 0.01; k = 50", 1.05),
+        ("he_torrance", "diffuse = 0; sigma_um = 0.001; tau_um = 100; specular_alpha = 0.1; eta = 0.01; k = 100", 1.0),
         ("plastic", "distribution = 'beckmann'; alpha = 0.2; ior = 1.5; diffuse = 1", 1.003),
     ] {
         let brdf = samples::of_model(model, parameters);

@@ -7,9 +7,9 @@ use clap::value_parser;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use threadlight::low_level::environment;
-use threadlight::low_level::evaluate::reference::{Processor, ReferenceSettings};
+use threadlight::low_level::evaluate::reference::{self, Processor, ReferenceSettings};
 use threadlight::low_level::evaluate::sweep::Measured;
-use threadlight::low_level::evaluate::{Cases, Shard, Sweep, reference_picture, sweep, tables};
+use threadlight::low_level::evaluate::{Cases, Shard, Sweep, sweep, tables};
 use threadlight::low_level::memo::{Memo, Round};
 use threadlight::low_level::method::{Method, Variant};
 use threadlight::low_level::output;
@@ -212,8 +212,8 @@ impl TruthArguments {
             tolerance: self.reference_tolerance.unwrap_or(tolerance.max(self.reference_on.default_tolerance())),
             processor: self.reference_on,
         };
-        let reference = |prepared: &_, round: &Round| reference_picture(prepared, device, &settings, round);
-        sweep::run(sweep, device, memo, &reference, observer, measured)
+        let truth = |prepared: &_, round: &Round| reference::reference(prepared, device, &settings, round);
+        sweep::run(sweep, device, memo, &truth, observer, measured)
     }
 }
 

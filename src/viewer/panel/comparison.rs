@@ -162,7 +162,7 @@ fn choose(ui: &mut Ui, other: Option<&Other>, scene: &Scene, inputs: &mut Vec<In
     if let Some(Other::Shading(shading)) = other {
         let method = shading.method;
         let most = most_count(method, scene);
-        let mut count = shading.threads.unwrap_or(method.default_count());
+        let mut count = shading.count();
         if most == 1 {
             return;
         }

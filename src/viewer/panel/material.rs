@@ -31,10 +31,7 @@ impl State {
 
     pub fn show(&mut self, ui: &mut Ui, viewer: &Viewer, inputs: &mut Vec<Input>) {
         let scene = viewer.session.wanted();
-        let is_edited = |name| move |material: &&MaterialSettings| material.name == name;
-        let Some(settings) = self.edited(scene).and_then(|name| scene.materials.iter().find(is_edited(name))) else {
-            return;
-        };
+        let Some(settings) = self.edited(scene).and_then(|name| scene.material(name)) else { return };
         let used = scene.used_materials();
         group(ui, "Material", |ui| {
             if used.len() > 1 {

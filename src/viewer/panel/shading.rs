@@ -53,7 +53,7 @@ pub fn show(ui: &mut Ui, viewer: &Viewer, inputs: &mut Vec<Input>) {
             None => "Samples of the Monte Carlo estimate for each pixel.",
         };
         let most = most_count(method, scene);
-        let mut count = scene.shading.threads.unwrap_or(method.default_count());
+        let mut count = scene.shading.count();
         // The split sum has no choice.
         if most > 1 {
             let slider = egui::Slider::new(&mut count, 1..=most)

@@ -20,8 +20,8 @@
 //!   lobe: that is k k. What then lacks leaves evenly: h h, of which the integral is what lacks, in the manner of Kulla and Conty (2017). Both are
 //!   exact for a diffuse base and for a mirror; between them a lobe of later light is taken for the base's own lobe and a haze.
 //!
-//! Reciprocal as the base is. Energy is at most 1.002, or at most that of the base where the base reflects more than it receives.
-//! ior = 1 without absorption is the base itself.
+//! Reciprocal as the base is. Energy is at most 1.002 over isotropic bases, 1.03 at some azimuths over anisotropic ones that lose nothing, or at most
+//! that of the base where the base reflects more than it receives. ior = 1 without absorption is the base itself.
 //!
 //! Left out: the coat's roughness as to what goes through (it would widen the base's lobe; Guo et al., "Position-Free Monte Carlo
 //! Simulation for Arbitrary Layered BSDFs", 2018, have it), light that facets of the coat reflect among them (it is taken to go in),
