@@ -155,6 +155,8 @@ impl Model for HeTorrance {
     }
 
     fn hash_content(&self, hasher: &mut blake3::Hasher) {
+        // Caches hold threads and pictures of earlier versions, whose mirror had no shadowing.
+        hasher.update(b"shadowed mirror");
         for colour in [self.diffuse, self.eta, self.k] {
             hash_numbers(hasher, colour.to_array());
         }
