@@ -1,6 +1,5 @@
 //! `threadlight compare`: how much, and where, two pictures differ.
-use super::{number, print};
-use anyhow::Context;
+use super::{json, number, print};
 use std::path::PathBuf;
 use threadlight::Result;
 use threadlight::low_level::evaluate::{Comparable, Display, Metrics, compare, difference_picture};
@@ -65,9 +64,7 @@ impl Compare {
             let (width, height, rgba) = difference_picture(&a, &b, self.mask_background);
             output::write_png(path, width, height, &rgba, false)?;
         }
-        let text =
-            if self.json { serde_json::to_string_pretty(&metrics).context("--json")? + "\n" } else { table(&metrics) };
-        print(text)?;
+        print(if self.json { json("--json", &metrics)? } else { table(&metrics) })?;
         if let Some(at_most) = self.at_most {
             anyhow::ensure!(metrics.nan == 0, "{names}: {} values are NaN or infinite", metrics.nan);
             anyhow::ensure!(metrics.rms <= at_most, "{names}: the RMS is {:.3e}, above {at_most:e}", metrics.rms);

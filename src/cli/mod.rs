@@ -15,6 +15,7 @@ mod threads;
 #[cfg(feature = "viewer")]
 mod view;
 
+use anyhow::Context;
 use clap::{Parser, Subcommand};
 use std::io::{self, ErrorKind, IsTerminal, Write};
 use std::ops::RangeInclusive;
@@ -107,6 +108,11 @@ pub fn say(line: std::fmt::Arguments) {
 fn print(text: impl std::fmt::Display) -> io::Result<()> {
     let mut out = io::stdout().lock();
     unless_unheard(write!(out, "{text}").and_then(|()| out.flush()))
+}
+
+/// `value` as JSON with a last line end, for this flag.
+fn json(flag: &'static str, value: &impl serde::Serialize) -> anyhow::Result<String> {
+    Ok(serde_json::to_string_pretty(value).context(flag)? + "\n")
 }
 
 /// What was `printed` into a pipe without a reader is no error.

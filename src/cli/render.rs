@@ -2,8 +2,7 @@
 use super::progress::TerminalProgress;
 use super::rendered::{ReferenceStats, Rendered, Stats};
 use super::scene_flags::{MachineFlags, SceneFlags};
-use super::{none_of, number, print, say};
-use anyhow::Context;
+use super::{json, none_of, number, print, say};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::value_parser;
 use std::path::PathBuf;
@@ -84,8 +83,7 @@ impl Render {
         }
         let messages = messages.all();
         if let Some(path) = &self.stats {
-            let text = serde_json::to_string_pretty(&Stats::new(&rendered, messages.len())).context("--stats")? + "\n";
-            output::write_whole(path, text.as_bytes())?;
+            output::write_whole(path, json("--stats", &Stats::new(&rendered, messages.len()))?.as_bytes())?;
         }
         if self.print_plan {
             print(&rendered.rendering.plan)?;

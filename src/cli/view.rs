@@ -1,15 +1,15 @@
 //! `threadlight view`: a window to look at a scene and change it.
 use super::scene_flags::{MachineFlags, SceneFlags};
-use super::{none_of, signals};
+use super::{json, none_of, signals};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::value_parser;
 use std::path::PathBuf;
 use std::time::Duration;
+use threadlight::Error;
 use threadlight::low_level::output;
 use threadlight::low_level::viewer::latency::Record;
 use threadlight::low_level::viewer::{self, Ended, ViewerSettings, input};
 use threadlight::low_level::vulkan::PresentMode;
-use threadlight::{Error, Result};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -92,7 +92,7 @@ impl ViewArguments {
         let Ended { messages, stats, failures, missing_screenshot } =
             viewer::run(settings, |cancel| signals::next_does(move || cancel.cancel()))?;
         if let Some((path, stats)) = self.stats.as_deref().zip(stats) {
-            output::write_whole(path, serde_json::to_string_pretty(&stats)?.as_bytes())?;
+            output::write_whole(path, json("--stats", &stats)?.as_bytes())?;
         }
         none_of(&messages)?;
         // Whoever sits before the window has been told.
@@ -110,8 +110,6 @@ impl ViewArguments {
 
 /// The name of a present mode.
 fn present_modes() -> impl TypedValueParser<Value = PresentMode> {
-    let names = PossibleValuesParser::new(PresentMode::ALL.iter().map(|mode| mode.name()));
-    names.try_map(|name| -> Result<PresentMode> {
-        Ok(PresentMode::ALL.into_iter().find(|mode| mode.name() == name).unwrap_or_default())
-    })
+    PossibleValuesParser::new(PresentMode::ALL.iter().map(|mode| mode.name()))
+        .map(|name| PresentMode::ALL.into_iter().find(|mode| mode.name() == name).unwrap_or_default())
 }

@@ -1,8 +1,7 @@
 //! What the measurements have in common on the command line: what to measure, on which device, and where to write it.
 use crate::cli::render::processor;
 use crate::cli::scene_flags::parse_size;
-use crate::cli::{cache_folder, nameable, number, print, stem};
-use anyhow::Context;
+use crate::cli::{cache_folder, json, nameable, number, print, stem};
 use clap::value_parser;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -247,8 +246,7 @@ impl JsonArgument {
 
     pub fn write(&self, measurements: &impl serde::Serialize) -> anyhow::Result<()> {
         let Some(path) = &self.json else { return Ok(()) };
-        let text = serde_json::to_string_pretty(measurements).context("--json")? + "\n";
-        Ok(output::write_whole(path, text.as_bytes())?)
+        Ok(output::write_whole(path, json("--json", measurements)?.as_bytes())?)
     }
 }
 
