@@ -117,7 +117,8 @@ impl DeviceScene {
         let finest_level = light.blurred.as_ref().map(|blurred| finest_level(&blurred.rest));
         let upload = UploadMaterials { device, method, materials: &materials, evaluates_brdf, finest_level };
         let materials = round.ask(&upload)?;
-        let most = most_shaders(&prepared.view, device.limits().max_storage_buffer_range);
+        let View { width, height, .. } = prepared.view;
+        let most = most_shaders([width, height], device.limits().max_storage_buffer_range);
         let shaders = ShadersOfMaterials::new(prepared, light.blurred.as_ref(), most);
         let irradiance = light.blurred.as_ref().map(|light| round.ask(&UploadIrradiance { device, light, way_around }));
         let irradiance = irradiance.transpose()?;

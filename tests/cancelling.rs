@@ -76,7 +76,7 @@ fn threads_stop_being_made_at_once() {
     let narrow = Brdf::builtin("chrome").unwrap();
     for (kind, count) in [(ThreadKind::Fitted, 128), (ThreadKind::Paper, 1024)] {
         let settings = ThreadSettings { kind, count, ..ThreadSettings::default() };
-        expect_to_stop(kind.name(), [10, 100, 300], |flag| generate(&narrow, &settings, flag));
+        expect_to_stop(kind.name(), [10, 100, 300, 1000], |flag| generate(&narrow, &settings, flag));
     }
 }
 
@@ -99,7 +99,7 @@ fn the_reference_stops_at_once_and_comes_in_stages() {
     let gpu = Validated::with_own_memo();
     let prepared = hard_scene();
     let settings = ReferenceSettings { tolerance: 1e-6, ..ReferenceSettings::default() };
-    expect_to_stop("reference", [100, 1500], |flag| {
+    expect_to_stop("reference", [100, 1000, 3000], |flag| {
         reference(&prepared, &gpu.device, &settings, &gpu.memo.round(flag))
     });
 
@@ -225,7 +225,7 @@ fn an_interrupted_rendering_ends_soon_and_leaves_no_file() {
     let map = folder.path().join("map.exr");
     threadlight::low_level::output::write_exr(&map, width, height, &texels, false, &Default::default()).unwrap();
     let mut interrupted = BTreeSet::new();
-    let moments = [200, 1000].map(Duration::from_millis);
+    let moments = [300, 1500, 3000].map(Duration::from_millis);
     for (after, signal) in moments.into_iter().flat_map(|after| ["INT", "TERM"].map(|signal| (after, signal))) {
         let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_threadlight"));
         command.args(["render", "--no-cache", "--environment", "map.exr", "--size", "64x48", "-o", "picture.png"]);

@@ -313,7 +313,7 @@ fn sampling_has_the_reference_as_its_limit() {
 #[test]
 fn a_pole_of_tangents_is_finite_and_no_tangent_is_ever_missing() {
     let gpu = Validated::new();
-    let mut scene = scene(brushed("alpha_x = 0.05; alpha_y = 0.3"), Method::Fitted, 1);
+    let mut scene = scene(brushed("alpha_x = 0.02; alpha_y = 0.5"), Method::Fitted, 4);
     // Straight down on the pole, where tangents around the axis have no direction.
     scene.camera = Some(Camera { eye: 4.0 * DVec3::Y, target: DVec3::ZERO, up: DVec3::Z, fov_y_deg: 2.0 });
     for rule in [TangentRule::Around(Vec3::Y), TangentRule::Along(Vec3::Y)] {

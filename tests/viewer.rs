@@ -220,8 +220,7 @@ fn a_dragged_parameter_is_seen_by_drafts_and_ends_as_if_it_had_never_been_dragge
         // Unlike the finished picture, but like it.
         assert!(ms(event, "rms_to_finished").is_none_or(|rms| rms > 0.0 && rms < 0.02), "{event}");
     }
-    // A busy machine shows fewer.
-    assert!(events.iter().filter(|event| event["rms_to_finished"].is_number()).count() > values.len() / 4);
+    assert!(events.iter().filter(|event| event["rms_to_finished"].is_number()).count() > values.len() / 2);
     let last = events.last().unwrap();
     assert!(ms(last, "finished_ms") > ms(last, "shown_ms"), "{last}");
     viewer.render("scene.toml", "again.png");

@@ -10,15 +10,15 @@ mod png_file;
 mod primaries;
 mod whole_file;
 
-/// What deflate makes of a byte at most. A sample takes a byte or more, and so do most pixels: it bounds how many there are.
-const DEFLATED: u64 = 1032;
-
 pub(crate) use cache_file::keep_file;
 pub(crate) use exr_file::parse_exr;
 pub use exr_file::{ExrHeader, write_exr};
 pub use png_file::write_png;
 pub(crate) use primaries::Primaries;
 pub use whole_file::{check_all_writable, check_not_read, check_writable, file_in, file_name, write_whole};
+
+/// What deflate makes of a byte at most. A sample takes a byte or more, and so do most pixels: it bounds how many there are.
+const DEFLATED: u64 = 1032;
 
 /// The file formats of a picture, told apart by the extension of the file's name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -26,11 +26,11 @@ const WIDEST_VARIANCE: f32 = 4e-3;
 /// How many shaders there can be at most: each is compiled twice and has two lists of pixels. glsl/classify.comp has room for 32.
 pub const MAX_SHADERS: usize = 16;
 
-/// How many of them a picture of `view` may have where shaders see buffers of so many bytes: the lists of all classes are in one.
-pub fn most_shaders(view: &View, max_buffer_bytes: u32) -> usize {
-    let [columns, rows] = [view.width, view.height].map(|side| u64::from(side.next_multiple_of(TILE_SIDE)));
-    // Interior and edge pixels of each shader have room for all parts of all tiles, of 4 bytes.
-    let bytes_a_shader = 2 * 4 * (columns * rows / PART_PIXELS);
+/// How many of them a picture of this size in pixels may have where shaders see buffers of so many bytes: the lists of all classes are in one.
+pub fn most_shaders(size_px: [u32; 2], max_buffer_bytes: u32) -> usize {
+    let [columns, rows] = size_px.map(|side| u64::from(side.next_multiple_of(TILE_SIDE)));
+    // Interior and edge pixels of each shader have room for all parts of all tiles.
+    let bytes_a_shader = 2 * PART_BYTES * (columns * rows / PART_PIXELS);
     (u64::from(max_buffer_bytes) / bytes_a_shader.max(1)).clamp(1, MAX_SHADERS as u64) as usize
 }
 
@@ -53,6 +53,9 @@ const TILE_SIDE: u32 = 8;
 
 /// Pixels of a part of a tile, at most: the same in glsl/tiles.glsl.
 const PART_PIXELS: u64 = 8;
+
+/// Bytes of a listed part: see `pack_part` in glsl/tiles.glsl.
+const PART_BYTES: u64 = 4;
 
 /// Bytes of `TileClass` in glsl/tiles.glsl: the arguments of an indirect dispatch, and a count.
 const TILE_CLASS_BYTES: u64 = 16;
@@ -193,7 +196,7 @@ pub fn classify<'a>(
     let mut counters = graph.kept_buffer("counters", BufferDesc { size_bytes: Counters::arguments_of(class_count) });
     graph.clear_buffer("clear_counters", &mut counters);
     let part_count = class_count as u64 * tile_pixels.div_ceil(PART_PIXELS) * tile_count;
-    let mut parts = graph.kept_buffer("part_list", BufferDesc { size_bytes: 4 * part_count });
+    let mut parts = graph.kept_buffer("part_list", BufferDesc { size_bytes: PART_BYTES * part_count });
     let mut pixels = graph.kept_buffer("pixel_list", BufferDesc { size_bytes: 4 * tile_pixels * tile_count });
     let mut coverage = graph.kept_buffer("coverage", BufferDesc { size_bytes: tile_pixels * tile_count / 4 });
     graph
@@ -214,4 +217,16 @@ pub fn classify<'a>(
         })
         .groups([region.tiles()[0], region.tiles()[1], 1]);
     Tiles { region, counters, parts, pixels, coverage }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_largest_pictures_have_as_many_shaders_as_their_lists_have_room_for() {
+        // As lavapipe has it.
+        let most = |size_px| most_shaders(size_px, 128 << 20);
+        assert_eq!([[640, 480], [3840, 2160], [4096, 4096], [8192, 4096]].map(most), [16, 16, 8, 4]);
+    }
 }

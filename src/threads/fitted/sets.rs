@@ -19,7 +19,7 @@ const FEW_THREADS: usize = 8;
 const PART_OF_LOBE: f64 = 0.2;
 
 /// How many of the `subpixels` x `subpixels` of a pixel within one surface are sums of their own: of more than 2 x 2 one in each row and column. If
-/// all of 4 x 4 were, 16 threads would be one for each, and a sphere of GGX 0.2 would err by 0.030 in the place of 0.005. Twin in
+/// all of 4 x 4 were, 16 threads would be one for each, and a sphere of GGX 0.2 would err by 0.030 in the place of 0.004. Twin in
 /// glsl/shared_sum.glsl.
 pub fn sums_of_pixel(subpixels: u32) -> u32 {
     if subpixels > 2 { subpixels } else { subpixels * subpixels }

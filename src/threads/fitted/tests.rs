@@ -537,17 +537,16 @@ fn brushed(alpha_x: f64, alpha_y: f64) -> Brdf {
 
 #[test]
 fn drafts_follow_a_brushed_lobe_with_up_to_three_times_the_error() {
-    const STEPS: u32 = 6;
+    const STEPS: u32 = 12;
     let at = |step: u32| brushed(0.2 - 0.1 * f64::from(step) / f64::from(STEPS), 0.5);
     let settings = ThreadSettings { sets: 2, ..small(16, 90) };
-    let finished = generate(&at(0), &settings, &()).unwrap();
-    let mut drafted = finished.clone();
-    for step in (1..=STEPS).chain((0..STEPS).rev()) {
+    let mut drafted = generate(&at(0), &settings, &()).unwrap();
+    for step in 1..=STEPS {
         drafted = draft(&at(step), &drafted, &()).unwrap();
-        assert!(drafted != finished, "{step}");
     }
+    let finished = generate(&at(STEPS), &settings, &()).unwrap();
     assert_eq!(drafted.azimuths, finished.azimuths);
-    let [found, finished] = [drafted, finished].map(|table| validation_error(&table, &at(0)));
-    println!("after {} drafts {found:.5}, finished {finished:.5}", 2 * STEPS);
+    let [found, finished] = [drafted, finished].map(|table| validation_error(&table, &at(STEPS)));
+    println!("after {STEPS} drafts {found:.5}, finished {finished:.5}");
     assert!(found < 3.0 * finished, "{found} {finished}");
 }
