@@ -4,7 +4,7 @@ use crate::environment::{self, CustomEnvironment};
 use crate::evaluate::reference::{ReferenceSettings, reference};
 use crate::memo::Memo;
 use crate::method::Method;
-use crate::output::ExrHeader;
+use crate::picture::ExrHeader;
 use crate::pipeline::{DeviceScene, Rendering, Wanted, check_picture};
 use crate::prepare::{prepare, threads_of};
 use crate::progress::Observer;

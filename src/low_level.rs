@@ -9,8 +9,8 @@ pub mod device_check;
 pub mod environment;
 #[path = "evaluate/mod.rs"]
 pub mod evaluate;
-#[path = "file_format.rs"]
-pub mod file_format;
+#[path = "files/mod.rs"]
+pub mod files;
 #[path = "geometry_texel.rs"]
 pub mod geometry_texel;
 #[path = "graph/mod.rs"]
@@ -21,12 +21,12 @@ pub mod light;
 pub mod memo;
 #[path = "method.rs"]
 pub mod method;
-#[path = "output/mod.rs"]
-pub mod output;
 #[path = "packing.rs"]
 pub mod packing;
 #[path = "passes/mod.rs"]
 pub mod passes;
+#[path = "picture/mod.rs"]
+pub mod picture;
 #[path = "pipeline.rs"]
 pub mod pipeline;
 #[path = "prepare.rs"]

@@ -3,8 +3,8 @@ use crate::graph::{BufferHandle, Executable, FrameGraph, ImageHandle};
 use crate::light::finest_level;
 use crate::memo::{Held, Keyed, Round};
 use crate::method::Method;
-use crate::output::{self, ExrHeader, Format};
 use crate::passes::*;
+use crate::picture::{self, ExrHeader, Format};
 use crate::prepare::Prepared;
 use crate::progress::Observer;
 use crate::scene::{ImageSettings, Mesh, Scene};
@@ -247,8 +247,8 @@ impl Rendering {
     pub fn write(&self, path: &Path, image: &ImageSettings, header: &ExrHeader) -> Result<()> {
         let &ImageSettings { width, height, .. } = image;
         match Format::of(path)? {
-            Format::Png => output::write_png(path, width, height, &self.display, image.has_alpha()),
-            Format::Exr => output::write_exr(path, width, height, &self.radiance, image.has_alpha(), header),
+            Format::Png => picture::write_png(path, width, height, &self.display, image.has_alpha()),
+            Format::Exr => picture::write_exr(path, width, height, &self.radiance, image.has_alpha(), header),
         }
     }
 

@@ -1,5 +1,7 @@
 //! Long work: how it says how far it is, and how it is told to stop.
 
+use std::sync::atomic::{AtomicUsize, Ordering};
+
 use crate::error::{Error, Result};
 
 /// Watches long work.
@@ -27,6 +29,30 @@ impl Observer for () {
     fn progress(&self, _done: usize, _total: usize) {}
     fn cancelled(&self) -> bool {
         false
+    }
+}
+
+/// Counts the parts of long work for its observer; they may end on any thread.
+pub(crate) struct Parts<'a> {
+    observer: &'a dyn Observer,
+    done: AtomicUsize,
+    total: usize,
+}
+
+impl<'a> Parts<'a> {
+    /// Tells `observer` that none of `total` is done.
+    pub fn new(total: usize, observer: &'a dyn Observer) -> Self {
+        observer.progress(0, total);
+        Self { observer, done: AtomicUsize::new(0), total }
+    }
+
+    /// One more is done.
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`].
+    pub fn advance(&self) -> Result<()> {
+        self.observer.progress(self.done.fetch_add(1, Ordering::Relaxed) + 1, self.total);
+        self.observer.check()
     }
 }
 

@@ -223,7 +223,7 @@ fn an_interrupted_rendering_ends_soon_and_leaves_no_file() {
     let (width, height) = (1024, 512);
     let texels: Vec<[f32; 4]> = (0..width * height).map(|i| [(i % 97) as f32, (i % 31) as f32, 1.0, 1.0]).collect();
     let map = folder.path().join("map.exr");
-    threadlight::low_level::output::write_exr(&map, width, height, &texels, false, &Default::default()).unwrap();
+    threadlight::low_level::picture::write_exr(&map, width, height, &texels, false, &Default::default()).unwrap();
     let mut interrupted = BTreeSet::new();
     let moments = [300, 1500, 3000].map(Duration::from_millis);
     for (after, signal) in moments.into_iter().flat_map(|after| ["INT", "TERM"].map(|signal| (after, signal))) {

@@ -39,7 +39,7 @@ fn a_custom_brdf_looks_like_the_model_with_its_values() {
     let map = folder.path().join("map.exr");
     let texel = |i: i32| if i == 64 * 9 + 20 { [90.0, 70.0, 50.0, 1.0] } else { [(i % 7) as f32, 0.1, 0.5, 1.0] };
     let texels: Vec<_> = (0..64 * 32).map(texel).collect();
-    threadlight::low_level::output::write_exr(&map, 64, 32, &texels, false, &Default::default()).unwrap();
+    threadlight::low_level::picture::write_exr(&map, 64, 32, &texels, false, &Default::default()).unwrap();
     let (sunny, white) = (Source::File(map), Source::Builtin("white".to_owned()));
     let (round, long) = ("alpha = 0.15", "alpha_x = 0.15\nalpha_y = 0.4\nrotation_deg = 20");
     for (roughness, method, environment, threads, tolerance) in [

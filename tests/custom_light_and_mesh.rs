@@ -36,7 +36,7 @@ fn light_file(folder: &Path) -> EnvironmentSource {
     let path = folder.join("light.exr");
     let [width, height] = SIZE.map(|size| size as u32);
     let pixels: Vec<_> = pixels().iter().map(|&[r, g, b]| [r, g, b, 1.0]).collect();
-    threadlight::low_level::output::write_exr(&path, width, height, &pixels, false, &Default::default()).unwrap();
+    threadlight::low_level::picture::write_exr(&path, width, height, &pixels, false, &Default::default()).unwrap();
     EnvironmentSource::File(path)
 }
 

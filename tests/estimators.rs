@@ -12,7 +12,7 @@ use threadlight::low_level::evaluate::reference::Integrator;
 use threadlight::low_level::geometry_texel::GeometryTexel;
 use threadlight::low_level::memo::Memo;
 use threadlight::low_level::method::{Method, Variant};
-use threadlight::low_level::output::write_exr;
+use threadlight::low_level::picture::write_exr;
 use threadlight::low_level::pipeline::{Rendering, Wanted};
 use threadlight::low_level::prepare::Prepared;
 use threadlight::low_level::scene::{

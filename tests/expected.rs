@@ -8,7 +8,7 @@ use threadlight::low_level::evaluate::expected::{TrueSample, prepare_within};
 use threadlight::low_level::evaluate::metrics::{Comparable, Display, compare};
 use threadlight::low_level::evaluate::reference::TOLERANCE;
 use threadlight::low_level::evaluate::reference::{ReferenceSettings, reference};
-use threadlight::low_level::output::{ExrHeader, write_exr};
+use threadlight::low_level::picture::{ExrHeader, write_exr};
 use threadlight::low_level::pipeline::Wanted;
 use threadlight::low_level::scene::{Background, Scene, Source};
 

@@ -138,7 +138,7 @@ fn light_that_brings_lamps_brings_the_brdfs_that_they_are_shaded_by() {
     let map = |name: &str, lamp: f32| {
         let path = folder.path().join(name);
         let texels: Vec<_> = (0..32 * 16).map(|i| [if i == 200 { lamp } else { 1.0 }; 4]).collect();
-        threadlight::low_level::output::write_exr(&path, 32, 16, &texels, false, &Default::default()).unwrap();
+        threadlight::low_level::picture::write_exr(&path, 32, 16, &texels, false, &Default::default()).unwrap();
         Source::File(path)
     };
     let mut scene = small();
@@ -160,7 +160,7 @@ fn a_lobe_that_mirrors_lamps_brings_what_they_are_blurred_to() {
     let path = folder.path().join("lamp.exr");
     let is_lamp = |i: usize| (60..63).contains(&(i % 128)) && (20..23).contains(&(i / 128));
     let texels: Vec<_> = (0..128 * 64).map(|i| [if is_lamp(i) { 500.0 } else { 1.0 }; 4]).collect();
-    threadlight::low_level::output::write_exr(&path, 128, 64, &texels, false, &Default::default()).unwrap();
+    threadlight::low_level::picture::write_exr(&path, 128, 64, &texels, false, &Default::default()).unwrap();
     let mut scene = small();
     scene.environment.source = Source::File(path);
     scene.materials[0].source = common::model("model = 'lambert'\nreflectance = 0.5");

@@ -11,7 +11,7 @@ use threadlight::low_level::evaluate::Display;
 use threadlight::low_level::evaluate::reference::{
     Integrator, Processor, ReferenceImage, ReferenceSettings, TOLERANCE, reference, tone_map,
 };
-use threadlight::low_level::output::{read_image, write_exr};
+use threadlight::low_level::picture::{read_image, write_exr};
 use threadlight::low_level::pipeline::{Wanted, render_geometry};
 use threadlight::low_level::prepare::Prepared;
 use threadlight::low_level::scene::{Background, Camera, MaterialSource, Scene, Source, TangentRule};

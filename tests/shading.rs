@@ -86,7 +86,7 @@ fn map_with_lamp(folder: &Path, name: &str, lamp: [f32; 4]) -> EnvironmentSource
         _ => [(i % 7) as f32, (i / 64) as f32 / 8.0, 0.5, 1.0],
     };
     let texels: Vec<_> = (0..64 * 32).map(texel).collect();
-    threadlight::low_level::output::write_exr(&path, 64, 32, &texels, false, &Default::default()).unwrap();
+    threadlight::low_level::picture::write_exr(&path, 64, 32, &texels, false, &Default::default()).unwrap();
     Source::File(path)
 }
 
@@ -234,7 +234,7 @@ fn lamps_of_many_sizes_are_shaded_as_by_the_cpu_twin() {
         _ => [0.5, 0.4, 0.01 * (x + y) as f32, 1.0],
     };
     let texels: Vec<_> = (0..64).flat_map(|y| (0..128).map(move |x| texel((x, y)))).collect();
-    threadlight::low_level::output::write_exr(&map, 128, 64, &texels, false, &Default::default()).unwrap();
+    threadlight::low_level::picture::write_exr(&map, 128, 64, &texels, false, &Default::default()).unwrap();
     // As far as the view grazes it.
     std::fs::write(&ground, "v -90 -1 90\nv 90 -1 90\nv 90 -1 -90\nv -90 -1 -90\nf 1 2 3 4\n").unwrap();
     let memo = gpu.memo_of_twin();
@@ -392,7 +392,7 @@ fn the_split_sum_of_a_metal_is_its_albedos_times_light_weighted_by_ggx_and_by_th
     let path = folder.path().join("map.exr");
     let texel = |i: usize| [1.0 + (i % 64) as f32 / 16.0, (i / 64) as f32 / 8.0, 0.5, 1.0];
     let texels: Vec<_> = (0..64 * 32).map(texel).collect();
-    threadlight::low_level::output::write_exr(&path, 64, 32, &texels, false, &Default::default()).unwrap();
+    threadlight::low_level::picture::write_exr(&path, 64, 32, &texels, false, &Default::default()).unwrap();
     // Of so large a k all is reflected, from everywhere.
     let material = model("model = 'conductor'\ndistribution = 'ggx'\nalpha = 0.3\neta = 1.0\nk = 100.0");
     let mut scene = sphere(material.clone(), "white", 1, (80, 60));
@@ -514,7 +514,7 @@ fn a_narrow_lobe_shows_a_lamp_with_dim_edges_as_the_reference_does() {
         _ => [0.05, 0.05, 0.05, 1.0],
     };
     let texels: Vec<_> = (0..128).flat_map(|y| (0..256).map(move |x| texel((x, y)))).collect();
-    threadlight::low_level::output::write_exr(&map, 256, 128, &texels, false, &Default::default()).unwrap();
+    threadlight::low_level::picture::write_exr(&map, 256, 128, &texels, false, &Default::default()).unwrap();
     for (name, parameters, most) in [
         ("Beckmann", "model = 'conductor'\ndistribution = 'beckmann'\nalpha = 0.02\nmetal = 'Cr'", 0.01),
         ("Torrance-Sparrow", "model = 'torrance_sparrow'\ndiffuse = 0\nspread_deg = 3\nmetal = 'Au'", 0.007),
@@ -659,7 +659,7 @@ fn a_sun_of_a_million_stays_finite() {
     let path = folder.path().join("sun.exr");
     let mut texels = vec![[0.25, 0.25, 0.25, 1.0]; 64 * 32];
     texels[64 * 10 + 20] = [1e6, 1e6, 1e6, 1.0];
-    threadlight::low_level::output::write_exr(&path, 64, 32, &texels, false, &Default::default()).unwrap();
+    threadlight::low_level::picture::write_exr(&path, 64, 32, &texels, false, &Default::default()).unwrap();
     for (name, material) in analytic_materials() {
         let mut scene = sphere(material, "white", 16, (48, 36));
         scene.environment.source = Source::File(path.clone());

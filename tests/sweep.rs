@@ -9,7 +9,7 @@ use threadlight::low_level::evaluate::sweep::{self, Measured};
 use threadlight::low_level::evaluate::{Cases, Shard, Sweep, gallery};
 use threadlight::low_level::memo::Round;
 use threadlight::low_level::method::Method;
-use threadlight::low_level::output::{ExrHeader, write_exr};
+use threadlight::low_level::picture::{ExrHeader, write_exr};
 use threadlight::low_level::pipeline::Wanted;
 use threadlight::low_level::prepare::Prepared;
 use threadlight::low_level::progress::Observer;

@@ -20,7 +20,7 @@ fn environment(width: usize) -> Environment {
             [1.0 + (row as f32 / 6.0).sin(), ((column * 7 + row * 3) % 13) as f32, spot, 1.0]
         })
         .collect();
-    threadlight::low_level::output::write_exr(&path, width as u32, height as u32, &texels, false, &Default::default())
+    threadlight::low_level::picture::write_exr(&path, width as u32, height as u32, &texels, false, &Default::default())
         .unwrap();
     Environment::load(&path).unwrap()
 }

@@ -12,7 +12,7 @@ use std::path::Path;
 use glam::{DVec2, DVec3, dvec3};
 
 use crate::error::{Error, Result};
-use crate::file_format::{self, FileKind};
+use crate::files::{FileKind, read};
 
 mod base;
 mod builtin;
@@ -113,7 +113,7 @@ impl Brdf {
 
     /// The model that a material file (`.toml`) names, and its parameters, not yet checked.
     pub fn load_model(path: &Path) -> Result<(String, toml::Table)> {
-        files::parse_model(path, &file_format::read(path)?)
+        files::parse_model(path, &read(path)?)
     }
 
     /// The model of the built-in material `name`, and its parameters.

@@ -6,7 +6,7 @@ use toml::{Table, Value};
 
 use super::Brdf;
 use crate::error::{Error, Result};
-use crate::file_format::is_misspelt;
+use crate::files::is_misspelt;
 
 /// The parameters of one material that have not been read yet.
 pub struct Parameters {

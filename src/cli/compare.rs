@@ -3,7 +3,8 @@ use super::{json, number, print};
 use std::path::PathBuf;
 use threadlight::Result;
 use threadlight::low_level::evaluate::{Comparable, Display, Metrics, compare, difference_picture};
-use threadlight::low_level::output;
+use threadlight::low_level::files;
+use threadlight::low_level::picture;
 use threadlight::low_level::scene::{EXPOSURE, GAMMA};
 
 const EXAMPLES: &str = "\
@@ -51,18 +52,18 @@ pub struct Compare {
 impl Compare {
     pub fn run(self) -> anyhow::Result<()> {
         if let Some(path) = &self.difference {
-            output::check_png(path)?;
-            output::check_writable(path)?;
-            output::check_not_read([path], [&self.a, &self.b])?;
+            picture::check_png(path)?;
+            files::check_writable(path)?;
+            files::check_not_read([path], [&self.a, &self.b])?;
         }
         let display = Display { exposure: self.exposure, gamma: self.gamma };
-        let read = |path| -> Result<_> { Ok(Comparable::from_picture(&output::read_image(path)?, display)) };
+        let read = |path| -> Result<_> { Ok(Comparable::from_picture(&picture::read_image(path)?, display)) };
         let (a, b) = (read(&self.a)?, read(&self.b)?);
         let names = format!("{} and {}", self.a.display(), self.b.display());
         let metrics = compare(&a, &b, self.mask_background).map_err(|error| error.within(&names))?;
         if let Some(path) = &self.difference {
             let (width, height, rgba) = difference_picture(&a, &b, self.mask_background);
-            output::write_png(path, width, height, &rgba, false)?;
+            picture::write_png(path, width, height, &rgba, false)?;
         }
         print(if self.json { json("--json", &metrics)? } else { table(&metrics) })?;
         if let Some(at_most) = self.at_most {

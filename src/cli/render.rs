@@ -9,9 +9,10 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use threadlight::low_level::evaluate::expected::prepare_within;
 use threadlight::low_level::evaluate::reference::{self, Processor, ReferenceSettings};
+use threadlight::low_level::files;
 use threadlight::low_level::memo::{Memo, Step};
 use threadlight::low_level::method::Method;
-use threadlight::low_level::output::{self, Format};
+use threadlight::low_level::picture::Format;
 use threadlight::low_level::pipeline::{DeviceScene, Rendering, Wanted, check_picture};
 use threadlight::low_level::prepare::prepare;
 use threadlight::low_level::progress::Observer;
@@ -83,7 +84,7 @@ impl Render {
         }
         let messages = messages.all();
         if let Some(path) = &self.stats {
-            output::write_whole(path, json("--stats", &Stats::new(&rendered, messages.len()))?.as_bytes())?;
+            files::write_whole(path, json("--stats", &Stats::new(&rendered, messages.len()))?.as_bytes())?;
         }
         if self.print_plan {
             print(&rendered.rendering.plan)?;
@@ -97,9 +98,9 @@ impl Render {
             let remedy = "name a picture with -o FILE.png, or ask for --stats or --print-plan";
             return Err(Error::input("render", "has nothing to write", remedy));
         }
-        output::check_all_writable(self.output.iter().chain(&self.stats))?;
+        files::check_all_writable(self.output.iter().chain(&self.stats))?;
         let scene = self.scene.scene()?;
-        output::check_not_read(self.output.iter().chain(&self.stats), &self.scene.files(&scene))?;
+        files::check_not_read(self.output.iter().chain(&self.stats), &self.scene.files(&scene))?;
         let method = scene.shading.method;
         let is_reference = method == Method::Reference;
         let useless = [

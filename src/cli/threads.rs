@@ -4,9 +4,10 @@ use super::scene_flags::subpixels;
 use super::{cache_folder, nameable, say, stem};
 use std::path::{Path, PathBuf};
 use threadlight::Error;
+use threadlight::low_level::files;
 use threadlight::low_level::memo::{Asked, Memo, Origin, Step};
 use threadlight::low_level::method::Method;
-use threadlight::low_level::output;
+use threadlight::low_level::picture;
 use threadlight::low_level::prepare::threads_of;
 use threadlight::low_level::scene::{ImageSettings, MaterialSource};
 use threadlight::low_level::steps::FitThreads;
@@ -68,10 +69,10 @@ impl Threads {
             return Err(Error::input("--count", format!("{count} is out of range"), remedy).into());
         }
         self.output.as_deref().map_or(Ok(()), check_threads)?;
-        self.plot.as_deref().map_or(Ok(()), output::check_png)?;
-        output::check_all_writable(self.output.iter().chain(&self.plot))?;
+        self.plot.as_deref().map_or(Ok(()), picture::check_png)?;
+        files::check_all_writable(self.output.iter().chain(&self.plot))?;
         let source = MaterialSource::named(&self.material);
-        output::check_not_read(self.output.iter().chain(&self.plot), &source.files())?;
+        files::check_not_read(self.output.iter().chain(&self.plot), &source.files())?;
         let name = match &source {
             MaterialSource::File(path) => stem(path),
             _ => self.material.clone(),

@@ -6,7 +6,8 @@ use clap::value_parser;
 use std::path::PathBuf;
 use std::time::Duration;
 use threadlight::Error;
-use threadlight::low_level::output;
+use threadlight::low_level::files;
+use threadlight::low_level::picture;
 use threadlight::low_level::viewer::latency::Record;
 use threadlight::low_level::viewer::{self, Ended, ViewerSettings, input};
 use threadlight::low_level::vulkan::PresentMode;
@@ -63,11 +64,11 @@ const SIZE: (u32, u32) = (980, 720);
 
 impl ViewArguments {
     pub fn run(self) -> anyhow::Result<()> {
-        self.screenshot.as_deref().map_or(Ok(()), output::check_png)?;
-        output::check_all_writable(self.screenshot.iter().chain(&self.stats))?;
+        self.screenshot.as_deref().map_or(Ok(()), picture::check_png)?;
+        files::check_all_writable(self.screenshot.iter().chain(&self.stats))?;
         let mut scene = self.scene.scene()?;
         let read = self.scene.scene.iter().chain(&self.replay);
-        output::check_not_read(self.screenshot.iter().chain(&self.stats), read.chain(&scene.files()))?;
+        files::check_not_read(self.screenshot.iter().chain(&self.stats), read.chain(&scene.files()))?;
         if self.scene.scene.is_none() && self.scene.size.is_none() {
             (scene.image.width, scene.image.height) = SIZE;
         }
@@ -92,7 +93,7 @@ impl ViewArguments {
         let Ended { messages, stats, failures, missing_screenshot } =
             viewer::run(settings, |cancel| signals::next_does(move || cancel.cancel()))?;
         if let Some((path, stats)) = self.stats.as_deref().zip(stats) {
-            output::write_whole(path, json("--stats", &stats)?.as_bytes())?;
+            files::write_whole(path, json("--stats", &stats)?.as_bytes())?;
         }
         none_of(&messages)?;
         // Whoever sits before the window has been told.

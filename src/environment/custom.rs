@@ -3,7 +3,7 @@ use std::sync::Arc;
 
 use super::Environment;
 use crate::error::{Error, Result};
-use crate::output::MAX_PIXELS;
+use crate::picture::MAX_PIXELS;
 
 /// An environment of pixels that a program has made. Cheap to clone: clones and renderers share the pixels.
 ///
@@ -74,7 +74,7 @@ impl PartialEq for CustomEnvironment {
 mod tests {
     use super::*;
     use crate::environment::RepairCounts;
-    use crate::output::{ExrHeader, write_exr};
+    use crate::picture::{ExrHeader, write_exr};
 
     #[test]
     fn pixels_that_a_program_gives_are_repaired_as_those_of_a_file_are() {

@@ -3,8 +3,8 @@ use std::path::Path;
 
 use super::Environment;
 use crate::error::Result;
-use crate::file_format::FileFormat;
-use crate::output;
+use crate::files::FileFormat;
+use crate::picture;
 
 pub(super) const FORMAT: FileFormat<Environment> = FileFormat {
     extension: "exr",
@@ -15,7 +15,7 @@ pub(super) const FORMAT: FileFormat<Environment> = FileFormat {
 
 /// EXR needs channels R, G, B or only Y; alpha is ignored.
 fn parse(path: &Path, bytes: &[u8]) -> Result<Environment> {
-    let picture = output::parse_exr(path, bytes)?;
+    let picture = picture::parse_exr(path, bytes)?;
     let texels = picture.rgba.iter().map(|&[r, g, b, _]| [r, g, b]).collect();
     Environment::of_pixels(path.display(), picture.width as usize, picture.height as usize, texels)
 }

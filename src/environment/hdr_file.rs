@@ -5,8 +5,8 @@ use std::path::Path;
 
 use super::Environment;
 use crate::error::{Error, Result};
-use crate::file_format::FileFormat;
-use crate::output::{self, Primaries};
+use crate::files::FileFormat;
+use crate::picture::{self, Primaries};
 
 pub(super) const FORMAT: FileFormat<Environment> = FileFormat {
     extension: "hdr",
@@ -31,7 +31,7 @@ fn parse(path: &Path, bytes: &[u8]) -> Result<Environment> {
     let size = take_line(&mut rest).and_then(|line| axes(&line));
     let axes = size.ok_or_else(|| broken("it has no size such as -Y 512 +X 1024"))?;
     let [lines, columns] = axes.map(|axis| axis.count);
-    output::check_pixels(path, [lines as u64 * columns as u64], bytes.len(), MAX_PIXELS_PER_BYTE)?;
+    picture::check_pixels(path, [lines as u64 * columns as u64], bytes.len(), MAX_PIXELS_PER_BYTE)?;
 
     let mut pixels = vec![[0; 4]; lines * columns];
     for (line, scanline) in pixels.chunks_exact_mut(columns.max(1)).enumerate() {

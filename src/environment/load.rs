@@ -3,7 +3,7 @@ use std::path::Path;
 
 use super::{Environment, FORMATS, RepairCounts, procedural};
 use crate::error::{Error, Result};
-use crate::file_format::FileKind;
+use crate::files::FileKind;
 
 /// The most radiance that a pixel of an environment has: sums over all pixels of a map, and BRDFs of up to 1e8 times it, are then numbers
 /// of single precision.
@@ -132,7 +132,7 @@ fn neighbours_mean(width: usize, height: usize, texels: &[[f32; 3]], index: usiz
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::output::{ExrHeader, write_exr};
+    use crate::picture::{ExrHeader, write_exr};
 
     /// A Radiance file of flat pixels: mantissas and shared exponent as given.
     fn hdr(width: usize, height: usize, rgbe: [u8; 4]) -> Vec<u8> {

@@ -4,7 +4,7 @@ use std::sync::{Arc, OnceLock};
 
 use glam::DVec3;
 
-use crate::file_format::file_formats;
+use crate::files::file_formats;
 
 mod box_filter;
 pub mod cube;

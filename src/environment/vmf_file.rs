@@ -12,8 +12,8 @@ use std::path::Path;
 use super::pyramid::MAX_FACE_SIZE;
 use super::{BlurKernel, Pyramid, VmfPyramid};
 use crate::error::{Error, Result};
-use crate::file_format;
-use crate::output::write_whole;
+use crate::files;
+use crate::files::{sealed, unsealed, write_whole};
 
 /// Version of the file format and of the maps in it: to be raised when the same environment gets others.
 pub const FORMAT_VERSION: u32 = 5;
@@ -27,9 +27,7 @@ fn encode(pyramid: &VmfPyramid) -> Vec<u8> {
     for map in &pyramid.levels.levels {
         bytes.extend(map.as_flattened().iter().flat_map(|value| value.to_le_bytes()));
     }
-    let digest = blake3::hash(&bytes);
-    bytes.extend(digest.as_bytes());
-    bytes
+    sealed(bytes)
 }
 
 /// Writes `pyramid` to the file at `path`, whole or not at all.
@@ -45,7 +43,7 @@ pub fn write(path: &Path, pyramid: &VmfPyramid) -> Result<()> {
 /// # Errors
 /// A file that cannot be read, or is not whole.
 pub fn read(path: &Path) -> Result<VmfPyramid> {
-    parse(path, &file_format::read(path)?)
+    parse(path, &files::read(path)?)
 }
 
 /// The pyramid in the bytes of the file at `path`.
@@ -57,11 +55,7 @@ pub fn parse(path: &Path, bytes: &[u8]) -> Result<VmfPyramid> {
 }
 
 fn decode(bytes: &[u8]) -> Option<VmfPyramid> {
-    let (content, digest) = bytes.split_last_chunk::<{ blake3::OUT_LEN }>()?;
-    if blake3::hash(content).as_bytes() != digest {
-        return None;
-    }
-    let rest = content.strip_prefix(MAGIC)?.strip_prefix(&FORMAT_VERSION.to_le_bytes())?;
+    let rest = unsealed(bytes)?.strip_prefix(MAGIC)?.strip_prefix(&FORMAT_VERSION.to_le_bytes())?;
     let (&face_size, mut rest) = rest.split_first_chunk()?;
     let face_size = u32::from_le_bytes(face_size) as usize;
     if !face_size.is_power_of_two() || face_size > MAX_FACE_SIZE {
@@ -106,15 +100,15 @@ mod tests {
     #[test]
     fn sizes_that_do_not_fit_the_content_are_refused() {
         let whole = encode(&pyramid());
-        let content = &whole[..whole.len() - blake3::OUT_LEN];
-        let signed = |content: &[u8]| [content, blake3::hash(content).as_bytes()].concat();
-        assert!(decode(&signed(content)).is_some());
-        assert!(decode(&signed(&content[..content.len() - 4])).is_none());
-        assert!(decode(&signed(&[content, &[0; 4]].concat())).is_none());
+        let content = unsealed(&whole).unwrap();
+        let is_read = |content: Vec<u8>| decode(&sealed(content)).is_some();
+        assert!(is_read(content.to_vec()));
+        assert!(!is_read(content[..content.len() - 4].to_vec()));
+        assert!(!is_read([content, &[0; 4]].concat()));
         for face_size in [0, 3, 1, 2 * MAX_FACE_SIZE as u32, u32::MAX] {
             let mut other = content.to_vec();
             other[12..16].copy_from_slice(&face_size.to_le_bytes());
-            assert!(decode(&signed(&other)).is_none(), "{face_size}");
+            assert!(!is_read(other), "{face_size}");
         }
     }
 }

@@ -2,7 +2,6 @@
 //! Fitted threads look these up. Twin: glsl/vmf_pyramid.comp, by which GPUs make it; processors make it here, in a fifth of the time
 //! that lavapipe takes for that.
 use std::ops::Range;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 use glam::{DVec2, DVec3, dvec2};
 use rayon::prelude::*;
@@ -11,7 +10,7 @@ use super::cube::{coordinates, direction_of, texel_solid_angle};
 use super::pyramid::Pyramid;
 use super::to_dvec3;
 use crate::error::Result;
-use crate::progress::Observer;
+use crate::progress::{Observer, Parts};
 use crate::vector_math::exp;
 
 /// Width of a level's kernel in texels of that level, in the middle of a face.
@@ -100,7 +99,8 @@ impl VmfPyramid {
         let mut maps: Vec<Vec<[f32; 3]>> = Vec::new();
         let steps = Self::steps(source.face_size);
         let blurs = || steps.iter().filter(|step| step.kernel == BlurKernel::Vmf);
-        let rows = Rows { done: AtomicUsize::new(0), total: blurs().map(|step| step.size).sum(), observer };
+        observer.check()?;
+        let rows = Parts::new(blurs().map(|step| step.size).sum(), observer);
         for step in &steps {
             let from = step.from.map_or(&source.levels[0], |from| &maps[from]);
             maps.push(match step.kernel {
@@ -159,13 +159,6 @@ fn means_of_four(source: &[[f32; 3]], size: usize) -> Vec<[f32; 3]> {
         (0.25 * (at(0, 0) + at(1, 0) + at(0, 1) + at(1, 1))).as_vec3().to_array()
     };
     (0..6 * size * size).into_par_iter().map(mean).collect()
-}
-
-/// How many rows of how many have been made, each on all six faces, and who hears of it.
-struct Rows<'a> {
-    done: AtomicUsize,
-    total: usize,
-    observer: &'a dyn Observer,
 }
 
 /// Texels side by side that are summed over at once.
@@ -291,12 +284,11 @@ fn texel_direction(size: usize, texel: usize) -> DVec3 {
 }
 
 /// A map, convolved from the one that `step` names.
-fn blurred(source: &[[f32; 3]], step: &BlurStep, rows: &Rows) -> Result<Vec<[f32; 3]>> {
+fn blurred(source: &[[f32; 3]], step: &BlurStep, rows: &Parts) -> Result<Vec<[f32; 3]>> {
     let blocks = Blocks::new(source, step.from_size);
     let of_row = |row: usize| -> Result<_> {
-        rows.observer.check()?;
         let texels = pulp::Arch::new().dispatch(BlurRow { blocks: &blocks, step, row });
-        rows.observer.progress(rows.done.fetch_add(1, Ordering::Relaxed) + 1, rows.total);
+        rows.advance()?;
         Ok(texels)
     };
     let of_rows: Vec<_> = (0..step.size).into_par_iter().map(of_row).collect::<Result<_>>()?;

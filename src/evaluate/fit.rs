@@ -6,7 +6,7 @@ use crate::error::Result;
 use crate::memo::Memo;
 use crate::pipeline::median;
 use crate::prepare::in_own_axes;
-use crate::progress::{Observer, OnlyCancels};
+use crate::progress::{Observer, OnlyCancels, Parts};
 use crate::scene::{ImageSettings, MaterialSource};
 use crate::steps::{FindLobe, LoadMaterial};
 use crate::threads::fitted::{generate, validation_error};
@@ -44,8 +44,7 @@ pub struct TimedFit {
 /// Materials that cannot be read, counts that cannot be fitted, [`crate::Error::Cancelled`].
 pub fn run(fits: &Fits, memo: &Memo, observer: &dyn Observer, found: &mut Vec<TimedFit>) -> Result<()> {
     let total = fits.materials.len() * fits.counts.len() * fits.repeat.max(1) as usize;
-    let mut done = 0;
-    observer.progress(done, total);
+    let timed = Parts::new(total, observer);
     for (material, source) in &fits.materials {
         let round = memo.round(observer);
         let (brdf, _) = in_own_axes(&round.ask(&LoadMaterial(source))?);
@@ -59,13 +58,11 @@ pub fn run(fits: &Fits, memo: &Memo, observer: &dyn Observer, found: &mut Vec<Ti
                 let start = Instant::now();
                 let table = generate(&brdf, &settings, &OnlyCancels(observer))?;
                 times_ms.push(start.elapsed().as_secs_f64() * 1e3);
-                done += 1;
-                observer.progress(done, total);
+                timed.advance()?;
                 if times_ms.len() >= fits.repeat as usize {
                     break table;
                 }
             };
-            observer.check()?;
             found.push(TimedFit {
                 material: material.clone(),
                 threads,

@@ -12,7 +12,7 @@ use crate::brdf::Brdf;
 use crate::error::Result;
 use crate::memo::Memo;
 use crate::pipeline::Wanted;
-use crate::progress::Observer;
+use crate::progress::{Observer, Parts};
 use crate::vulkan::Device;
 
 /// A picture and what it is of, after which its file is named.
@@ -31,7 +31,7 @@ pub fn material_sheets(
     observer: &dyn Observer,
 ) -> Result<Vec<Named>> {
     let mut tiles = Vec::new();
-    observer.progress(0, cases.place_count());
+    let places = Parts::new(cases.place_count(), observer);
     cases.for_each_place(memo, observer, &mut |place| {
         place.choose(estimator)?;
         place.prepared.show_environment = true;
@@ -46,8 +46,7 @@ pub fn material_sheets(
         });
         let of = format!("{}_{}", place.environment, place.scene);
         tiles.push((of, Tile { picture, caption: place.material.to_owned() }));
-        observer.progress(tiles.len(), cases.place_count());
-        observer.check()
+        places.advance()
     })?;
     let sheets = in_order(tiles.iter().map(|(of, _)| of.clone()));
     let sheet = |of: &String| {

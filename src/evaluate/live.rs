@@ -11,7 +11,7 @@ use crate::memo::{Memo, Round, Step};
 use crate::method::Method;
 use crate::pipeline::{DeviceScene, Wanted, median};
 use crate::prepare::{Prepared, prepare, prepare_draft};
-use crate::progress::{Observer, OnlyCancels};
+use crate::progress::{Observer, OnlyCancels, Parts};
 use crate::scene::{Background, Scene};
 use crate::steps::FitThreads;
 use crate::vulkan::Device;
@@ -76,18 +76,12 @@ pub fn run(
         return Err(Error::input(format!("method \"{}\"", method.name()), "has no drafts", remedy));
     }
     let values = &drag.values;
-    let total = 3 * values.len() - 2;
-    let mut done = 0;
-    let mut next = || {
-        done += 1;
-        observer.progress(done, total);
-        observer.check()
-    };
+    let pictures = Parts::new(3 * values.len() - 2, observer);
     let inner = OnlyCancels(observer);
     let mut truths = Vec::new();
     for value in values {
         truths.push(truth(drag, value, settings, device, &memo.round(&inner))?);
-        next()?;
+        pictures.advance()?;
     }
     // Threads are neither read from disk nor remembered: what is known needs no draft.
     let drafts = Memo::default();
@@ -118,7 +112,7 @@ pub fn run(
             reference_change: largest_change(&truths[before].reference, reference),
         });
         (shown, before) = ((draft, picture), at);
-        next()?;
+        pictures.advance()?;
     }
     Ok(())
 }

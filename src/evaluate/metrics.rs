@@ -3,8 +3,8 @@ use serde::{Deserialize, Serialize};
 
 use super::ssim::{RADIUS, WINDOW, ssim_map};
 use crate::error::{Error, Result};
-use crate::output::{Format, PictureFile};
 use crate::passes::View;
+use crate::picture::{Format, PictureFile};
 
 /// How radiance L is displayed: clamp(exposure L, 0, 1)^(1/gamma).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -226,7 +226,7 @@ fn flip_map(a: &[[f32; 3]], b: &[[f32; 3]], width: usize, height: usize) -> Vec<
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::output::read_image;
+    use crate::picture::read_image;
 
     /// Values in [0, 1] that a formula of row, column and channel gives: see `agrees_with_scikit_image`.
     fn formula(width: usize, height: usize, shift: usize) -> Vec<[f64; 3]> {
@@ -360,8 +360,8 @@ mod tests {
             exr.push([linear(r) * alpha, linear(g) * alpha, linear(b) * alpha, alpha]);
             png.extend([r, g, b, f64::from(alpha)].map(|value| (255.0 * value).round() as u8));
         }
-        crate::output::write_exr(&folder.path().join("a.exr"), 20, 20, &exr, true, &Default::default()).unwrap();
-        crate::output::write_png(&folder.path().join("a.png"), 20, 20, &png, true).unwrap();
+        crate::picture::write_exr(&folder.path().join("a.exr"), 20, 20, &exr, true, &Default::default()).unwrap();
+        crate::picture::write_png(&folder.path().join("a.png"), 20, 20, &png, true).unwrap();
         let [a, b] = ["a.exr", "a.png"]
             .map(|name| Comparable::from_picture(&read_image(&folder.path().join(name)).unwrap(), display));
         let metrics = compare(&a, &b, true).unwrap();

@@ -12,7 +12,7 @@ use super::Row;
 use super::speed::{Growth, TimedFrame, Timings};
 use super::tables::{by_count, in_order, mean};
 use crate::error::{Error, Result};
-use crate::output::{file_in, write_whole};
+use crate::files::{file_in, write_whole};
 
 const SIZE_PX: (u32, u32) = (960, 600);
 /// At the right, for names: the longest is about "environment, floor".

@@ -15,7 +15,7 @@ use crate::error::Result;
 use crate::memo::{Key, Keyed, Memo};
 use crate::pipeline::{Wanted, render_geometry};
 use crate::prepare::Prepared;
-use crate::progress::Observer;
+use crate::progress::{Observer, Parts};
 use crate::shading::random::pcg4d;
 use crate::shading::{CpuShader, texels_of_pixel};
 use crate::threads::Threads;
@@ -99,8 +99,7 @@ pub fn run(
     found: &mut Vec<Rounded>,
 ) -> Result<()> {
     let estimators = cases.estimators();
-    let total = cases.place_count() * estimators.len();
-    let mut done = 0;
+    let pictures = Parts::new(cases.place_count() * estimators.len(), observer);
     cases.for_each_place(memo, observer, &mut |place| {
         for &estimator in &estimators {
             place.choose(estimator)?;
@@ -116,8 +115,7 @@ pub fn run(
                     most,
                 });
             }
-            done += 1;
-            observer.progress(done, total);
+            pictures.advance()?;
         }
         Ok(())
     })

@@ -11,7 +11,7 @@ use crate::error::{Error, Result};
 use crate::memo::{Key, Keyed, Memo};
 use crate::passes::{BareLookup, BareLookups, PlacedMesh};
 use crate::pipeline::{DeviceScene, Rendering, Wanted, median, time_bare_lookups};
-use crate::progress::Observer;
+use crate::progress::{Observer, Parts};
 use crate::steps::{BoxFilter, CheckDevice, pipelines};
 use crate::threads::fitted::kernel::FINEST_WIDTH_RAD;
 use crate::threads::fitted::{FittedTable, PackedKernel};
@@ -136,21 +136,15 @@ pub fn run(
     let steps: usize = SERIES.iter().map(|(_, _, steps)| steps.len()).sum();
     let of_place = speed.cases.estimators().len() + speed.cases.methods.len() * steps;
     let total = speed.cases.place_count() * of_place * (speed.repeat.max(1) as usize + 1);
-    let mut done = 0;
-    observer.progress(0, total);
-    let mut advance = || {
-        done += 1;
-        observer.progress(done, total);
-        observer.check()
-    };
+    let frames = Parts::new(total, observer);
     speed.cases.for_each_place(memo, observer, &mut |place| {
         let mut entrants = Vec::new();
         for estimator in speed.cases.estimators() {
             place.choose(estimator)?;
             entrants.push(Entrant::new(device, place)?);
-            advance()?;
+            frames.advance()?;
         }
-        timings.frames.extend(take_turns(entrants, device, speed.repeat, &mut advance)?);
+        timings.frames.extend(take_turns(entrants, device, speed.repeat, &frames)?);
         for &variant in &speed.cases.methods {
             for (growing, what, steps) in SERIES {
                 let side = growing.most_subpixels(steps, place.prepared.view.subpixels);
@@ -162,10 +156,10 @@ pub fn run(
                         Entrant::new(device, place)
                     };
                     entrants.push(growing.at(step, place, entrant)?);
-                    advance()?;
+                    frames.advance()?;
                 }
                 let mut before = None;
-                for frame in take_turns(entrants, device, speed.repeat, &mut advance)? {
+                for frame in take_turns(entrants, device, speed.repeat, &frames)? {
                     let ratio = before.replace(frame.gpu_ms).map(|before| frame.gpu_ms / before);
                     let quantity = growing.quantity(&frame);
                     timings.growths.push(Growth { what: what.to_owned(), quantity, ratio, frame });
@@ -346,12 +340,12 @@ fn take_turns(
     mut entrants: Vec<Entrant>,
     device: &Arc<Device>,
     repeat: u32,
-    advance: &mut dyn FnMut() -> Result<()>,
+    frames: &Parts,
 ) -> Result<Vec<TimedFrame>> {
     for _ in 0..repeat.max(1) {
         for entrant in &mut entrants {
             entrant.take_turn(device)?;
-            advance()?;
+            frames.advance()?;
         }
     }
     Ok(entrants.into_iter().map(Entrant::finish).collect())

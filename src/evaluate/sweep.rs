@@ -15,7 +15,7 @@ use crate::memo::{Memo, Round};
 use crate::passes::View;
 use crate::pipeline::{Rendering, Wanted};
 use crate::prepare::Prepared;
-use crate::progress::Observer;
+use crate::progress::{Observer, Parts};
 use crate::vulkan::Device;
 
 /// What to measure, and how.
@@ -152,8 +152,7 @@ pub fn run(
     for (_, scene) in &sweep.cases.scenes {
         check_size(scene.image.width as usize, scene.image.height as usize)?;
     }
-    let total = sweep.row_count();
-    observer.progress(0, total);
+    let rows = Parts::new(sweep.row_count(), observer);
     sweep.cases.for_each_place(memo, observer, &mut |place| {
         let (width, height, display) = (place.prepared.view.width, place.prepared.view.height, place.display);
         let comparable =
@@ -187,7 +186,7 @@ pub fn run(
             if sweep.keep_pictures {
                 measured.pictures.push(over_grey(&rendering.radiance, width, height, display));
             }
-            observer.progress(measured.rows.len(), total);
+            rows.advance()?;
         }
         Ok(())
     })

@@ -10,7 +10,7 @@ use crate::error::Result;
 use crate::memo::{Memo, Round};
 use crate::pipeline::{DeviceScene, Rendering, median};
 use crate::prepare::prepare;
-use crate::progress::{Observer, OnlyCancels};
+use crate::progress::{Observer, OnlyCancels, Parts};
 use crate::scene::{EnvironmentSource, MaterialSettings, MaterialSource, ObjectSettings, Scene, Source};
 use crate::vulkan::Device;
 
@@ -82,27 +82,21 @@ pub fn run(
     found: &mut Vec<TimedTogether>,
 ) -> Result<()> {
     let total = together.environments.len() * (together.materials.len() + 1) * (together.repeat.max(1) as usize + 1);
-    let mut done = 0;
-    observer.progress(done, total);
-    let mut advance = || {
-        done += 1;
-        observer.progress(done, total);
-        observer.check()
-    };
+    let frames = Parts::new(total, observer);
     let cancels = &OnlyCancels(observer);
     for (environment, source) in &together.environments {
         let round = memo.round(cancels);
         let mut all = Entrant::new(&together.scene(source, &together.materials), device, &round)?;
-        advance()?;
+        frames.advance()?;
         let mut alone = Vec::new();
         for material in &together.materials {
             alone.push(Entrant::new(&together.scene(source, std::slice::from_ref(material)), device, &round)?);
-            advance()?;
+            frames.advance()?;
         }
         for _ in 0..together.repeat.max(1) {
             for entrant in std::iter::once(&mut all).chain(&mut alone) {
                 entrant.renderings.push(render(&entrant.renderer)?);
-                advance()?;
+                frames.advance()?;
             }
         }
         let alone = together.materials.iter().zip(&alone).map(|((material, _), entrant)| TimedAlone {

@@ -1,7 +1,7 @@
 //! Outputs on disk: a file each, named by its key.
 use super::Key;
 use crate::error::{Error, Result};
-use crate::output::keep_file;
+use crate::files::keep_file;
 use std::path::{Path, PathBuf};
 
 /// Reads an output from the file at a path.

@@ -1,7 +1,7 @@
 //! Files that steps read: known by their contents, not by their names.
 use super::Key;
 use crate::error::{Error, Result};
-use crate::file_format::read;
+use crate::files::read;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};

@@ -325,7 +325,7 @@ mod tests {
                     let text = std::fs::read_to_string(path).map_err(|cause| Error::unreadable(path, cause))?;
                     text.parse().map_err(|_| Error::in_file(path, "is damaged", "it is made again"))
                 }),
-                write: Box::new(|path, number: &u64| crate::output::write_whole(path, number.to_string().as_bytes())),
+                write: Box::new(|path, number: &u64| crate::files::write_whole(path, number.to_string().as_bytes())),
             })
         }
     }

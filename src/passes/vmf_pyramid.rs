@@ -6,7 +6,7 @@ use super::{Readbacks, texels};
 use crate::Result;
 use crate::environment::{BlurKernel, BlurStep, Pyramid, VmfPyramid};
 use crate::graph::{Access, BufferDesc, DeviceResource, Executable, FrameGraph};
-use crate::progress::Observer;
+use crate::progress::{Observer, Parts};
 use crate::vulkan::{Buffer, BufferUse, ComputePipeline, Device, Frames, PipelineCache, compiled};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
@@ -43,16 +43,13 @@ pub fn vmf_pyramid(
     let finest = Arc::new(Buffer::with_contents(device, "box", storage, finest_texels)?);
     let steps = VmfPyramid::steps(source.face_size);
     let total = steps.iter().map(|step| parts(&pipeline, step.size).count()).sum();
-    let (mut done, mut maps, mut levels) = (0, Vec::new(), Vec::new());
+    let submissions = Parts::new(total, observer);
+    let (mut maps, mut levels) = (Vec::new(), Vec::new());
     for step in &steps {
         let usage = storage | vk::BufferUsageFlags::TRANSFER_SRC;
         let map = Arc::new(Buffer::new(device, "vmf_map", size_bytes_of(step), usage, BufferUse::Device)?);
         let from = step.from.map_or(&finest, |from| &maps[from]);
-        blur(device, &pipeline, step, from, &map, &mut || {
-            done += 1;
-            observer.progress(done, total);
-            observer.check()
-        })?;
+        blur(device, &pipeline, step, from, &map, &submissions)?;
         // The others have served.
         if step.kernel == BlurKernel::Vmf {
             levels.push(read_back(device, &map)?);
@@ -69,14 +66,14 @@ fn parts(pipeline: &ComputePipeline, size: usize) -> impl Iterator<Item = [u32; 
     (0..faces).flat_map(move |face| (0..rows).map(move |row| [row * group_rows, face]))
 }
 
-/// Makes the map of `step` part by part; `go_on` is asked before each of them.
+/// Makes the map of `step` part by part.
 fn blur(
     device: &Arc<Device>,
     pipeline: &ComputePipeline,
     step: &BlurStep,
     from: &Arc<Buffer>,
     map: &Arc<Buffer>,
-    go_on: &mut dyn FnMut() -> Result<()>,
+    submissions: &Parts,
 ) -> Result<()> {
     let part = Cell::new([0; 2]);
     let BlurStep { from_kernel, from_size, size, kernel, .. } = *step;
@@ -104,10 +101,10 @@ fn blur(
     let executable = Executable::new(device, graph, &imports)?;
     let mut frames = Frames::new(device, "vmf_pyramid", 1)?;
     for place in parts(pipeline, size) {
-        go_on()?;
         part.set(place);
         executable.execute(&mut frames)?;
         frames.wait()?;
+        submissions.advance()?;
     }
     Ok(())
 }

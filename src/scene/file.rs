@@ -15,8 +15,8 @@ use super::{
 use crate::brdf::{Brdf, change_base_files, has_model, resolve_base_files};
 use crate::environment;
 use crate::error::{Error, Result};
-use crate::file_format::{self, FileFormat, FileKind, text};
-use crate::output::write_whole;
+use crate::files::write_whole;
+use crate::files::{self, FileFormat, FileKind, text};
 
 /// A whole scene file.
 #[derive(Deserialize)]
@@ -86,7 +86,7 @@ impl Scene {
     /// Reads a scene file. Paths in it are relative to its folder. Without objects the scene is the built-in sphere; an object
     /// that names no material is of the first one, or of the default one in a scene without any.
     pub fn load(path: &Path) -> Result<Self> {
-        parse_file(path, &file_format::read(path)?)
+        parse_file(path, &files::read(path)?)
     }
 
     /// The formats of scene files.

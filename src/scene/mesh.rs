@@ -6,7 +6,7 @@ use glam::{DVec3, Vec3};
 
 use super::FORMATS;
 use crate::error::{Error, Result};
-use crate::file_format::FileKind;
+use crate::files::FileKind;
 
 /// Cells along the edge of a face of the built-in sphere, 49152 triangles: chords err by 1.5e-4, half of it each side.
 const SPHERE_CELLS: usize = 64;

@@ -10,7 +10,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 use crate::brdf::{Brdf, Custom, base_files, base_files_of};
 use crate::environment::CustomEnvironment;
 use crate::error::{Error, Result};
-use crate::file_format::file_formats;
+use crate::files::file_formats;
 
 pub mod camera;
 mod custom_mesh;

@@ -10,7 +10,7 @@ use glam::{DVec3, Vec2, Vec3};
 use super::Mesh;
 use super::polygon::triangles_of;
 use crate::error::{Error, Result};
-use crate::file_format::FileFormat;
+use crate::files::FileFormat;
 use crate::progress::Observer;
 
 /// A mesh and where its vertices are on a texture.

@@ -9,7 +9,7 @@ use glam::{Vec2, Vec3};
 
 use super::obj_file::{TEXTURED_FORMAT, TexturedMesh};
 use super::{Mesh, TangentRule, mesh};
-use crate::file_format::FileKind;
+use crate::files::FileKind;
 use crate::tangent::tangent_along;
 
 impl TexturedMesh {

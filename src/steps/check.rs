@@ -2,9 +2,9 @@
 use crate::Result;
 use crate::device_check::{Verdict, check};
 use crate::error::Error;
-use crate::file_format;
+use crate::files;
+use crate::files::write_whole;
 use crate::memo::{Key, Memo, Round, Step, Stored};
-use crate::output::write_whole;
 use crate::steps::pipelines;
 use crate::vulkan::{Device, compiled};
 use std::path::Path;
@@ -35,7 +35,7 @@ impl Step for CheckDevice<'_> {
 }
 
 fn read(path: &Path) -> Result<Verdict> {
-    Verdict::parse(path, &file_format::read(path)?)
+    Verdict::parse(path, &files::read(path)?)
 }
 
 fn write(path: &Path, verdict: &Verdict) -> Result<()> {

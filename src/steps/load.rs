@@ -3,7 +3,7 @@ use crate::Result;
 use crate::brdf::{Brdf, LobeShape, base_files, base_files_of, tabulate};
 use crate::environment::{CustomEnvironment, Environment};
 use crate::error::Error;
-use crate::file_format::FileKind;
+use crate::files::FileKind;
 use crate::memo::{Key, Keyed, Memo, Round, Step};
 use crate::scene::{CustomMesh, EnvironmentSource, MaterialSource, Mesh, MeshSource, Source, TexturedMesh};
 use crate::threads::SliceTable;

@@ -43,14 +43,13 @@ use super::rim::{EVEN, is_rim_power};
 use super::{ThreadKind, ThreadTable, Threads};
 use crate::brdf::BaseProfile;
 use crate::error::{Error, Result};
-use crate::file_format;
-use crate::output::write_whole;
+use crate::files;
+use crate::files::{sealed, unsealed, write_whole};
 
 /// Version of the file format and of the threads in it: to be raised when either changes, since caches depend on it.
 pub const FORMAT_VERSION: u32 = 29;
 
 const MAGIC: &[u8; 8] = b"THREADS\0";
-const DIGEST_BYTES: usize = blake3::OUT_LEN;
 
 #[derive(Serialize, Deserialize)]
 struct Header {
@@ -100,7 +99,7 @@ pub fn write(threads: &Threads, path: &Path) -> Result<()> {
 
 /// Reads threads back. Errors: unreadable, not a thread file, of another version, damaged.
 pub fn read(path: &Path) -> Result<Threads> {
-    parse(path, &file_format::read(path)?)
+    parse(path, &files::read(path)?)
 }
 
 /// The threads in the bytes of the file at `path`.
@@ -131,9 +130,7 @@ fn encode(threads: &Threads) -> Vec<u8> {
         Threads::Paper(table) => table.file_words(),
     };
     bytes.extend(words.iter().flat_map(|word| word.to_le_bytes()));
-    let digest = blake3::hash(&bytes);
-    bytes.extend(digest.as_bytes());
-    bytes
+    sealed(bytes)
 }
 
 fn decode(bytes: &[u8]) -> Result<Threads, String> {
@@ -143,11 +140,8 @@ fn decode(bytes: &[u8]) -> Result<Threads, String> {
     if version != FORMAT_VERSION {
         return Err(format!("has format version {version}, this program reads {FORMAT_VERSION}"));
     }
-    let content = bytes.len().checked_sub(DIGEST_BYTES).ok_or("is cut short")?;
-    if blake3::hash(&bytes[..content]).as_bytes() != &bytes[content..] {
-        return Err("is damaged (its checksum does not match)".into());
-    }
-    let rest = &rest[..rest.len().checked_sub(DIGEST_BYTES).ok_or("is cut short")?];
+    let content = unsealed(bytes).ok_or("is damaged (its checksum does not match)")?;
+    let rest = content.get(bytes.len() - rest.len()..).ok_or("is cut short")?;
     let (&length, rest) = rest.split_first_chunk().ok_or("is cut short")?;
     let (header, payload) = rest.split_at_checked(u32::from_le_bytes(length) as usize).ok_or("is cut short")?;
     let header: Header = serde_json::from_slice(header).map_err(|error| format!("has a bad header ({error})"))?;

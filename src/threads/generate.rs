@@ -1,5 +1,4 @@
 //! Makes the threads of a BRDF, section 3.2: from the normal outwards, each view angle starts from the one before.
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
@@ -10,7 +9,7 @@ use super::{MIN_COS, Sample, ThreadSettings, ThreadTable, theta_o};
 use super::{forces, peaks, smoothing};
 use crate::brdf::{Brdf, SeenBrdf};
 use crate::error::Result;
-use crate::progress::Observer;
+use crate::progress::{Observer, Parts};
 
 /// Most steps along the forces in a row; with 50 or 200 pictures came out no nearer to their references, only later.
 const ITERATIONS: usize = 25;
@@ -23,14 +22,12 @@ pub fn generate(brdf: &Brdf, settings: &ThreadSettings, observer: &dyn Observer)
     settings.check()?;
 
     // Each row is finished twice: its slice is tabulated (on all cores), then its samples settle.
-    let done = AtomicUsize::new(0);
-    let advance = || observer.progress(done.fetch_add(1, Ordering::Relaxed).div_ceil(2), rows);
+    let parts = Parts::new(2 * rows, observer);
     let seen = SeenBrdf::from_all_around(brdf);
     let tabulate = |row| {
-        observer.check()?;
         let slice = Slice::new(&seen, theta_o(row, rows));
         let peak = peaks::sharp_peak(&slice);
-        advance();
+        parts.advance()?;
         Ok((slice, peak))
     };
     let slices: Vec<(Slice, Option<DVec3>)> = (0..rows).into_par_iter().map(tabulate).collect::<Result<_>>()?;
@@ -52,7 +49,7 @@ pub fn generate(brdf: &Brdf, settings: &ThreadSettings, observer: &dyn Observer)
         samples.iter_mut().for_each(|s| *s = above_horizon(*s));
         settled.push(samples.clone());
         is_peak.push(peak_thread);
-        advance();
+        parts.advance()?;
     }
 
     let threads = (0..count).into_par_iter().map(|thread| {
@@ -128,7 +125,7 @@ fn evaluated(slice: &Slice, candidates: [DVec3; 2]) -> Sample {
 #[cfg(test)]
 mod tests {
     use std::f64::consts::PI;
-    use std::sync::atomic::AtomicBool;
+    use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
     use super::*;
     use crate::error::Error;
@@ -346,7 +343,7 @@ mod tests {
         struct CancelAt(usize, AtomicBool, AtomicUsize);
         impl Observer for CancelAt {
             fn progress(&self, done: usize, total: usize) {
-                assert_eq!(total, 90);
+                assert_eq!(total, 180);
                 self.2.fetch_max(done, Ordering::Relaxed);
                 self.1.fetch_or(done >= self.0, Ordering::Relaxed);
             }

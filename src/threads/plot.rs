@@ -7,7 +7,7 @@ use plotters::prelude::*;
 
 use super::{Threads, theta_o};
 use crate::error::{Error, Result};
-use crate::output::write_whole;
+use crate::files::write_whole;
 
 /// Each view is a square of this side.
 const VIEW_PX: u32 = 900;

@@ -6,8 +6,9 @@ use super::interaction::{UnsavedPicture, Viewer};
 use super::latency::{Answer, Latency, Record, Stats};
 use super::loaded::Loaded;
 use super::presenter::{Drawn, Extras, Presenter, SHADE, ShownPicture};
-use crate::output::{self, Format};
+use crate::files;
 use crate::passes::{Area, View};
+use crate::picture::Format;
 use crate::pipeline::{Wanted, check_size};
 use crate::prepare::view_of;
 use crate::scene::Scene;
@@ -199,8 +200,8 @@ impl Viewer {
     /// Saves the picture of what is wanted, as `threadlight render` would make it: now, or when its threads are finished.
     pub(super) fn save_picture(&mut self, path: &Path) -> Result<()> {
         Format::of(path)?;
-        output::check_writable(path)?;
-        output::check_not_read([path], &self.session.wanted().files())?;
+        files::check_writable(path)?;
+        files::check_not_read([path], &self.session.wanted().files())?;
         let (path, scene) = (path.to_owned(), self.session.wanted().clone());
         self.to_save.push(UnsavedPicture { path, scene, key: self.wanted });
         self.save_finished(self.is_loading() || self.request_after_frame);

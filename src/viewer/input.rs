@@ -38,7 +38,7 @@ use super::orbit;
 use crate::brdf::Brdf;
 use crate::environment::Environment;
 use crate::error::{Error, Result};
-use crate::file_format::{self, FileKind};
+use crate::files::{self, FileKind};
 use crate::scene::{MaterialSource, Mesh, Scene, Source};
 
 /// Something that the user does.
@@ -157,8 +157,8 @@ impl Drag {
 /// # Errors
 /// The file cannot be read; the first line that is no event, by its number.
 pub fn read_replay(path: &Path) -> Result<Vec<(usize, Input)>> {
-    let bytes = file_format::read(path)?;
-    parse_replay(file_format::text(path, &bytes)?, path)
+    let bytes = files::read(path)?;
+    parse_replay(files::text(path, &bytes)?, path)
 }
 
 /// The events in the text of the replay file at `path`, with their lines.
@@ -221,7 +221,7 @@ pub fn change_of_dropped(path: &Path) -> Result<Dropped> {
     let mut candidates: Vec<_> = candidates.into_iter().flatten().collect();
     // The content tells apart what has the same extension.
     if candidates.len() > 1 {
-        let bytes = file_format::read(path)?;
+        let bytes = files::read(path)?;
         candidates.retain(|candidate| (candidate.is_of_format)(&bytes));
     }
     candidates.into_iter().next().map(|candidate| candidate.dropped).ok_or_else(|| {

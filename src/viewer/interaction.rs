@@ -13,8 +13,8 @@ use super::measured::Measured;
 use super::orbit::{Bounds, Orbit, environment_turn_deg};
 use super::plots::Plotter;
 use super::session::{Edit, Session};
+use crate::files;
 use crate::memo::{Key, Memo};
-use crate::output;
 use crate::passes::Area;
 use crate::pipeline::DeviceScene;
 use crate::prepare::{Prepared, view_of};
@@ -208,7 +208,7 @@ impl Viewer {
             Input::SavePicture(path) => self.save_picture(path),
             Input::SaveScene(path) => {
                 Scene::FILES.format_of(path)?;
-                output::check_not_read([path], &self.session.wanted().files())?;
+                files::check_not_read([path], &self.session.wanted().files())?;
                 self.session.wanted().save(path)?;
                 self.tell_saved(path);
                 Ok(())

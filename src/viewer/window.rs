@@ -9,8 +9,8 @@ use super::pointer::{Pointer, button_of, scroll_of};
 use super::presenter::Presenter;
 use super::{ViewerSettings, failed};
 use crate::memo::Memo;
-use crate::output;
 use crate::passes::Area;
+use crate::picture;
 use crate::scene::{MAX_SIZE_PX, Scene};
 use crate::vulkan::{Device, Instance, Messages, Surface, UiFrame};
 use crate::{Error, Result};
@@ -305,7 +305,7 @@ impl Open {
         if let Some((rgba, [width, height])) = drawn.screenshot
             && let Some(path) = self.script.screenshot.take()
         {
-            output::write_png(&path, width, height, &rgba, false)?;
+            picture::write_png(&path, width, height, &rgba, false)?;
         }
         if let Some(left) = self.script.frames_left.as_mut().filter(|_| counts) {
             *left = left.saturating_sub(1);

@@ -1,7 +1,7 @@
 //! The driver's cache of compiled pipelines, on disk.
 use super::device::Device;
 use super::error::{Result, call};
-use crate::output::{keep_file, write_whole};
+use crate::files::{keep_file, sealed, unsealed, write_whole};
 use ash::vk;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -9,7 +9,7 @@ use std::sync::Arc;
 /// The driver's cache of compiled pipelines, kept in a file.
 ///
 /// A missing, foreign or damaged file is only a slower start. Drivers check the header of what they are given and trust the
-/// rest, so the file begins with a hash of it.
+/// rest, so the file is sealed.
 pub struct PipelineCache {
     pub(super) raw: vk::PipelineCache,
     file: Option<PathBuf>,
@@ -24,9 +24,9 @@ impl PipelineCache {
     pub fn new(device: &Arc<Device>, folder: Option<&Path>) -> Result<Self> {
         let uuid: String = device.properties.pipeline_cache_uuid.iter().map(|byte| format!("{byte:02x}")).collect();
         let file = folder.map(|folder| folder.join(format!("pipelines-{uuid}.bin")));
-        let contents =
-            file.as_deref().and_then(|file| unwrapped(crate::file_format::read(file).ok()?)).unwrap_or_default();
-        let info = vk::PipelineCacheCreateInfo::default().initial_data(&contents);
+        let kept = file.as_deref().and_then(|file| crate::files::read(file).ok()).unwrap_or_default();
+        let contents = unsealed(&kept).unwrap_or_default();
+        let info = vk::PipelineCacheCreateInfo::default().initial_data(contents);
         // SAFETY: `contents` outlives the call; it is what a driver has made, whose header tells this one whether it is its own.
         let raw = call("vkCreatePipelineCache", "pipeline cache", || unsafe {
             device.raw.create_pipeline_cache(&info, None)
@@ -42,11 +42,11 @@ impl PipelineCache {
             Ok(contents) => contents,
             Err(result) => return tracing::warn!("vkGetPipelineCacheData failed: {result}"),
         };
-        let contents = [&blake3::hash(&contents).as_bytes()[..], &contents].concat();
-        if crate::file_format::read(file).is_ok_and(|old| old == contents) {
+        let kept = sealed(contents);
+        if crate::files::read(file).is_ok_and(|old| old == kept) {
             return;
         }
-        keep_file(file, || write_whole(file, &contents));
+        keep_file(file, || write_whole(file, &kept));
     }
 }
 
@@ -55,29 +55,5 @@ impl Drop for PipelineCache {
         self.save();
         // SAFETY: pipelines do not need their cache after creation, and this one is destroyed once.
         unsafe { self.device.raw.destroy_pipeline_cache(self.raw, None) };
-    }
-}
-
-/// What was written, without its hash; none if it was not written whole.
-fn unwrapped(file: Vec<u8>) -> Option<Vec<u8>> {
-    let (hash, contents) = file.split_at_checked(blake3::OUT_LEN)?;
-    (blake3::hash(contents).as_bytes()[..] == *hash).then(|| contents.to_vec())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_damaged_file_is_as_good_as_none() {
-        let contents = b"compiled".to_vec();
-        let file = [&blake3::hash(&contents).as_bytes()[..], &contents].concat();
-        assert_eq!(unwrapped(file.clone()), Some(contents));
-        for at in 0..file.len() {
-            let mut damaged = file.clone();
-            damaged[at] ^= 1;
-            assert_eq!(unwrapped(damaged), None);
-            assert_eq!(unwrapped(file[..at].to_vec()), None);
-        }
     }
 }

@@ -8,12 +8,12 @@ fn pictures() -> TempDir {
     let folder = workplace();
     let png = |name: &str, side: u32, alpha: bool| {
         let rgba = vec![100; (side * side * 4) as usize];
-        threadlight::low_level::output::write_png(&folder.path().join(name), side, side, &rgba, alpha).unwrap();
+        threadlight::low_level::picture::write_png(&folder.path().join(name), side, side, &rgba, alpha).unwrap();
     };
     png("small.png", 16, false);
     png("large.png", 32, false);
     png("tiny.png", 10, false);
-    threadlight::low_level::output::write_png(&folder.path().join("nothing.png"), 16, 16, &[0; 16 * 16 * 4], true)
+    threadlight::low_level::picture::write_png(&folder.path().join("nothing.png"), 16, 16, &[0; 16 * 16 * 4], true)
         .unwrap();
     fs::write(folder.path().join("broken.exr"), "no picture").unwrap();
     folder

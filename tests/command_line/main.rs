@@ -9,7 +9,7 @@ use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
-use threadlight::low_level::output::{PictureFile, read_image};
+use threadlight::low_level::picture::{PictureFile, read_image};
 use threadlight::low_level::scene::{ImageSettings, MaterialSource, Method, Pattern, Scene, ShadingSettings, Source};
 
 /// What makes a render quick: few pixels, few threads, and an environment that takes no time.

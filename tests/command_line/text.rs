@@ -282,7 +282,7 @@ fn workplace_with_two_greys() -> TempDir {
     let folder = workplace();
     for (name, value) in [("a.png", 51), ("b.png", 102)] {
         let rgba = vec![value; 24 * 16 * 4];
-        threadlight::low_level::output::write_png(&folder.path().join(name), 24, 16, &rgba, false).unwrap();
+        threadlight::low_level::picture::write_png(&folder.path().join(name), 24, 16, &rgba, false).unwrap();
     }
     folder
 }
@@ -357,9 +357,9 @@ fn pictures_are_compared_as_a_table_as_json_and_as_a_heat_map() {
     for (pictures, reason) in
         [("a.png b.png", "the RMS is 2.000e-1, above 1.99e-1"), ("nan.exr a.png", "384 values are NaN")]
     {
-        let header = threadlight::low_level::output::ExrHeader::default();
+        let header = threadlight::low_level::picture::ExrHeader::default();
         let nan = [[f32::NAN, 0.0, 0.0, 1.0]; 24 * 16];
-        threadlight::low_level::output::write_exr(&folder.path().join("nan.exr"), 24, 16, &nan, false, &header)
+        threadlight::low_level::picture::write_exr(&folder.path().join("nan.exr"), 24, 16, &nan, false, &header)
             .unwrap();
         let output = threadlight(&folder, &format!("compare {pictures} --at-most 0.199")).output().unwrap();
         let said = String::from_utf8_lossy(&output.stderr).into_owned();

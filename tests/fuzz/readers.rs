@@ -6,7 +6,7 @@ use threadlight::low_level::brdf::{BaseProfile, Brdf};
 use threadlight::low_level::device_check::Verdict;
 use threadlight::low_level::environment::{Environment, Pyramid, VmfPyramid, vmf_file};
 use threadlight::low_level::evaluate::{Row, reference};
-use threadlight::low_level::output::{ExrHeader, parse_image, write_exr, write_png};
+use threadlight::low_level::picture::{ExrHeader, parse_image, write_exr, write_png};
 use threadlight::low_level::scene::{Mesh, Scene};
 use threadlight::low_level::threads::{self, FittedTable, Sample, ThreadTable, Threads, fitted::PackedKernel};
 

@@ -3,7 +3,7 @@ use std::path::Path;
 
 use crate::brdf::{Brdf, MerlTable};
 use crate::error::{Error, Result};
-use crate::file_format::FileFormat;
+use crate::files::FileFormat;
 
 pub(super) const FORMAT: FileFormat<Brdf> = FileFormat {
     extension: "binary",

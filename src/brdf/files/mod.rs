@@ -1,6 +1,6 @@
 //! Files of materials: a reader for each format, and who writes MERL's.
 use super::Brdf;
-use crate::file_format::file_formats;
+use crate::files::file_formats;
 
 mod merl_export;
 mod spectrum;

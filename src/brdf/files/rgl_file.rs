@@ -17,7 +17,7 @@ use super::tensor_file::{Tensor, TensorFile};
 use crate::brdf::Brdf;
 use crate::brdf::rgl::{Grid, Rgl, RglTables, Warp};
 use crate::error::{Error, Result};
-use crate::file_format::FileFormat;
+use crate::files::FileFormat;
 
 pub(super) const FORMAT: FileFormat<Brdf> = FileFormat {
     extension: "bsdf",

@@ -3,7 +3,7 @@ use std::path::Path;
 
 use crate::brdf::{Brdf, model_of, resolve_base_files};
 use crate::error::{Error, Result};
-use crate::file_format::{FileFormat, text};
+use crate::files::{FileFormat, text};
 
 pub(super) const FORMAT: FileFormat<Brdf> = FileFormat {
     extension: "toml",

@@ -16,7 +16,7 @@ use glam::Vec3;
 use crate::brdf::Brdf;
 use crate::brdf::goniometric::{Axes, Goniometric, Nodes};
 use crate::error::{Error, Result};
-use crate::file_format::FileFormat;
+use crate::files::FileFormat;
 
 pub(super) const FORMAT: FileFormat<Brdf> = FileFormat {
     extension: "bin",

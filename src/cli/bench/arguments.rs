@@ -9,9 +9,9 @@ use threadlight::low_level::environment;
 use threadlight::low_level::evaluate::reference::{self, Processor, ReferenceSettings};
 use threadlight::low_level::evaluate::sweep::Measured;
 use threadlight::low_level::evaluate::{Cases, Shard, Sweep, sweep, tables};
+use threadlight::low_level::files;
 use threadlight::low_level::memo::{Memo, Round};
 use threadlight::low_level::method::{Method, Variant};
-use threadlight::low_level::output;
 use threadlight::low_level::progress::Observer;
 use threadlight::low_level::scene::{
     EnvironmentSource, MAX_SAMPLES, MAX_SUBPIXELS, MaterialSettings, MaterialSource, ObjectSettings, Scene, Source,
@@ -157,7 +157,7 @@ pub fn named_materials(flag: &str, texts: &[String]) -> Result<Vec<(String, Mate
         }
     }
     // Their pictures and plots are named after them, too.
-    once(flag, materials.iter().map(|(name, _)| output::file_name(name)).collect())?;
+    once(flag, materials.iter().map(|(name, _)| files::file_name(name)).collect())?;
     Ok(materials)
 }
 
@@ -227,8 +227,8 @@ pub struct JsonArgument {
 impl JsonArgument {
     /// Says before the work begins if the file cannot be written, or is one that the command has `read`.
     pub fn check(&self, read: &[PathBuf]) -> Result<()> {
-        self.json.as_deref().map_or(Ok(()), output::check_writable)?;
-        output::check_not_read(&self.json, read)
+        self.json.as_deref().map_or(Ok(()), files::check_writable)?;
+        files::check_not_read(&self.json, read)
     }
 
     /// Prints the tables of what was `found`, if anything was, and writes it if that is all: a file that is there is whole.
@@ -246,7 +246,7 @@ impl JsonArgument {
 
     pub fn write(&self, measurements: &impl serde::Serialize) -> anyhow::Result<()> {
         let Some(path) = &self.json else { return Ok(()) };
-        Ok(output::write_whole(path, json("--json", measurements)?.as_bytes())?)
+        Ok(files::write_whole(path, json("--json", measurements)?.as_bytes())?)
     }
 }
 
@@ -277,7 +277,7 @@ pub fn check_folder(folder: &Path) -> Result<()> {
     }
     // One that is not there yet has to be made; its name may end in a separator.
     let to_make = || folder.components().collect();
-    output::check_writable(&if folder.exists() { folder.join("plot.svg") } else { to_make() })
+    files::check_writable(&if folder.exists() { folder.join("plot.svg") } else { to_make() })
 }
 
 #[cfg(test)]

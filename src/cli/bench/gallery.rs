@@ -9,8 +9,9 @@ use threadlight::low_level::brdf::Brdf;
 use threadlight::low_level::evaluate::gallery::{self, Named};
 use threadlight::low_level::evaluate::sweep::Measured;
 use threadlight::low_level::evaluate::{Cases, Estimator, Sweep, tables};
+use threadlight::low_level::files;
 use threadlight::low_level::method::Method;
-use threadlight::low_level::output;
+use threadlight::low_level::picture;
 use threadlight::low_level::progress::Observer;
 use threadlight::low_level::threads::MAX_COUNT;
 use threadlight::{Error, Result};
@@ -109,7 +110,7 @@ fn write_pictures(pictures: &[Named], folder: &Path) -> Result<()> {
     std::fs::create_dir_all(folder).map_err(|cause| Error::unwritable(folder, cause))?;
     for (name, picture) in pictures {
         let rgba: Vec<u8> = picture.pixels().flat_map(|pixel| [pixel[0], pixel[1], pixel[2], 255]).collect();
-        output::write_png(&output::file_in(folder, name, "png"), picture.width(), picture.height(), &rgba, false)?;
+        picture::write_png(&files::file_in(folder, name, "png"), picture.width(), picture.height(), &rgba, false)?;
     }
     Ok(())
 }

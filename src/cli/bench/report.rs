@@ -10,8 +10,8 @@ use threadlight::low_level::evaluate::report::Report;
 use threadlight::low_level::evaluate::speed::{self, Speed};
 use threadlight::low_level::evaluate::sweep::Measured;
 use threadlight::low_level::evaluate::{Cases, Estimator, Row, Sweep, gallery, merged};
+use threadlight::low_level::files;
 use threadlight::low_level::method::Method;
-use threadlight::low_level::output;
 use threadlight::low_level::progress::Observer;
 use threadlight::low_level::scene::MaterialSource;
 use threadlight::low_level::threads::MAX_COUNT;
@@ -127,7 +127,7 @@ impl BenchReport {
         let html = report.html()?;
         std::fs::create_dir_all(folder).map_err(|cause| Error::unwritable(folder, cause))?;
         let path = folder.join("report.html");
-        output::write_whole(&path, html.as_bytes())?;
+        files::write_whole(&path, html.as_bytes())?;
         error::write_files(&report.rows, &self.output)?;
         Ok(print(format_args!("{}\n", path.display()))?)
     }

@@ -5,7 +5,7 @@ use std::ffi::OsStr;
 use std::path::PathBuf;
 use threadlight::Error;
 use threadlight::low_level::brdf::{MerlTable, merl_bytes};
-use threadlight::low_level::output;
+use threadlight::low_level::files;
 
 /// Writes the BRDF, if it is isotropic, as a table of the MERL database's form, a `.binary` file of 35 MB, or its sample threads, a `.threads` file.
 ///
@@ -30,7 +30,7 @@ impl Export {
                 return Err(Error::in_file(&self.output, "is no known kind of material file", remedy).into());
             }
         }
-        output::check_writable(&self.output)?;
+        files::check_writable(&self.output)?;
         self.named.check_is_not(&self.output)?;
         let brdf = self.named.load()?;
         if !brdf.is_isotropic() {
@@ -51,6 +51,6 @@ impl Export {
                 "export a material that reflects light",
             )
         })?;
-        Ok(output::write_whole(&self.output, &table)?)
+        Ok(files::write_whole(&self.output, &table)?)
     }
 }

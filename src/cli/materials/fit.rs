@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use threadlight::Error;
 use threadlight::low_level::brdf::Brdf;
 use threadlight::low_level::evaluate::material_fit::{fit, names};
-use threadlight::low_level::output;
+use threadlight::low_level::files;
 
 /// Writes the parameters of a model that are nearest to the BRDF, which is isotropic, as a material file, and how near they are.
 ///
@@ -29,13 +29,13 @@ impl Fit {
         if !Brdf::is_model_file(&self.output) {
             return Err(Error::in_file(&self.output, "is no material file", "end its name in .toml").into());
         }
-        output::check_writable(&self.output)?;
+        files::check_writable(&self.output)?;
         self.named.check_is_not(&self.output)?;
         let fits = fit(&*self.named.load()?, &self.model).map_err(|error| error.within(&self.named.material))?;
         let name = stem(Path::new(&self.named.material));
         // There is at least one.
         let text = fits.first().map(|nearest| nearest.to_toml(&name)).unwrap_or_default();
-        output::write_whole(&self.output, text.as_bytes())?;
+        files::write_whole(&self.output, text.as_bytes())?;
         for fit in &fits {
             let relative = 100.0 * fit.error / fit.error_of_black;
             let words = fit.parameters.values().filter_map(|value| value.as_str()).collect::<Vec<_>>().join(", ");

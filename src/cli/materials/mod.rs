@@ -9,8 +9,8 @@ use super::nameable;
 use clap::Subcommand;
 use std::path::PathBuf;
 use threadlight::low_level::brdf::Brdf;
+use threadlight::low_level::files;
 use threadlight::low_level::memo::{Keyed, Memo};
-use threadlight::low_level::output;
 use threadlight::low_level::scene::MaterialSource;
 use threadlight::low_level::steps::LoadMaterial;
 
@@ -62,7 +62,7 @@ struct Named {
 impl Named {
     /// An error if `output` is a file that the material is read from.
     fn check_is_not(&self, output: &PathBuf) -> threadlight::Result<()> {
-        output::check_not_read([output], &MaterialSource::named(&self.material).files())
+        files::check_not_read([output], &MaterialSource::named(&self.material).files())
     }
 
     fn load(&self) -> threadlight::Result<Keyed<Brdf>> {

@@ -4,7 +4,7 @@ use crate::cli::stem;
 use std::path::{Path, PathBuf};
 use threadlight::Error;
 use threadlight::low_level::evaluate::material_plot;
-use threadlight::low_level::output;
+use threadlight::low_level::files;
 
 /// Draws the BRDF as SVG: lobes in the plane of incidence, the image over half and difference angle, albedo by angle.
 ///
@@ -23,10 +23,10 @@ impl Plot {
         if self.output.extension().is_none_or(|extension| !extension.eq_ignore_ascii_case("svg")) {
             return Err(Error::in_file(&self.output, "is no SVG", "end its name in .svg").into());
         }
-        output::check_writable(&self.output)?;
+        files::check_writable(&self.output)?;
         self.named.check_is_not(&self.output)?;
         let name = stem(Path::new(&self.named.material));
         let svg = material_plot::svg(&*self.named.load()?, &name, &self.output)?;
-        Ok(output::write_whole(&self.output, svg.as_bytes())?)
+        Ok(files::write_whole(&self.output, svg.as_bytes())?)
     }
 }

@@ -10,7 +10,7 @@
 //! [`Environment::radiance`]: crate::environment::Environment::radiance
 //! [`Brdf::evaluate`]: crate::brdf::Brdf::evaluate
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
 use glam::{DMat3, DVec3, UVec2, dvec3};
@@ -22,7 +22,7 @@ use crate::memo::{Origin, Round, Step};
 use crate::passes::View;
 use crate::pipeline::{Rendering, render_geometry};
 use crate::prepare::Prepared;
-use crate::progress::Observer;
+use crate::progress::{Observer, Parts};
 use crate::shading::display_value;
 use crate::vulkan::Device;
 use crate::{Error, Result};
@@ -202,7 +202,8 @@ impl Integrator<'_> {
     ) -> Result<ReferenceImage> {
         let start = Instant::now();
         let (width, height) = (view.width as usize, view.height as usize);
-        let (evaluations, covered, rows_done) = (AtomicU64::new(0), AtomicU64::new(0), AtomicUsize::new(0));
+        let (evaluations, covered) = (AtomicU64::new(0), AtomicU64::new(0));
+        let rows_done = Parts::new(height, observer);
         let row = |y: usize| -> Result<(Vec<[f32; 4]>, Vec<DVec3>)> {
             let (mut texels, mut errors) = (Vec::with_capacity(width), Vec::new());
             for x in 0..width {
@@ -216,7 +217,7 @@ impl Integrator<'_> {
                 errors.push(estimate.display_error);
                 texels.push(rgba);
             }
-            observer.progress(rows_done.fetch_add(1, Ordering::Relaxed) + 1, height);
+            rows_done.advance()?;
             Ok((texels, errors))
         };
         let rows = (0..height).into_par_iter().map(row).collect::<Result<Vec<_>>>()?;

@@ -5,7 +5,7 @@ use super::{Integrator, rms};
 use crate::error::Result;
 use crate::passes::View;
 use crate::prepare::Prepared;
-use crate::progress::Observer;
+use crate::progress::{Observer, Parts};
 
 /// A step on the way.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -63,15 +63,15 @@ pub fn progressive(
             known_tolerance = tolerance;
         }
         let rows: Vec<usize> = (0..height).step_by(step).collect();
-        let done = std::sync::atomic::AtomicUsize::new(0);
+        let rows_done = Parts::new(rows.len(), observer);
         let of_row = |&y: &usize| -> Result<Vec<Pixel>> {
             let pixel = |x: usize| match known[y * width + x] {
                 Some(pixel) => Ok(pixel),
                 None => integrator.watched(view, geometry, [x, y], tolerance, observer),
             };
-            let pixels = (0..width).step_by(step).map(pixel).collect();
-            observer.progress(done.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1, rows.len());
-            pixels
+            let pixels = (0..width).step_by(step).map(pixel).collect::<Result<_>>()?;
+            rows_done.advance()?;
+            Ok(pixels)
         };
         let pixels = rows.par_iter().map(of_row).collect::<Result<Vec<_>>>()?;
         for (&y, row) in rows.iter().zip(&pixels) {

@@ -3,10 +3,10 @@ use std::path::Path;
 
 use super::{Integrator, ReferenceImage};
 use crate::error::{Error, Result};
-use crate::file_format;
+use crate::files;
 use crate::memo::{Key, Memo, Round, Step, Stored};
-use crate::output::{ExrHeader, parse_image, write_exr};
 use crate::passes::View;
+use crate::picture::{ExrHeader, parse_image, write_exr};
 use crate::prepare::Prepared;
 
 /// Changes whenever the same question gets another answer.
@@ -50,7 +50,7 @@ impl Step for Integrate<'_> {
         let view = &self.prepared.view;
         Some(Stored {
             extension: "reference.exr",
-            read: Box::new(move |path| parse(path, &file_format::read(path)?, [view.width, view.height])),
+            read: Box::new(move |path| parse(path, &files::read(path)?, [view.width, view.height])),
             write: Box::new(move |path, image| write(path, view, image)),
         })
     }

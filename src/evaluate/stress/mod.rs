@@ -20,7 +20,7 @@ use crate::method::Method;
 use crate::passes::check_aliases;
 use crate::pipeline::{DeviceScene, Wanted};
 use crate::prepare::prepare;
-use crate::progress::Observer;
+use crate::progress::{Observer, Parts};
 use crate::shading::{CpuShader, texels_of_pixel};
 use crate::vulkan::{Device, DeviceKind};
 
@@ -108,8 +108,7 @@ pub fn run(
     let methods = || Method::ALL.iter().filter(|method| method.runs_on_gpu());
     let methods: Vec<Method> = methods().filter(|method| extent.all || method.threads().is_some()).copied().collect();
     let formats: &[bool] = if extent.all { &[false, true] } else { &[false] };
-    let total = cases.len() * methods.len() * formats.len();
-    let mut done = 0;
+    let pictures = Parts::new(cases.len() * methods.len() * formats.len(), observer);
     for case in &cases {
         let file = case.write_file()?;
         // Another case had another file there.
@@ -118,10 +117,8 @@ pub fn run(
         let mut held = Held::default();
         for &method in &methods {
             for &bright in formats {
-                observer.check()?;
                 found.extend(stress(device, memo, case, method, bright, &mut held)?);
-                done += 1;
-                observer.progress(done, total);
+                pictures.advance()?;
             }
         }
         file.map_or(Ok(()), std::fs::remove_file).map_err(|cause| Error::unwritable(folder.path(), cause))?;

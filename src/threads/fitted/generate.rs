@@ -1,5 +1,4 @@
 //! The fit of all rows: from the middle one outwards, each starts from its neighbour; of an anisotropic BRDF, so does each azimuth.
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 use glam::{DVec2, DVec3, dvec3};
 use rayon::prelude::*;
@@ -14,7 +13,7 @@ use super::stray;
 use super::table::FittedTable;
 use crate::brdf::{BaseProfile, Brdf, LobeShape, SeenBrdf, luminance};
 use crate::error::Result;
-use crate::progress::Observer;
+use crate::progress::{Observer, Parts};
 use crate::threads::azimuths::{View, azimuth_count};
 use crate::threads::rim::rim_power;
 use crate::threads::slice::{Resolution, Slice, reflect};
@@ -132,12 +131,11 @@ impl Targets {
 pub fn generate(brdf: &Brdf, settings: &ThreadSettings, observer: &dyn Observer) -> Result<FittedTable> {
     settings.check()?;
     let targets = Targets::new(brdf, settings, observer)?;
-    let done = AtomicUsize::new(0);
     let are_two = settings.sets > 1 && pixels_have_own(&targets.lobe);
     let total = if are_two { 2 * targets.rows.len() } else { targets.rows.len() };
-    let row_is_done = || observer.progress(done.fetch_add(1, Ordering::Relaxed) + 1, total);
+    let rows = Parts::new(total, observer);
     let share = share_of_sets(targets.azimuths, are_two);
-    let fit = |sets| fit_all(brdf, &targets, &ThreadSettings { sets, ..*settings }, share, observer, &row_is_done);
+    let fit = |sets| fit_all(brdf, &targets, &ThreadSettings { sets, ..*settings }, share, observer, &rows);
     if !are_two {
         return fit(settings.sets);
     }
@@ -152,7 +150,7 @@ fn fit_all(
     settings: &ThreadSettings,
     share: f32,
     observer: &dyn Observer,
-    row_is_done: &(impl Fn() + Sync),
+    rows_done: &Parts,
 ) -> Result<FittedTable> {
     let rows = settings.rows;
     // Row `index` of all azimuths, from what its neighbours' kernels are there: those of the view angle before and of the azimuth before.
@@ -203,7 +201,7 @@ fn fit_all(
         };
         let kernels = fit.part_of_the_way(&start, &free, is_steady);
         let error = fit.relative_error(&kernels);
-        row_is_done();
+        rows_done.advance()?;
         Ok((scaled(&kernels, lights.unit), *albedo, error))
     };
     let column = |azimuth: usize, beside: Neighbour<Vec<Row>>| -> Result<Vec<Row>> {

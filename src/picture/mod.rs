@@ -2,20 +2,16 @@
 use std::path::Path;
 
 use crate::error::{Error, Result};
-use crate::file_format;
+use crate::files;
 
-mod cache_file;
 mod exr_file;
 mod png_file;
 mod primaries;
-mod whole_file;
 
-pub(crate) use cache_file::keep_file;
 pub(crate) use exr_file::parse_exr;
 pub use exr_file::{ExrHeader, write_exr};
 pub use png_file::write_png;
 pub(crate) use primaries::Primaries;
-pub use whole_file::{check_all_writable, check_not_read, check_writable, file_in, file_name, write_whole};
 
 /// What deflate makes of a byte at most. A sample takes a byte or more, and so do most pixels: it bounds how many there are.
 const DEFLATED: u64 = 1032;
@@ -68,7 +64,7 @@ pub struct PictureFile {
 /// Reads the PNG or EXR at `path`. EXR may have R, G, B or only Y, with or without A.
 pub fn read_image(path: &Path) -> Result<PictureFile> {
     Format::of(path)?;
-    parse_image(path, &file_format::read(path)?)
+    parse_image(path, &files::read(path)?)
 }
 
 /// The picture in the bytes of the PNG or EXR at `path`.
@@ -110,6 +106,7 @@ pub(crate) fn check_pixels(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::files::check_writable;
 
     const GRADIENT: [[f32; 4]; 6] = [
         [0.0, 0.5, 1.0, 1.0],

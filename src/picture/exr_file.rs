@@ -12,8 +12,9 @@ use exr::prelude::{
     LayerAttributes, ReadChannels, ReadLayers, Vec2, WritableImage,
 };
 
-use super::{DEFLATED, Format, PictureFile, Primaries, check_pixels, write_whole};
+use super::{DEFLATED, Format, PictureFile, Primaries, check_pixels};
 use crate::error::{Error, Result};
+use crate::files::write_whole;
 
 /// DWA deflates four bytes for each block of 8 x 8 samples.
 const MAX_SAMPLES_PER_BYTE: u64 = 16 * DEFLATED;

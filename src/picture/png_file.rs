@@ -5,8 +5,9 @@ use std::path::Path;
 use image::codecs::png::{PngDecoder, PngEncoder};
 use image::{DynamicImage, ExtendedColorType, ImageDecoder, ImageEncoder};
 
-use super::{DEFLATED, Format, PictureFile, check_pixels, write_whole};
+use super::{DEFLATED, Format, PictureFile, check_pixels};
 use crate::error::{Error, Result};
+use crate::files::write_whole;
 
 /// The bytes of a PNG before its first optional chunk: signature (8) and the IHDR chunk (25).
 const AFTER_HEADER: usize = 8 + 25;
