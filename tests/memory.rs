@@ -1,4 +1,4 @@
-//! Changes of a scene do not grow memory: the only test of this process, whose memory it measures.
+//! Changes of a scene do not grow memory: in a process of its own, whose memory is measured.
 mod common;
 use common::{Validated, sphere};
 use std::process::Command;
@@ -14,21 +14,24 @@ fn resident_bytes() -> Option<u64> {
     Some(1024 * line.split_whitespace().nth(1)?.parse::<u64>().ok()?)
 }
 
-/// glibc has an arena for each thread that allocates at the same time as others, and gives back what is free at the end of one: by which
-/// thread made what, resident memory differed by a sixth. With one arena it is the same in each run, within a thousandth.
-const ONE_ARENA: (&str, &str) = ("MALLOC_ARENA_MAX", "1");
-
 #[test]
 fn two_hundred_changes_do_not_grow_memory() {
-    if std::env::var(ONE_ARENA.0).is_ok_and(|arenas| arenas == ONE_ARENA.1) {
-        return change_two_hundred_times();
-    }
-    let this_test = std::env::current_exe().unwrap();
-    let status = Command::new(this_test).env(ONE_ARENA.0, ONE_ARENA.1).arg("--nocapture").status().unwrap();
-    assert!(status.success(), "with one arena: {status}");
+    // By which of glibc's arenas gets what, and by what was freed before it takes large blocks from the system, resident memory grew by 3 to 15 % in the
+    // same changes. With one arena, and all blocks of 128 KiB and more from the system, it grows by 4.7 % in each of six runs.
+    let test = Command::new(std::env::current_exe().unwrap())
+        .args(["--exact", "memory_that_is_given_back_at_once_does_not_grow", "--ignored", "--nocapture"])
+        .envs([("MALLOC_ARENA_MAX", "1"), ("MALLOC_MMAP_THRESHOLD_", "131072")])
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&test.stdout);
+    // Of a name that there is not no test fails.
+    assert!(test.status.success() && said.contains("1 passed"), "{said}{}", String::from_utf8_lossy(&test.stderr));
+    println!("{said}");
 }
 
-fn change_two_hundred_times() {
+#[test]
+#[ignore = "the test above runs it"]
+fn memory_that_is_given_back_at_once_does_not_grow() {
     let gpu = Validated::with_own_memo();
     let environments = ["white", "sky"];
     let mut scene = sphere(MaterialSource::Builtin("clay".into()), "white", 4, (32, 24));
@@ -59,7 +62,7 @@ fn change_two_hundred_times() {
     ] {
         let (early, late) = (most(of, 40..120), most(of, 120..200));
         println!("{name}: at most {early} in changes 40 to 120, {late} in changes 120 to 200");
-        // The validation layer keeps some of what is freed (measured: a twenty-fifth; without the layer a hundredth), and alignment
+        // The validation layer keeps some of what is freed (measured: a twentieth; without the layer a hundredth), and alignment
         // moves some on the device.
         let slack = match name {
             "resident bytes" => early / 10,
