@@ -17,7 +17,7 @@ fn resident_bytes() -> Option<u64> {
 #[test]
 fn two_hundred_changes_do_not_grow_memory() {
     // By which of glibc's arenas gets what, and by what was freed before it takes large blocks from the system, resident memory grew by 3 to 15 % in the
-    // same changes. With one arena, and all blocks of 128 KiB and more from the system, it grows by 4.7 % in each of six runs.
+    // same changes. With one arena, and all blocks of 128 KiB and more from the system, it grew by 4.7 % in each of seven runs.
     let test = Command::new(std::env::current_exe().unwrap())
         .args(["--exact", "memory_that_is_given_back_at_once_does_not_grow", "--ignored", "--nocapture"])
         .envs([("MALLOC_ARENA_MAX", "1"), ("MALLOC_MMAP_THRESHOLD_", "131072")])

@@ -205,25 +205,28 @@ fn a_dragged_parameter_is_seen_by_drafts_and_ends_as_if_it_had_never_been_dragge
     values.iter().for_each(|value| replay += &alpha(*value));
     replay += "\"wait\"\n{\"save_picture\": \"saved.png\"}\n{\"save_scene\": \"scene.toml\"}\n\"quit\"\n";
     let arguments = ["--threads", "4", "--no-cache", "--stats", "stats.json", "--stats-error"];
-    let ended = viewer.play(&[&SMALL[..], &arguments].concat(), &replay);
-    ended.expect_success();
-    let stats: serde_json::Value = serde_json::from_slice(&std::fs::read(viewer.path("stats.json")).unwrap()).unwrap();
-    assert_eq!(stats["size"], serde_json::json!([160, 240]));
-    // Others are of the window, which gets its size.
-    let events = stats["events"].as_array().expect("events").iter();
-    let events: Vec<_> = events.filter(|event| event["input"]["set"]["parameter"].is_object()).collect();
-    assert_eq!(events.len(), values.len());
-    let ms = |event: &serde_json::Value, key: &str| event[key].as_f64();
-    for (event, value) in events.iter().copied().zip(&values) {
-        assert_eq!(event["input"]["set"]["parameter"]["value"].as_f64(), Some(*value));
-        assert!(ms(event, "shown_ms") > Some(0.0), "{event}");
-        // Unlike the finished picture, but like it.
-        assert!(ms(event, "rms_to_finished").is_none_or(|rms| rms > 0.0 && rms < 0.02), "{event}");
-    }
-    // On a machine that is busy with other work a value more often gives way to the next before its draft is shown.
-    assert!(events.iter().filter(|event| event["rms_to_finished"].is_number()).count() > values.len() / 4);
-    let last = events.last().unwrap();
-    assert!(ms(last, "finished_ms") > ms(last, "shown_ms"), "{last}");
+    let most_have_drafts = || {
+        viewer.play(&[&SMALL[..], &arguments].concat(), &replay).expect_success();
+        let stats = std::fs::read(viewer.path("stats.json")).unwrap();
+        let stats: serde_json::Value = serde_json::from_slice(&stats).unwrap();
+        assert_eq!(stats["size"], serde_json::json!([160, 240]));
+        // Others are of the window, which gets its size.
+        let events = stats["events"].as_array().expect("events").iter();
+        let events: Vec<_> = events.filter(|event| event["input"]["set"]["parameter"].is_object()).collect();
+        assert_eq!(events.len(), values.len());
+        let ms = |event: &serde_json::Value, key: &str| event[key].as_f64();
+        for (event, value) in events.iter().copied().zip(&values) {
+            assert_eq!(event["input"]["set"]["parameter"]["value"].as_f64(), Some(*value));
+            assert!(ms(event, "shown_ms") > Some(0.0), "{event}");
+            // Unlike the finished picture, but like it.
+            assert!(ms(event, "rms_to_finished").is_none_or(|rms| rms > 0.0 && rms < 0.02), "{event}");
+        }
+        let last = events.last().unwrap();
+        assert!(ms(last, "finished_ms") > ms(last, "shown_ms"), "{last}");
+        events.iter().filter(|event| event["rms_to_finished"].is_number()).count() > values.len() / 2
+    };
+    // A draft that other work on the machine delays gives way to the next value.
+    assert!((0..3).any(|_| most_have_drafts()));
     viewer.render("scene.toml", "again.png");
     assert!(std::fs::read(viewer.path("again.png")).unwrap() == std::fs::read(viewer.path("saved.png")).unwrap());
 }

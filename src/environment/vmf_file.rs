@@ -12,8 +12,7 @@ use std::path::Path;
 use super::pyramid::MAX_FACE_SIZE;
 use super::{BlurKernel, Pyramid, VmfPyramid};
 use crate::error::{Error, Result};
-use crate::files;
-use crate::files::{sealed, unsealed, write_whole};
+use crate::files::{self, sealed, unsealed, write_whole};
 
 /// Version of the file format and of the maps in it: to be raised when the same environment gets others.
 pub const FORMAT_VERSION: u32 = 5;

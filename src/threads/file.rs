@@ -43,8 +43,7 @@ use super::rim::{EVEN, is_rim_power};
 use super::{ThreadKind, ThreadTable, Threads};
 use crate::brdf::BaseProfile;
 use crate::error::{Error, Result};
-use crate::files;
-use crate::files::{sealed, unsealed, write_whole};
+use crate::files::{self, sealed, unsealed, write_whole};
 
 /// Version of the file format and of the threads in it: to be raised when either changes, since caches depend on it.
 pub const FORMAT_VERSION: u32 = 29;

@@ -155,7 +155,6 @@ fn fit_all(
     let rows = settings.rows;
     // Row `index` of all azimuths, from what its neighbours' kernels are there: those of the view angle before and of the azimuth before.
     let fit = |index: usize, neighbours: &[(usize, &Row)]| -> Result<Row> {
-        observer.check()?;
         let (lights, albedo) = &targets.rows[index];
         let in_units = |kernels: &[Kernel]| scaled(kernels, 1.0 / lights.unit);
         let to = View::of_row(index, rows);
