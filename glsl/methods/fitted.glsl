@@ -171,9 +171,9 @@ const float MOST_VIEW = 0.3;
 bool needs_subpixels(Surface surface, Material material) {
     float deviation = sqrt(surface.normal_variance);
     Lobe lobe = lobe_of(surface, material);
-    // Normals mirrored turn twice as far; three standard deviations of that.
     float most = max(min(lobe.width, NEARLY_FLAT_RAD), material.shared_deviation * lobe.w_o.z);
-    // Of normals alone; their variance in the surface has the view's in it.
+    // Of normals alone; their variance in the surface has the view's in it. What is mirrored turns twice as far as normals, and counts within
+    // three standard deviations.
     return surface.normal_variance > most * most + 0.25 * view_variance()
         || 0.5 * sqrt(view_variance()) > MOST_VIEW * lobe.width
         || HAS_SOURCES != 0 && share_of_brdf(least_clearance(lobe, surface, material, 3.0 * 2.0 * deviation), material) < 1.0;

@@ -96,13 +96,13 @@ pub(super) const TOLD_RAD: f64 = 0.02;
 ///
 /// Nor is one of few threads of a lobe that is wide enough up to a view of this cosine: few pixels see it beyond that, but all would pay.
 const SHARPEST_WITHOUT_MAP: f64 = 0.51;
-const FEW_THREADS: usize = 16;
+const MOST_WITHOUT_MAP: usize = 16;
 const COS_OF_WIDE: f64 = 0.5;
 
 /// The level that kernels of so many threads of a BRDF with this lobe are no sharper than, at the view angle `theta_o` in radians.
 pub fn sharpest_level(lobe: &LobeShape, count: usize, theta_o: f64) -> f64 {
     let at = |cos: f64| ((NARROWEST_IN_LOBE * lobe.width_rad).min(TOLD_RAD) * cos / FINEST_WIDTH_RAD).log2();
-    let is_wide = count <= FEW_THREADS && at(COS_OF_WIDE) > SHARPEST_WITHOUT_MAP;
+    let is_wide = count <= MOST_WITHOUT_MAP && at(COS_OF_WIDE) > SHARPEST_WITHOUT_MAP;
     let least = if lobe.is_cusp || is_wide { SHARPEST_WITHOUT_MAP } else { SHARPEST_LEVEL };
     at(theta_o.cos().max(MIN_COS_THETA_D)).max(least)
 }

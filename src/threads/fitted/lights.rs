@@ -60,7 +60,7 @@ pub struct TestLights {
     pub direction: [Vec<f32>; 3],
     /// Factor on the residual of each.
     pub weight: Vec<f32>,
-    /// Irradiance over pi of each.
+    /// The base's answer to each.
     pub cosine: Vec<f32>,
     /// The slice's answer to each: radiance in units, red, green, blue.
     pub response: [Vec<f32>; 3],
@@ -122,7 +122,7 @@ impl TestLights {
         Self::weighted(slice, &directions, &weights, &response, 0..SCALES, &cosine)
     }
 
-    /// Lights of these `scales`, which count by `weights`, with what `slice` and the cosine over pi answer them.
+    /// Lights of these `scales`, which count by `weights`, with what `slice` and its base answer them.
     pub(super) fn weighted(
         slice: &Slice,
         directions: &[DVec3],
