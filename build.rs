@@ -27,6 +27,8 @@ fn main() {
     let generated = out.join("glsl");
     write(&generated.join("brdf_models.glsl"), &brdf_switch());
 
+    write(&out.join("shader_constants.rs"), &shader_constants(&[glsl, &glsl.join("methods")]));
+
     let twins: Vec<_> = BRDF_MODELS.iter().filter(|name| has_twin(name)).collect();
     write(
         &out.join("brdf_twins.rs"),
@@ -89,6 +91,36 @@ fn recipe(recipes: &mut String, source: &Path, name: &str, includes: &[&Path]) {
     let _ = writeln!(recipes, "    Recipe {{ name: {name:?}, source: {source:?}, includes: &{includes:?} }},");
 }
 
+/// The numbers that GLSL files of these folders declare, as Rust: a module for each file, `const float X = 1.0;` as `pub const X: f32 = 1.0;`.
+fn shader_constants(folders: &[&Path]) -> String {
+    let mut rust = String::new();
+    for source in folders.iter().flat_map(|folder| files(folder)) {
+        let code = fs::read_to_string(&source).expect("a readable shader");
+        let constants: String = code.lines().filter_map(shader_constant).collect();
+        if !constants.is_empty() {
+            let name = text(source.file_name()).replace('.', "_");
+            let module = name.strip_suffix("_glsl").unwrap_or(&name);
+            let _ = writeln!(rust, "pub mod {module} {{\n{constants}}}");
+        }
+    }
+    rust
+}
+
+/// `const uint NAME = 8u;` or `const float NAME = 0.5;`, a formula of numbers and names, as a line of Rust.
+fn shader_constant(line: &str) -> Option<String> {
+    let (kind, rest) = line.strip_prefix("const ")?.split_once(' ')?;
+    let kind = match kind {
+        "uint" => "u32",
+        "float" => "f32",
+        _ => return None,
+    };
+    let (name, value) = rest.split_once(';')?.0.split_once(" = ")?;
+    // Functions of GLSL are none of Rust's; whole numbers end in `u`.
+    let is_call = value.split('(').rev().skip(1).any(|before| before.ends_with(char::is_alphanumeric));
+    let words: Vec<_> = value.split(' ').map(|word| word.strip_suffix('u').unwrap_or(word)).collect();
+    (!is_call).then(|| format!("    pub const {name}: {kind} = {};\n", words.join(" ")))
+}
+
 /// GLSL that includes every model and picks one by its id; models that no material of a scene uses are compiled out.
 fn brdf_switch() -> String {
     let mut glsl = String::from("// Generated from src/brdf/models/table.rs.\n");
@@ -96,7 +128,10 @@ fn brdf_switch() -> String {
         let _ = writeln!(glsl, "#include \"brdf/{name}.glsl\"");
     }
     glsl += "layout(constant_id = 1) const uint MODELS_USED = 0xffffffffu; // bit i: some material has model i\n";
+    glsl += "// f in 1/sr. Twin: Brdf::evaluate in src/brdf/mod.rs.\n";
     glsl += "vec3 brdf(Material material, vec3 w_i, vec3 w_o) {\n";
+    glsl += "    // Written so that a NaN counts as not positive.\n";
+    glsl += "    if (!(w_i.z > 0.0 && w_o.z > 0.0)) return vec3(0.0);\n";
     for (id, name) in BRDF_MODELS.iter().enumerate().filter(|(_, name)| has_twin(name)) {
         let bit = 1_u32 << id;
         let _ = writeln!(

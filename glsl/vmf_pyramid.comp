@@ -84,7 +84,8 @@ uvec2 cone_range(float x, float z, float sin_cone, uint size) {
         return uvec2(0);
     }
     vec2 texels = 0.5 * (vec2(low, high) + 1.0) * float(size);
-    return uvec2(floor(texels.x), min(ceil(texels.y), float(size)));
+    // Divisions may err by so little that a place is beyond the edge, too, and what is negative is no uint.
+    return uvec2(max(floor(texels.x), 0.0), min(ceil(texels.y), float(size)));
 }
 
 vec3 source_texel(uvec3 id) {

@@ -4,13 +4,11 @@ use std::f32::consts::TAU;
 use glam::{UVec2, Vec2, Vec3};
 
 use crate::packing::{octahedral_decode, octahedral_encode, pack_snorm_2x16, unpack_snorm_2x16};
+use crate::shader_constants::geometry_texel::{MATERIAL_BITS, TANGENT_STEPS};
 use crate::tangent::any_tangent;
 
 /// Most materials of a picture: their indices plus one have 16 bits.
 pub const MAX_MATERIALS: usize = MATERIAL_BITS as usize;
-
-const MATERIAL_BITS: u32 = 0xffff;
-const TANGENT_STEPS: f32 = 65534.0;
 
 /// What a sub-pixel sees of a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -35,6 +35,8 @@ pub mod prepare;
 pub mod progress;
 #[path = "scene/mod.rs"]
 pub mod scene;
+#[path = "shader_constants.rs"]
+pub(crate) mod shader_constants;
 #[path = "shading/mod.rs"]
 pub mod shading;
 #[path = "specialise.rs"]

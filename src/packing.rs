@@ -1,6 +1,8 @@
 //! Unit vectors in 32 bits. Twin of glsl/packing.glsl.
 use glam::{Vec2, Vec3};
 
+use crate::shader_constants;
+
 /// Octahedral map of a unit vector to [-1, 1]^2. Twin of `octahedral_encode`.
 pub fn octahedral_encode(n: Vec3) -> Vec2 {
     let n = n / (n.x.abs() + n.y.abs() + n.z.abs());
@@ -20,8 +22,8 @@ pub fn octahedral_decode(e: Vec2) -> Vec3 {
     Vec3::new(unfold(e.x), unfold(e.y), z).normalize()
 }
 
-/// How far from the middle a stereographic map goes: 13 degrees beyond the horizon. Twin of `STEREOGRAPHIC_EXTENT`.
-pub const STEREOGRAPHIC_EXTENT: f32 = 1.25;
+/// How far from the middle a stereographic map goes: 13 degrees beyond the horizon.
+pub const STEREOGRAPHIC_EXTENT: f32 = shader_constants::packing::STEREOGRAPHIC_EXTENT;
 
 /// Stereographic map of a unit vector to the plane, from -z: the upper hemisphere is the unit disc. What is outside of the map is moved to
 /// its border.

@@ -13,7 +13,6 @@ float ashikhmin_shirley_room(float cos_theta) {
 }
 
 vec3 ashikhmin_shirley(BrdfParameters parameters, vec3 w_i, vec3 w_o) {
-    if (!(w_i.z > 0.0 && w_o.z > 0.0)) return vec3(0.0);
     vec3 h = normalize(w_i + w_o);
     float cos_theta_d = dot(w_o, h);
     vec2 h2 = h.xy * h.xy;

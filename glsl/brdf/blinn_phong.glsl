@@ -5,7 +5,6 @@
 #include "pi.glsl"
 
 vec3 blinn_phong(BrdfParameters parameters, vec3 w_i, vec3 w_o) {
-    if (!(w_i.z > 0.0 && w_o.z > 0.0)) return vec3(0.0);
     vec3 h = normalize(w_i + w_o);
     float log_cos2 = log_one_minus(dot(h.xy, h.xy), 2.0 * log(h.z));
     float lobe = parameters.b.w * exp(0.5 * parameters.a.w * log_cos2);

@@ -5,7 +5,6 @@
 #include "microfacet.glsl"
 
 vec3 conductor(BrdfParameters parameters, vec3 w_i, vec3 w_o) {
-    if (!(w_i.z > 0.0 && w_o.z > 0.0)) return vec3(0.0);
     vec3 h = normalize(w_i + w_o);
     return fresnel_conductor(dot(w_o, h), parameters.a.rgb, parameters.b.rgb)
         * torrance_sparrow(parameters.b.w, w_i, w_o, h, parameters.c.xy);

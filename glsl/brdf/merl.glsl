@@ -7,7 +7,6 @@
 #include "parameters.glsl"
 
 vec3 merl(BrdfParameters parameters, vec3 w_i, vec3 w_o) {
-    if (!(w_i.z > 0.0 && w_o.z > 0.0)) return vec3(0.0);
     vec3 h = normalize(w_i + w_o);
     float sin_theta_h = length(h.xy);
     // The azimuth of a half vector at the pole is arbitrary.

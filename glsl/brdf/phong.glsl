@@ -5,7 +5,6 @@
 #include "pi.glsl"
 
 vec3 phong(BrdfParameters parameters, vec3 w_i, vec3 w_o) {
-    if (!(w_i.z > 0.0 && w_o.z > 0.0)) return vec3(0.0);
     vec3 chord = vec3(-w_i.xy, w_i.z) - w_o;
     float x = 0.5 * dot(chord, chord); // 1 - cos
     if (x >= 1.0) return parameters.a.rgb * INVERSE_PI;

@@ -6,7 +6,6 @@
 #include "pi.glsl"
 
 vec3 plastic(BrdfParameters parameters, vec3 w_i, vec3 w_o) {
-    if (!(w_i.z > 0.0 && w_o.z > 0.0)) return vec3(0.0);
     float ior = parameters.b.x;
     vec3 h = normalize(w_i + w_o);
     float coat = fresnel_dielectric(dot(w_o, h), ior) * torrance_sparrow(parameters.b.y, w_i, w_o, h, parameters.c.xy);

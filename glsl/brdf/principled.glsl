@@ -7,7 +7,6 @@
 
 vec3 principled(BrdfParameters parameters, vec3 w_i, vec3 w_o) {
     const float GGX = 0.0;
-    if (!(w_i.z > 0.0 && w_o.z > 0.0)) return vec3(0.0);
     vec3 h = normalize(w_i + w_o);
     float cos_theta_d = dot(w_o, h);
     vec3 base_colour = parameters.a.rgb;

@@ -22,7 +22,6 @@ vec3 slab_texel(BrdfParameters parameters, vec3 position, float h_y, float side)
 }
 
 vec3 tabulated_anisotropic(BrdfParameters parameters, vec3 w_i, vec3 w_o) {
-    if (!(w_i.z > 0.0 && w_o.z > 0.0)) return vec3(0.0);
     mat2 to_own = mat2(parameters.a.x, -parameters.a.y, parameters.a.y, parameters.a.x);
     vec3 own_i = vec3(to_own * w_i.xy, w_i.z);
     vec3 h = normalize(own_i + vec3(to_own * w_o.xy, w_o.z));

@@ -5,7 +5,6 @@
 #include "pi.glsl"
 
 vec3 ward(BrdfParameters parameters, vec3 w_i, vec3 w_o) {
-    if (!(w_i.z > 0.0 && w_o.z > 0.0)) return vec3(0.0);
     vec3 sum = w_i + w_o;
     vec2 scaled = sum.xy / parameters.c.xy;
     float cos2 = sum.z * sum.z;

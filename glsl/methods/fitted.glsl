@@ -146,14 +146,16 @@ float least_clearance(Lobe lobe, Surface surface, Material material, float least
 
 // Twin: NARROWING_COSINES in src/brdf/lobe/narrowing.rs.
 const vec4 NARROWING_FROM = vec4(1.0, 0.6, 0.4, 0.25);
-const vec4 NARROWING_TO = vec4(0.6, 0.4, 0.25, 0.1);
+const vec4 NARROWING_TO = vec4(NARROWING_FROM.yzw, 0.1);
 
-// The lobe of what is seen: across the plane of incidence it is narrower by the cosine, and it may be another one at grazing views. Twin of the
-// bound: MIN_COS_THETA_D in src/brdf/lobe/mod.rs.
+// The same as in src/brdf/lobe/mod.rs.
+const float MIN_COS_THETA_D = 0.05;
+
+// The lobe of what is seen: across the plane of incidence it is narrower by the cosine, and it may be another one at grazing views.
 Lobe lobe_of(Surface surface, Material material) {
     vec3 w_o = view_direction(surface);
     vec4 way = clamp((NARROWING_FROM - w_o.z) / (NARROWING_FROM - NARROWING_TO), 0.0, 1.0);
-    float narrower = max(w_o.z, 0.05) * exp2(dot(material.narrowing, way));
+    float narrower = max(w_o.z, MIN_COS_THETA_D) * exp2(dot(material.narrowing, way));
     vec3 mirror = surface.frame * vec3(-w_o.x, -w_o.y, w_o.z);
     return Lobe(w_o, mirror, narrower * material.lobe_width, narrower * material.lobe_radius);
 }

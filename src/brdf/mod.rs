@@ -9,7 +9,7 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::path::Path;
 
-use glam::{DVec2, DVec3, dvec3};
+use glam::{DVec2, DVec3, Vec4, dvec3};
 
 use crate::error::{Error, Result};
 use crate::files::{FileKind, read};
@@ -166,9 +166,9 @@ impl Brdf {
         }
     }
 
-    /// The model's parameters for its GLSL twin, `BrdfParameters { vec4 a, b, c }` in memory order. Shaders have no rotation: see
+    /// The model's parameters for its GLSL twin, `BrdfParameters { vec4 a, b, c }`. Shaders have no rotation: see
     /// [`Self::without_rotation`].
-    pub fn gpu_parameters(&self) -> [f32; 12] {
+    pub fn gpu_parameters(&self) -> [Vec4; 3] {
         debug_assert!(self.without_rotation().is_none(), "{} is rotated", self.model());
         dispatch!(self, model => model.gpu_parameters())
     }

@@ -68,7 +68,7 @@ impl MaterialRecord {
     /// Of `brdf`, whose lobe this is, without threads and CDFs.
     pub fn new(brdf: &Brdf, lobe: &LobeShape) -> Self {
         Self {
-            parameters: brdf.gpu_parameters(),
+            parameters: bytemuck::cast(brdf.gpu_parameters().map(<[f32; 4]>::from)),
             model: brdf.model_index(lobe),
             first_slice: 0,
             lobe_width: lobe.width_rad as f32,

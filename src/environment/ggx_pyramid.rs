@@ -7,15 +7,15 @@ use super::cube::direction_of;
 use crate::brdf::ggx_lobe;
 use crate::error::Result;
 use crate::progress::Observer;
+use crate::shader_constants::split_sum;
 
 /// Texels along the edge of a face of level 0, at least: the last level has one. Twice as many as the source has, up to the most.
 const FEWEST_TEXELS: usize = 64;
 const MOST_TEXELS: usize = 256;
 
 /// roughness_alpha of level 0: its lobe is as wide as three texels of a face of 256. Each level has twice that of the one before, up to 1.
-/// `FINEST_ALPHA` in glsl/methods/split_sum.glsl.
-pub const FINEST_ALPHA: f64 = 1.0 / 64.0;
-const LEVELS: usize = 7;
+pub const FINEST_ALPHA: f64 = split_sum::FINEST_ALPHA as f64;
+const LEVELS: usize = 1 + split_sum::COARSEST_LEVEL as usize;
 
 /// Samples of a texel: rings of equal mass, times as many azimuths. Lookups are as wide as what they stand for, so wide lobes, whose rings lie
 /// further apart, need more.

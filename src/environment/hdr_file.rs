@@ -1,5 +1,6 @@
 //! Reads environments from Radiance HDR files, by the rules of Radiance itself (`header.c`, `resolu.c` and `color.c` in its `src/common`), but
-//! that a value is its mantissa's, without the half step that `color.c` adds.
+//! that a value is its mantissa's, without the half step that `color.c` adds, and that a file without `PRIMARIES` has those of Rec. 709, as other
+//! programs write it, not Radiance's own.
 use std::borrow::Cow;
 use std::path::Path;
 
@@ -15,7 +16,8 @@ pub(super) const FORMAT: FileFormat<Environment> = FileFormat {
     parse: |path, bytes, _| parse(path, bytes),
 };
 
-/// A run of each of four channels takes two bytes and is of 127 pixels at most.
+/// A run of each of four channels takes two bytes and is of 127 pixels at most. Runs of the older form may be longer, so old files of nearly one
+/// colour are refused: what a few bytes may ask for has to end somewhere.
 const MAX_PIXELS_PER_BYTE: u64 = 16;
 
 const SIGNATURES: [&str; 2] = ["#?RADIANCE", "#?RGBE"];

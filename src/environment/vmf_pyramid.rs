@@ -11,16 +11,17 @@ use super::pyramid::Pyramid;
 use super::to_dvec3;
 use crate::error::Result;
 use crate::progress::{Observer, Parts};
+use crate::shader_constants::vmf_pyramid_comp;
 use crate::vector_math::exp;
 
 /// Width of a level's kernel in texels of that level, in the middle of a face.
-const TEXELS_A_WIDTH: f64 = 2.0;
+const TEXELS_A_WIDTH: f64 = vmf_pyramid_comp::TEXELS_A_WIDTH as f64;
 
 /// Texels along the edge of a face of the level whose kernel has a width of one radian; there are no wider ones.
 const WIDEST_FACE_SIZE: usize = (2.0 * TEXELS_A_WIDTH) as usize;
 
 /// Kernels end where they have fallen to exp(-8), and beyond is 3.4e-4 of their mass; the rest is scaled to have it all.
-const KERNEL_EXTENT: f64 = 8.0;
+const KERNEL_EXTENT: f64 = vmf_pyramid_comp::KERNEL_EXTENT as f64;
 
 /// The environment blurred by kernels.
 #[derive(Clone, Debug, PartialEq)]

@@ -4,13 +4,11 @@ use super::light::DevicePyramid;
 use crate::Result;
 use crate::environment::Pyramid;
 use crate::graph::{BufferDesc, BufferHandle, FrameGraph};
+use crate::shader_constants::tiles::MAX_GROUPS;
 use crate::vulkan::{Buffer, ComputePipeline, Device, PipelineCache, compiled};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 use std::sync::Arc;
-
-/// Workgroups along an axis that every device can dispatch.
-const MAX_GROUPS: u32 = 65535;
 
 /// What the pass is made of.
 pub struct BareLookups {

@@ -5,6 +5,7 @@ use crate::environment::Environment;
 use crate::graph::{BufferDesc, BufferHandle, FrameGraph, ImageHandle};
 use crate::memo::Keyed;
 use crate::method::Method;
+use crate::shader_constants::tiles::{PART_PIXELS, TILE_SIDE};
 use crate::threads::fitted::NEARLY_FLAT_RAD;
 use crate::vulkan::{Buffer, ComputePipeline, Device};
 use ash::vk;
@@ -30,7 +31,7 @@ pub const MAX_SHADERS: usize = 16;
 pub fn most_shaders(size_px: [u32; 2], max_buffer_bytes: u32) -> usize {
     let [columns, rows] = size_px.map(|side| u64::from(side.next_multiple_of(TILE_SIDE)));
     // Interior and edge pixels of each shader have room for all parts of all tiles.
-    let bytes_a_shader = 2 * PART_BYTES * (columns * rows / PART_PIXELS);
+    let bytes_a_shader = 2 * PART_BYTES * (columns * rows / u64::from(PART_PIXELS));
     (u64::from(max_buffer_bytes) / bytes_a_shader.max(1)).clamp(1, MAX_SHADERS as u64) as usize
 }
 
@@ -47,12 +48,6 @@ pub struct Counters {
     /// Those among them that are in edge pixels.
     pub covered_edge_subpixels: u32,
 }
-
-/// Pixels on the side of a tile: the same in glsl/tiles.glsl.
-const TILE_SIDE: u32 = 8;
-
-/// Pixels of a part of a tile, at most: the same in glsl/tiles.glsl.
-const PART_PIXELS: u64 = 8;
 
 /// Bytes of a listed part: see `pack_part` in glsl/tiles.glsl.
 const PART_BYTES: u64 = 4;
@@ -195,7 +190,7 @@ pub fn classify<'a>(
     let class_count = 2 * classify.shader_count as usize;
     let mut counters = graph.kept_buffer("counters", BufferDesc { size_bytes: Counters::arguments_of(class_count) });
     graph.clear_buffer("clear_counters", &mut counters);
-    let part_count = class_count as u64 * tile_pixels.div_ceil(PART_PIXELS) * tile_count;
+    let part_count = class_count as u64 * tile_pixels.div_ceil(u64::from(PART_PIXELS)) * tile_count;
     let mut parts = graph.kept_buffer("part_list", BufferDesc { size_bytes: PART_BYTES * part_count });
     let mut pixels = graph.kept_buffer("pixel_list", BufferDesc { size_bytes: 4 * tile_pixels * tile_count });
     let mut coverage = graph.kept_buffer("coverage", BufferDesc { size_bytes: tile_pixels * tile_count / 4 });

@@ -5,6 +5,7 @@ use crate::Result;
 use crate::graph::{FrameGraph, ImageDesc, ImageHandle};
 use crate::memo::Keyed;
 use crate::scene::{Mesh, TangentRule};
+use crate::shader_constants::geometry_cache::{TANGENT_ALONG, TANGENT_AROUND, TANGENT_OF_MESH};
 use crate::vulkan::{
     Device, GraphicsPipeline, GraphicsState, PipelineCache, Shader, Triangles, VertexAttribute, compiled,
 };
@@ -26,11 +27,6 @@ const NEAR_PLANE: f32 = 1e-6;
 
 /// What the vertex shader may be off by, of the size of what it adds: some ten roundings of 2^-24.
 const ROUNDING: f64 = 1e-6;
-
-/// How tangents go by the axis of an object, as glsl/geometry_cache.glsl has it; 0 is not at all.
-const TANGENT_AROUND: f32 = 1.0;
-const TANGENT_ALONG: f32 = 2.0;
-const TANGENT_OF_MESH: f32 = 3.0;
 
 /// The triangles of a mesh on the device.
 pub struct DeviceMesh {

@@ -9,6 +9,9 @@ use crate::environment::sources::clearance;
 use crate::environment::{LightMap, SourceRecord};
 use crate::light::{BlurredLight, finest_level};
 use crate::packing::stereographic_decode;
+use crate::shader_constants::fitted::{
+    self, FAR, LOW_COSINE, LOW_DEVIATIONS, MOST_VIEW, OPENED_WITHIN, STEEP, VERY_FAR, WIDEST_WHOLE_RAD, WIDTHS_ON_THE_WAY,
+};
 use crate::threads::azimuths::Azimuths;
 use crate::threads::fitted::kernel::{FINEST_WIDTH_RAD, level_of_variance, sharp_part, variance_of_level};
 use crate::threads::fitted::{FittedTable, NEARLY_FLAT_RAD, UnpackedKernel};
@@ -57,16 +60,9 @@ fn blurred_radiance(twin: &CpuShader, direction: Vec3, level: f32, sources: f32)
     radiance
 }
 
-/// Twins of the shader's.
-const FAR: f32 = 4.0;
-const VERY_FAR: f32 = 40.0;
-const OPENED_WITHIN: f32 = 12.0;
-const WIDTHS_ON_THE_WAY: f32 = 4.2;
-const STEEP: f32 = 0.7;
-const WIDEST_WHOLE_RAD: f32 = 0.1;
-const LOW_COSINE: f32 = 0.3;
-const LOW_DEVIATIONS: f32 = 20.0;
-const MOST_VIEW: f32 = 0.3;
+// What Rust has in double precision.
+const _: () = assert!(MIN_COS_THETA_D as f32 == fitted::MIN_COS_THETA_D);
+const _: () = assert!(NEARLY_FLAT_RAD as f32 == fitted::NEARLY_FLAT_RAD);
 
 /// A lobe, seen from w_o in the shading frame. Twin of `Lobe`.
 struct Lobe<'a> {

@@ -5,11 +5,10 @@ use glam::{Vec2, Vec3};
 
 use super::random::to_unit;
 use super::turned;
+use crate::shader_constants::importance_sampling::DIFFUSE_SHARE;
 use crate::threads::SliceTable;
 use crate::threads::azimuths::Azimuths;
 use crate::threads::slice_table::{AZIMUTHS, RINGS, ROW_SIZE};
-
-const DIFFUSE_SHARE: f32 = 0.05;
 
 /// The rows of the table between which a view angle lies. Twin of `SliceRows`.
 pub(super) struct SliceRows<'a> {

@@ -4,6 +4,7 @@ use std::f32::consts::FRAC_PI_2;
 use glam::{Mat3, Vec2, Vec3, Vec4};
 
 use super::{Point, Surface, smoothstep, turned};
+use crate::shader_constants::paper::{FACING_DEG, TURNING_DEG};
 use crate::tangent::tangent_along;
 use crate::threads::rim::towards_row_above;
 use crate::threads::{ThreadTable, Threads};
@@ -13,10 +14,6 @@ fn fixed_frame(n: Vec3, axis: Vec3) -> Mat3 {
     let x = tangent_along(axis, n);
     Mat3::from_cols(x, n.cross(x), n)
 }
-
-/// Twins of those of the shader.
-const FACING_DEG: f32 = 3.0;
-const TURNING_DEG: f32 = 15.0;
 
 /// Sums of f cos / p and of f cos / p times radiance.
 #[derive(Default)]

@@ -3,8 +3,7 @@ use glam::Vec3;
 
 use super::{Point, importance_sampling::SliceRows, light_sampling::light_pdf, random::to_unit};
 use crate::brdf::LUMINANCE;
-
-const CANDIDATES: u32 = 8;
+use crate::shader_constants::ris::CANDIDATES;
 
 /// Twin of `estimate`.
 pub(super) fn estimate(point: &Point) -> Vec3 {

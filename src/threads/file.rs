@@ -7,7 +7,7 @@
 //! | 8 | magic `THREADS\0` |
 //! | 4 | u32 format version, [`FORMAT_VERSION`] |
 //! | 4 | u32 length H of the header |
-//! | H | header, JSON: `method` ("fitted", "paper" or "gaussian"), `material`, `count`, `rows`, `seed`, `rim_power` if it is not 1, `base` if it is not Lambert's, and `azimuths` and `sets` if there is more than one |
+//! | H | header, JSON: `method` ("fitted", "paper" or "gaussian"), `material`, `count`, `rows`, `seed`, `rim_power`, `base`, `azimuths` and `sets` |
 //! | ... | the rows, then the threads, see below |
 //! | 32 | BLAKE3 digest of everything before |
 //!
@@ -39,14 +39,14 @@ use serde::{Deserialize, Serialize};
 
 use super::azimuths::is_azimuth_count;
 use super::fitted::FittedTable;
-use super::rim::{EVEN, is_rim_power};
+use super::rim::is_rim_power;
 use super::{ThreadKind, ThreadTable, Threads};
 use crate::brdf::BaseProfile;
 use crate::error::{Error, Result};
 use crate::files::{self, sealed, unsealed, write_whole};
 
 /// Version of the file format and of the threads in it: to be raised when either changes, since caches depend on it.
-pub const FORMAT_VERSION: u32 = 29;
+pub const FORMAT_VERSION: u32 = 30;
 
 const MAGIC: &[u8; 8] = b"THREADS\0";
 
@@ -57,38 +57,10 @@ struct Header {
     count: usize,
     rows: usize,
     seed: u64,
-    #[serde(default = "even", skip_serializing_if = "is_even")]
     rim_power: f32,
-    #[serde(default = "lambert", skip_serializing_if = "is_lambert")]
     base: [f32; BaseProfile::TERMS],
-    #[serde(default = "one", skip_serializing_if = "is_one")]
     azimuths: usize,
-    #[serde(default = "one", skip_serializing_if = "is_one")]
     sets: usize,
-}
-
-fn one() -> usize {
-    1
-}
-
-fn even() -> f32 {
-    EVEN
-}
-
-fn is_even(power: &f32) -> bool {
-    *power == EVEN
-}
-
-fn lambert() -> [f32; BaseProfile::TERMS] {
-    BaseProfile::EVEN.0
-}
-
-fn is_lambert(base: &[f32; BaseProfile::TERMS]) -> bool {
-    *base == lambert()
-}
-
-fn is_one(number: &usize) -> bool {
-    *number == 1
 }
 
 /// Writes `threads` to `path`, whole or not at all.
@@ -116,7 +88,7 @@ fn encode(threads: &Threads) -> Vec<u8> {
         Threads::Fitted(table) | Threads::Gaussian(table) => {
             (table.material.clone(), 0, table.rim_power, table.base.0, table.azimuths, table.for_subpixels().sets)
         }
-        Threads::Paper(table) => (table.material.clone(), table.seed, table.rim_power, lambert(), 1, 1),
+        Threads::Paper(table) => (table.material.clone(), table.seed, table.rim_power, BaseProfile::EVEN.0, 1, 1),
     };
     let header = serde_json::to_vec(&Header { method, material, count, rows, seed, rim_power, base, azimuths, sets });
     let header = header.expect("a header of strings and numbers is always JSON");

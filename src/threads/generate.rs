@@ -270,66 +270,6 @@ mod tests {
         (0..table.count).map(term).sum::<DVec3>() / table.count as f64
     }
 
-    /// Measurements for the project's notes: `cargo test --release threads::generate -- --ignored --nocapture`.
-    #[test]
-    #[ignore = "prints measurements"]
-    fn measure() {
-        for (name, brdf) in test_materials::all() {
-            for count in [4, 16, 100] {
-                let start = std::time::Instant::now();
-                let table = generate(
-                    &brdf,
-                    &ThreadSettings { kind: ThreadKind::Paper, count, ..ThreadSettings::default() },
-                    &(),
-                )
-                .unwrap();
-                let seconds = start.elapsed().as_secs_f64();
-                let worst = |offset: f64| {
-                    let errors = (0..88).map(|row| (f64::from(row) + offset).to_radians()).map(|theta_o| {
-                        let albedo = brdf.albedo(theta_o);
-                        let error = (furnace(&brdf, &table, theta_o) - albedo) / albedo;
-                        error.abs().max_element()
-                    });
-                    errors.fold(0.0, f64::max)
-                };
-                let mut turns: Vec<f64> = (1..88)
-                    .flat_map(|row| table.row(row - 1).iter().zip(table.row(row)).collect::<Vec<_>>())
-                    .map(|(a, b)| a.direction().angle_between(b.direction()).to_degrees())
-                    .collect();
-                turns.sort_by(f64::total_cmp);
-                println!(
-                    "{name:16} {count:4} threads: {seconds:.2} s, furnace {:.4} on rows, {:.4} between; turn per row: median {:.2}, 99 % {:.2}, most {:.2} deg; light error {:.4}",
-                    worst(0.0),
-                    worst(0.5),
-                    turns[turns.len() / 2],
-                    turns[turns.len() * 99 / 100],
-                    turns[turns.len() - 1],
-                    light_error(&brdf, &table)
-                );
-            }
-        }
-    }
-
-    /// Relative RMS error of radiance under soft lights exp(8 (w . d - 1)), over 40 light directions d and 4 views.
-    fn light_error(brdf: &Brdf, table: &ThreadTable) -> f64 {
-        let (mut error, mut size) = (0.0, 0.0);
-        for row in [5, 30, 55, 70].map(|row| row * table.rows / 90) {
-            let slice = Slice::new(&SeenBrdf::from_all_around(brdf), theta_o(row, table.rows));
-            let dense: Vec<DVec3> = slice.points(20_000).collect();
-            for uv in fibonacci_lattice(40) {
-                let z = uv.x;
-                let d = (DVec2::from_angle(2.0 * PI * uv.y) * (1.0 - z * z).sqrt()).extend(z);
-                let light = |s: DVec3| (8.0 * (s.dot(d) - 1.0)).exp();
-                let exact = dense.iter().map(|&s| light(s)).sum::<f64>() / dense.len() as f64;
-                let term = |s: &Sample| light(s.direction()) * slice.pdf(s.direction()) / f64::from(s.p);
-                let estimate = table.row(row).iter().map(term).sum::<f64>() / table.count as f64;
-                error += (estimate - exact).powi(2);
-                size += exact * exact;
-            }
-        }
-        (error / size).sqrt()
-    }
-
     #[test]
     fn impossible_settings_are_refused() {
         let brdf = test_materials::narrow();

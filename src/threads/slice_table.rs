@@ -5,15 +5,17 @@ use rayon::prelude::*;
 use super::azimuths::{View, azimuth_count};
 use super::slice::{Resolution, Slice};
 use crate::brdf::{Brdf, SeenBrdf};
+use crate::shader_constants::importance_sampling::{self, SLICE_AZIMUTHS, SLICE_RINGS, SLICE_ROWS, SLICE_SIZE};
 
-/// View angles of an isotropic BRDF: theta_o = row 90 deg / (ROWS - 1), the last 89.99 degrees. `SLICE_ROWS` in glsl/importance_sampling.glsl.
-pub const ROWS: usize = 91;
-/// Rings of the half vector: theta_h = 90 deg x^2, x in steps of 1 / RINGS. `SLICE_RINGS`.
-pub const RINGS: usize = Resolution::FULL.theta / MERGED;
-/// Azimuths of the half vector from -180 degrees. `SLICE_AZIMUTHS`.
-pub const AZIMUTHS: usize = Resolution::FULL.phi / MERGED;
-/// Numbers of a row. `SLICE_SIZE`.
-pub const ROW_SIZE: usize = RINGS + 1 + RINGS * (AZIMUTHS + 1);
+/// View angles of an isotropic BRDF: theta_o = row 90 deg / (ROWS - 1), the last 89.99 degrees.
+pub const ROWS: usize = SLICE_ROWS as usize;
+/// Rings of the half vector: theta_h = 90 deg x^2, x in steps of 1 / RINGS.
+pub const RINGS: usize = SLICE_RINGS as usize;
+/// Azimuths of the half vector from -180 degrees.
+pub const AZIMUTHS: usize = SLICE_AZIMUTHS as usize;
+/// Numbers of a row.
+pub const ROW_SIZE: usize = SLICE_SIZE as usize;
+const _: () = assert!(RINGS == Resolution::FULL.theta / MERGED && AZIMUTHS == Resolution::FULL.phi / MERGED);
 
 /// Four midpoints make the mass of a cell, so that one half below the horizon is not taken for empty.
 const MERGED: usize = 2;
@@ -21,8 +23,8 @@ const MERGED: usize = 2;
 /// Random numbers are multiples of 1 / STEPS in [0, 1).
 const STEPS: f64 = (1 << 24) as f64;
 
-/// View angles of an anisotropic BRDF at each azimuth: fewer, since it needs 19 or more of these. `AZIMUTH_ROWS`.
-pub const AZIMUTH_ROWS: usize = 46;
+/// View angles of an anisotropic BRDF at each azimuth: fewer, since it needs 19 or more of these.
+pub const AZIMUTH_ROWS: usize = importance_sampling::AZIMUTH_ROWS as usize;
 
 /// Row by row of the view angle: the CDF over rings, then ring by ring that over azimuths. All are multiples of 2^-24,
 /// as random numbers are, so a cell is drawn with exactly the probability that the numbers tell. 2.3 MB.

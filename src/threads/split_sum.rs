@@ -13,9 +13,10 @@ use super::rim::rim_power;
 use super::slice::{Resolution, Slice};
 use super::theta_o;
 use crate::brdf::{BaseProfile, Brdf, SeenBrdf, Tap, ggx_lobe};
+use crate::shader_constants::split_sum::SPLIT_SUM_ROWS;
 
-/// View angles: theta_o = row 90 deg / (ROWS - 1), the last 89.99 degrees. `SPLIT_SUM_ROWS` in glsl/methods/split_sum.glsl.
-pub const ROWS: usize = 91;
+/// View angles: theta_o = row 90 deg / (ROWS - 1), the last 89.99 degrees.
+pub const ROWS: usize = SPLIT_SUM_ROWS as usize;
 
 /// View angles at which lights are answered.
 const FITTED_ROWS: [usize; 6] = [0, 20, 40, 55, 70, 80];

@@ -2,7 +2,7 @@
 //!
 //! The axes are those of the shading frame, x the tangent, turned by `rotation_deg`. Facets are like those of an isotropic surface that is
 //! stretched along them: Heitz, "Understanding the Masking-Shadowing Function in Microfacet-Based BRDFs" (2014), appendix A.
-use glam::{DVec2, DVec3};
+use glam::{DVec2, DVec3, Vec4};
 
 use crate::brdf::{Parameters, Spacing, hash_numbers};
 use crate::error::{Error, Result};
@@ -135,9 +135,9 @@ impl Roughness {
         self.axes.without_rotation().map(|(axes, deg)| (Self { axes, ..self }, deg))
     }
 
-    /// As shaders have it: roughness_alpha along both axes, which are those of the shading frame there.
-    pub(crate) fn gpu_parameters(self) -> [f32; 2] {
-        self.alpha.as_vec2().to_array()
+    /// As shaders have it: roughness_alpha along both axes, which are those of the shading frame there, and nothing more.
+    pub(crate) fn gpu_parameters(self) -> Vec4 {
+        self.alpha.as_vec2().extend(0.0).extend(0.0)
     }
 
     /// Adds it to a fingerprint. What is alike in all directions has none.

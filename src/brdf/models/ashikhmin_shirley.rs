@@ -13,7 +13,7 @@
 //! Reciprocal. Energy is conserved for all parameters: the lobe's albedo is at most F, the diffuse part's at most diffuse (1 - specular).
 use std::f64::consts::PI;
 
-use glam::{DVec2, DVec3};
+use glam::{DVec2, DVec3, Vec4};
 
 use crate::brdf::microfacet::fresnel_schlick;
 use crate::brdf::microfacet::roughness::{Axes, is_along_axes};
@@ -83,13 +83,13 @@ impl Model for AshikhminShirley {
         Ok(Self { diffuse, specular, exponent: DVec2::new(exponent_x, exponent_y), axes })
     }
 
-    fn gpu_parameters(&self) -> [f32; 12] {
+    fn gpu_parameters(&self) -> [Vec4; 3] {
         let diffuse = self.diffuse * (1.0 - self.specular) * (28.0 / (23.0 * PI));
-        let mut packed = [0.0; 12];
-        packed[0..4].copy_from_slice(&diffuse.as_vec3().extend(self.exponent.x as f32).to_array());
-        packed[4..8].copy_from_slice(&self.specular.as_vec3().extend(self.exponent.y as f32).to_array());
-        packed[8] = self.normalisation() as f32;
-        packed
+        [
+            diffuse.as_vec3().extend(self.exponent.x as f32),
+            self.specular.as_vec3().extend(self.exponent.y as f32),
+            Vec4::X * self.normalisation() as f32,
+        ]
     }
 
     fn without_rotation(&self) -> Option<(Self, f64)> {

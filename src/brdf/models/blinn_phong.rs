@@ -1,7 +1,7 @@
 //! Blinn-Phong with a normalised lobe: f = diffuse / pi + specular c_n (n . h)^n. Twin: glsl/brdf/blinn_phong.glsl.
 use std::f64::consts::{FRAC_1_PI, PI};
 
-use glam::DVec3;
+use glam::{DVec3, Vec4};
 
 use crate::brdf::{Model, Parameters, Spacing, hash_numbers, warn_of_excess};
 use crate::error::Result;
@@ -49,12 +49,9 @@ impl Model for BlinnPhong {
         Ok(model)
     }
 
-    fn gpu_parameters(&self) -> [f32; 12] {
+    fn gpu_parameters(&self) -> [Vec4; 3] {
         let (diffuse, specular) = (self.diffuse.as_vec3(), self.specular.as_vec3());
-        let mut packed = [0.0; 12];
-        packed[0..4].copy_from_slice(&diffuse.extend(self.exponent as f32).to_array());
-        packed[4..8].copy_from_slice(&specular.extend(self.normalisation() as f32).to_array());
-        packed
+        [diffuse.extend(self.exponent as f32), specular.extend(self.normalisation() as f32), Vec4::ZERO]
     }
 
     fn hash_content(&self, hasher: &mut blake3::Hasher) {

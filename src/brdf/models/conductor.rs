@@ -1,5 +1,5 @@
 //! Rough metal: f = F D G / (4 cos_theta_i cos_theta_o), exact conductor Fresnel. Twin: glsl/brdf/conductor.glsl.
-use glam::DVec3;
+use glam::{DVec3, Vec4};
 
 use crate::brdf::microfacet::metals::index_of_refraction;
 use crate::brdf::microfacet::{Distribution, fresnel_conductor};
@@ -32,12 +32,12 @@ impl Model for Conductor {
         Ok(Self { distribution, roughness, eta, k })
     }
 
-    fn gpu_parameters(&self) -> [f32; 12] {
-        let mut packed = [0.0; 12];
-        packed[0..4].copy_from_slice(&self.eta.as_vec3().extend(0.0).to_array());
-        packed[4..8].copy_from_slice(&self.k.as_vec3().extend(self.distribution.gpu_id()).to_array());
-        packed[8..10].copy_from_slice(&self.roughness.gpu_parameters());
-        packed
+    fn gpu_parameters(&self) -> [Vec4; 3] {
+        [
+            self.eta.as_vec3().extend(0.0),
+            self.k.as_vec3().extend(self.distribution.gpu_id()),
+            self.roughness.gpu_parameters(),
+        ]
     }
 
     fn without_rotation(&self) -> Option<(Self, f64)> {

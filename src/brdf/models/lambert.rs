@@ -1,7 +1,7 @@
 //! Lambert: a perfectly diffuse surface, f = reflectance / pi. Twin: glsl/brdf/lambert.glsl.
 use std::f64::consts::FRAC_1_PI;
 
-use glam::DVec3;
+use glam::{DVec3, Vec4};
 
 use crate::brdf::{Model, Parameters, hash_numbers};
 use crate::error::Result;
@@ -22,9 +22,8 @@ impl Model for Lambert {
         Ok(Self { reflectance: parameters.colour("reflectance", 0.0..=1.0, "Albedo, linear Rec. 709.")? })
     }
 
-    fn gpu_parameters(&self) -> [f32; 12] {
-        let [r, g, b] = self.reflectance.as_vec3().to_array();
-        [r, g, b, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+    fn gpu_parameters(&self) -> [Vec4; 3] {
+        [self.reflectance.as_vec3().extend(0.0), Vec4::ZERO, Vec4::ZERO]
     }
 
     fn hash_content(&self, hasher: &mut blake3::Hasher) {

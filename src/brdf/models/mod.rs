@@ -1,5 +1,5 @@
 //! The models: a file each, and what each of them offers. A measured BRDF is a model whose parameters are a file.
-use glam::DVec3;
+use glam::{DVec3, Vec4};
 
 use super::Parameters;
 use crate::error::{Error, Result};
@@ -27,8 +27,8 @@ pub trait Model: Sized {
 
     /// The model's parameters as its GLSL twin expects them: `BrdfParameters { vec4 a, b, c }`, without those of [`Self::without_rotation`]. None
     /// of a model that has no twin.
-    fn gpu_parameters(&self) -> [f32; 12] {
-        [0.0; 12]
+    fn gpu_parameters(&self) -> [Vec4; 3] {
+        [Vec4::ZERO; 3]
     }
 
     /// Whether shaders have to look it up in a table although its model has a GLSL twin: where the twin leaves out what its parameters ask for.

@@ -8,7 +8,7 @@
 //! horizon. So diffuse + specular <= 1 conserves energy; a warning says so where they are more.
 use std::f64::consts::{FRAC_1_PI, PI};
 
-use glam::DVec3;
+use glam::{DVec3, Vec4};
 
 use crate::brdf::{Model, Parameters, Spacing, hash_numbers, warn_of_excess};
 use crate::error::Result;
@@ -59,11 +59,9 @@ impl Model for Phong {
         Ok(model)
     }
 
-    fn gpu_parameters(&self) -> [f32; 12] {
-        let mut packed = [0.0; 12];
-        packed[0..4].copy_from_slice(&self.diffuse.as_vec3().extend(self.exponent as f32).to_array());
-        packed[4..8].copy_from_slice(&self.specular.as_vec3().extend(self.normalisation() as f32).to_array());
-        packed
+    fn gpu_parameters(&self) -> [Vec4; 3] {
+        let (diffuse, specular) = (self.diffuse.as_vec3(), self.specular.as_vec3());
+        [diffuse.extend(self.exponent as f32), specular.extend(self.normalisation() as f32), Vec4::ZERO]
     }
 
     fn hash_content(&self, hasher: &mut blake3::Hasher) {

@@ -1,7 +1,7 @@
 //! Plastic: a rough dielectric coat on a diffuse base. Twin: glsl/brdf/plastic.glsl.
 use std::f64::consts::FRAC_1_PI;
 
-use glam::DVec3;
+use glam::{DVec3, Vec4};
 
 use crate::brdf::microfacet::{Distribution, fresnel_dielectric};
 use crate::brdf::{Model, Parameters, Roughness, Spacing, hash_numbers};
@@ -62,13 +62,12 @@ impl Model for Plastic {
         Ok(Self::new(distribution, roughness, ior, diffuse))
     }
 
-    fn gpu_parameters(&self) -> [f32; 12] {
-        let mut packed = [0.0; 12];
-        packed[0..4].copy_from_slice(&self.base.as_vec3().extend(0.0).to_array());
-        packed[4] = self.ior as f32;
-        packed[5] = self.distribution.gpu_id();
-        packed[8..10].copy_from_slice(&self.roughness.gpu_parameters());
-        packed
+    fn gpu_parameters(&self) -> [Vec4; 3] {
+        [
+            self.base.as_vec3().extend(0.0),
+            Vec4::new(self.ior as f32, self.distribution.gpu_id(), 0.0, 0.0),
+            self.roughness.gpu_parameters(),
+        ]
     }
 
     fn without_rotation(&self) -> Option<(Self, f64)> {

@@ -39,7 +39,7 @@
 use std::f64::consts::{FRAC_1_PI, PI};
 use std::sync::{Arc, OnceLock};
 
-use glam::{DVec2, DVec3, dvec3};
+use glam::{DVec2, DVec3, Vec3, Vec4, dvec3};
 
 use crate::brdf::microfacet::roughness::{Axes, ROTATION};
 use crate::brdf::microfacet::{Distribution, fresnel_schlick};
@@ -250,15 +250,15 @@ impl Model for Principled {
         self.sheen.is_some()
     }
 
-    fn gpu_parameters(&self) -> [f32; 12] {
-        let mut packed = [0.0; 12];
-        packed[0..4].copy_from_slice(&self.base_colour.as_vec3().extend(self.metallic as f32).to_array());
-        packed[4] = f0(self.ior) as f32;
-        if let Some(Coat { weight, roughness, ior }) = self.coat {
-            packed[5..8].copy_from_slice(&[weight, roughness * roughness, f0(ior)].map(|number| number as f32));
-        }
-        packed[8..10].copy_from_slice(&self.facets().gpu_parameters());
-        packed
+    fn gpu_parameters(&self) -> [Vec4; 3] {
+        let coat = self.coat.map_or(Vec3::ZERO, |Coat { weight, roughness, ior }| {
+            DVec3::new(weight, roughness * roughness, f0(ior)).as_vec3()
+        });
+        [
+            self.base_colour.as_vec3().extend(self.metallic as f32),
+            Vec4::new(f0(self.ior) as f32, coat.x, coat.y, coat.z),
+            self.facets().gpu_parameters(),
+        ]
     }
 
     fn without_rotation(&self) -> Option<(Self, f64)> {

@@ -15,7 +15,7 @@
 //! and where diffuse + specular is more than 1.
 use std::f64::consts::{FRAC_1_PI, PI};
 
-use glam::DVec3;
+use glam::{DVec3, Vec4};
 
 use crate::brdf::{Model, Parameters, Roughness, hash_numbers, warn_of_excess};
 use crate::error::Result;
@@ -81,12 +81,12 @@ impl Model for Ward {
         Ok(Self { diffuse, specular, roughness, normalisation })
     }
 
-    fn gpu_parameters(&self) -> [f32; 12] {
-        let mut packed = [0.0; 12];
-        packed[0..4].copy_from_slice(&self.diffuse.as_vec3().extend(self.normalisation as u8 as f32).to_array());
-        packed[4..7].copy_from_slice(&self.specular.as_vec3().to_array());
-        packed[8..10].copy_from_slice(&self.roughness.gpu_parameters());
-        packed
+    fn gpu_parameters(&self) -> [Vec4; 3] {
+        [
+            self.diffuse.as_vec3().extend(self.normalisation as u8 as f32),
+            self.specular.as_vec3().extend(0.0),
+            self.roughness.gpu_parameters(),
+        ]
     }
 
     fn without_rotation(&self) -> Option<(Self, f64)> {

@@ -87,8 +87,8 @@ fn continued(drafting: &Drafting, observer: &dyn Observer) -> Result<FittedTable
     let blend = |rows_of_columns: &[Vec<Row>], to: usize| {
         let of_column = |column: usize| {
             let row = |at: usize| {
-                let (kernels, albedo, error) = &rows_of_columns[column][at];
-                (carried(kernels, view(index(column, at)), view(to)), *albedo, *error)
+                let row = &rows_of_columns[column][at];
+                Row { kernels: carried(&row.kernels, view(index(column, at)), view(to)), ..*row }
             };
             let (low, high, t) = around(&places, to % rows);
             if t == 1.0 { row(high) } else { between(&row(low), &row(high), t) }
@@ -96,8 +96,10 @@ fn continued(drafting: &Drafting, observer: &dyn Observer) -> Result<FittedTable
         let (low, high, t) = around(&columns, to / rows);
         if t == 1.0 { of_column(high) } else { between(&of_column(low), &of_column(high), t) }
     };
-    let edited = |index: usize| {
-        (edit.applied(&before.unpacked_row(index), view(index).theta_o, None), albedo_of(before, index), 0.0)
+    let edited = |index: usize| Row {
+        kernels: edit.applied(&before.unpacked_row(index), view(index).theta_o, None),
+        albedo: albedo_of(before, index),
+        relative_error: 0.0,
     };
     let edited: Vec<Row> = (0..azimuths * rows).map(edited).collect();
     let edited_where_fitted: Vec<Vec<Row>> = (0..columns.len())
@@ -158,7 +160,7 @@ impl Drafting<'_> {
         observer.check()?;
         let target = self.target(index);
         // Only directions and levels are tied, so weights may be in any unit.
-        let carried = |(from, (kernels, ..)): (usize, &Row)| carried(kernels, self.view(from), self.view(index));
+        let carried = |(from, row): (usize, &Row)| carried(&row.kernels, self.view(from), self.view(index));
         let beside = match neighbours {
             [Some(a), Some(b)] => Some(all_between(&carried(a), &carried(b), 0.5)),
             [a, b] => a.or(b).map(carried),
@@ -177,8 +179,8 @@ impl Drafting<'_> {
         let most = MOST_MOVED + MOST_MOVED_AN_OCTAVE * edit.octaves.abs();
         let is_steady = |kernels: &[Kernel]| most_moved([&start, &start], kernels, *albedo / lights.unit) < most;
         let kernels = fit.part_of_the_way(&start, &free, is_steady);
-        let error = fit.relative_error(&kernels);
-        Ok((scaled(&kernels, lights.unit), *albedo, error))
+        let relative_error = fit.relative_error(&kernels);
+        Ok(Row { kernels: scaled(&kernels, lights.unit), albedo: *albedo, relative_error })
     }
 }
 
@@ -197,19 +199,21 @@ fn around(places: &[usize], at: usize) -> (usize, usize, f64) {
 }
 
 /// The row the part `t` of the way from `a` to `b`, which are both carried to its view.
-fn between((a, albedo_a, error_a): &Row, (b, albedo_b, error_b): &Row, t: f64) -> Row {
-    let kernels = a.iter().zip(b).map(|(a, b)| blended(a, b, t)).collect();
-    (kernels, albedo_a.lerp(*albedo_b, t), error_a + t * (error_b - error_a))
+fn between(a: &Row, b: &Row, t: f64) -> Row {
+    Row {
+        kernels: a.kernels.iter().zip(&b.kernels).map(|(a, b)| blended(a, b, t)).collect(),
+        albedo: a.albedo.lerp(b.albedo, t),
+        relative_error: a.relative_error + t * (b.relative_error - a.relative_error),
+    }
 }
 
-/// The row `blended` with the part [`REST`] of what `before` has besides its own blend, but no kernel sharper than the level `sharpest`.
-fn with_rest((kernels, albedo, error): Row, blended_before: &Row, before: &Row, sharpest: f64) -> Row {
-    let (kernels_blended, albedo_blended, _) = blended_before;
-    let (kernels_before, albedo_before, _) = before;
-    let albedo = albedo * DVec3::ONE.lerp(ratio_or(*albedo_before, *albedo_blended, DVec3::ONE), REST);
+/// The row `blended` with the part [`REST`] of what `before` has besides its own blend, `blended_before`, but no kernel sharper than the level `sharpest`.
+fn with_rest(blended: Row, blended_before: &Row, before: &Row, sharpest: f64) -> Row {
+    let [albedo_before, albedo_blended] = [before.albedo, blended_before.albedo];
+    let albedo = blended.albedo * DVec3::ONE.lerp(ratio_or(albedo_before, albedo_blended, DVec3::ONE), REST);
     let with_rest = |(kernel, (before, blended)): (&Kernel, (&Kernel, &Kernel))| {
         let part_of = |weight: DVec3, albedo: DVec3| ratio_or(weight, albedo, DVec3::ZERO);
-        let part = part_of(before.weight, *albedo_before) - part_of(blended.weight, *albedo_blended);
+        let part = part_of(before.weight, albedo_before) - part_of(blended.weight, albedo_blended);
         Kernel {
             direction: (kernel.direction + REST * (before.direction - blended.direction))
                 .normalize_or(kernel.direction),
@@ -217,8 +221,8 @@ fn with_rest((kernels, albedo, error): Row, blended_before: &Row, before: &Row, 
             weight: (kernel.weight + REST * albedo * part).max(DVec3::ZERO),
         }
     };
-    let kernels = kernels.iter().zip(kernels_before.iter().zip(kernels_blended)).map(with_rest).collect();
-    (kernels, albedo, error)
+    let others = before.kernels.iter().zip(&blended_before.kernels);
+    Row { kernels: blended.kernels.iter().zip(others).map(with_rest).collect(), albedo, ..blended }
 }
 
 /// The kernels of `row` of `table` with weights for this albedo: another colour, or none, has them at once.

@@ -56,18 +56,36 @@ const LEAST_ERROR: f64 = 3e-3;
 /// Kernels narrower than this, in radians, stay where a facet mirrors the view to; wider ones stay where they are.
 const FOLLOWS_BELOW_RAD: f64 = 0.15;
 
-/// A row: its kernels, the albedo and the relative error.
-pub(super) type Row = (Vec<Kernel>, DVec3, f64);
+/// A fitted row.
+#[derive(Clone)]
+pub(super) struct Row {
+    pub kernels: Vec<Kernel>,
+    pub albedo: DVec3,
+    /// What is left of the error, relative to the answers (F23).
+    pub relative_error: f64,
+}
 
 /// What has been fitted next to a row, or to an azimuth of rows, and its number; none for the first one.
 pub(super) type Neighbour<'a, T = Row> = Option<(usize, &'a T)>;
+
+/// What the threads of a row are fitted to.
+struct TargetRow {
+    lights: TestLights,
+    albedo: DVec3,
+}
+
+impl TargetRow {
+    /// The fit of one set of kernels, whose weights are in units of the lights.
+    fn fit(&self) -> Fit<'_> {
+        Fit::new(&self.lights, self.albedo / self.lights.unit)
+    }
+}
 
 /// What threads of a BRDF are fitted to: lights, and what it makes of them, in each row.
 struct Targets {
     /// How many azimuths there are rows of.
     azimuths: usize,
-    /// The lights and the albedo.
-    rows: Vec<(TestLights, DVec3)>,
+    rows: Vec<TargetRow>,
     /// Of the BRDF, seen along the normal.
     lobe: LobeShape,
     /// Of its albedos, of an anisotropic BRDF those seen along its tangent.
@@ -99,27 +117,25 @@ impl Targets {
             _ => (Resolution::OF_AZIMUTHS, Quadrature::OF_AZIMUTHS),
         };
         let slices = |view: View| Slice::with_lobes_of_view(brdf, &lobe, view, resolution);
-        let target = |index: usize| -> Result<(TestLights, DVec3)> {
+        let target = |index: usize| -> Result<TargetRow> {
             observer.check()?;
             let slices = slices(View::of_row(index, rows));
             let lights = match settings.kind {
                 ThreadKind::Gaussian => TestLights::directions(&slices, DIRECTIONS_A_LIGHT * count),
                 _ => TestLights::new(&slices, count, LIGHTS_SEED, quadrature, &answers),
             };
-            Ok((lights, slices[0].albedo()))
+            Ok(TargetRow { lights, albedo: slices[0].albedo() })
         };
         let targets = (0..azimuths * rows).into_par_iter().map(target).collect::<Result<Vec<_>>>()?;
         let albedo = |theta_o: f64| slices(View { theta_o, phi_o: 0.0 })[0].albedo();
-        let albedos: Vec<_> = targets[..rows].iter().map(|(_, albedo)| *albedo).collect();
+        let albedos: Vec<_> = targets[..rows].iter().map(|row| row.albedo).collect();
         let rim_power = rim_power(&albedos, albedo);
         Ok(Self { azimuths, rows: targets, lobe, rim_power, base })
     }
 
     /// Whether the base alone does in all rows.
     fn are_diffuse(&self) -> bool {
-        let error =
-            |(lights, albedo): &(TestLights, DVec3)| Fit::new(lights, *albedo / lights.unit).relative_error(&[]);
-        self.rows.par_iter().all(|row| error(row) < LEAST_ERROR)
+        self.rows.par_iter().all(|row| row.fit().relative_error(&[]) < LEAST_ERROR)
     }
 }
 
@@ -133,9 +149,12 @@ pub fn generate(brdf: &Brdf, settings: &ThreadSettings, observer: &dyn Observer)
     let targets = Targets::new(brdf, settings, observer)?;
     let are_two = settings.sets > 1 && pixels_have_own(&targets.lobe);
     let total = if are_two { 2 * targets.rows.len() } else { targets.rows.len() };
-    let rows = Parts::new(total, observer);
+    let done = Parts::new(total, observer);
     let share = share_of_sets(targets.azimuths, are_two);
-    let fit = |sets| fit_all(brdf, &targets, &ThreadSettings { sets, ..*settings }, share, observer, &rows);
+    let fit = |sets| {
+        RowFit { brdf, targets: &targets, settings: ThreadSettings { sets, ..*settings }, share, observer, done: &done }
+            .of_all()
+    };
     if !are_two {
         return fit(settings.sets);
     }
@@ -143,32 +162,53 @@ pub fn generate(brdf: &Brdf, settings: &ThreadSettings, observer: &dyn Observer)
     Ok(of_pixels?.with_subpixels(of_subpixels?))
 }
 
-/// The fit of all rows, all threads of which are in `settings.sets`, which count as `share` says: [`Fit::in_sets`].
-fn fit_all(
-    brdf: &Brdf,
-    targets: &Targets,
-    settings: &ThreadSettings,
+/// The fit of rows to `targets`, all threads of which are in `settings.sets`, which count as `share` says: [`Fit::in_sets`].
+struct RowFit<'a> {
+    brdf: &'a Brdf,
+    targets: &'a Targets,
+    settings: ThreadSettings,
     share: f32,
-    observer: &dyn Observer,
-    rows_done: &Parts,
-) -> Result<FittedTable> {
-    let rows = settings.rows;
-    // Row `index` of all azimuths, from what its neighbours' kernels are there: those of the view angle before and of the azimuth before.
-    let fit = |index: usize, neighbours: &[(usize, &Row)]| -> Result<Row> {
-        let (lights, albedo) = &targets.rows[index];
+    observer: &'a dyn Observer,
+    /// Counts rows.
+    done: &'a Parts<'a>,
+}
+
+impl RowFit<'_> {
+    /// All rows.
+    fn of_all(&self) -> Result<FittedTable> {
+        let Self { targets, settings: ThreadSettings { rows, sets, .. }, .. } = *self;
+        let column = |azimuth: usize, beside: Neighbour<Vec<Row>>| -> Result<Vec<Row>> {
+            from_the_middle(rows, &|row, before| {
+                let before = before.map(|(before, row)| (azimuth * rows + before, row));
+                let beside = beside.map(|(beside, column)| (beside * rows + row, &column[row]));
+                self.of_row(azimuth * rows + row, &before.into_iter().chain(beside).collect::<Vec<_>>())
+            })
+        };
+        let mut fitted = from_the_middle(targets.azimuths, &column)?.concat();
+        if targets.are_diffuse() {
+            // Where kernels are is kept, for drafts to start from.
+            fitted.iter_mut().for_each(|row| row.kernels = scaled(&row.kernels, 0.0));
+        }
+        Ok(FittedTable::pack(&fitted, targets.azimuths, sets, targets.rim_power, targets.base))
+    }
+
+    /// Row `index` of all azimuths, from what its `neighbours` are there: those of the view angle before and of the azimuth before.
+    fn of_row(&self, index: usize, neighbours: &[(usize, &Row)]) -> Result<Row> {
+        let Self { brdf, targets, settings, observer, .. } = *self;
+        let target = &targets.rows[index];
+        let TargetRow { lights, albedo } = target;
         let in_units = |kernels: &[Kernel]| scaled(kernels, 1.0 / lights.unit);
-        let to = View::of_row(index, rows);
-        // What they were, and what becomes of that here.
-        let neighbours = neighbours.iter().map(|(from, (kernels, ..))| {
-            let before = in_units(kernels);
-            let here = carried(&before, View::of_row(*from, rows), to);
-            (before, here)
-        });
-        let (before, neighbours): (Vec<_>, Vec<_>) = neighbours.unzip();
-        let fit = Fit::new(lights, *albedo / lights.unit)
-            .in_sets(settings.sets, share)
-            .no_sharper_than(sharpest_level(&targets.lobe, settings.count, to.theta_o));
-        let start = match &neighbours[..] {
+        let view = |index: usize| View::of_row(index, settings.rows);
+        let to = view(index);
+        let before: Vec<_> = neighbours.iter().map(|(_, row)| in_units(&row.kernels)).collect();
+        let carry = |((from, _), before): (&(usize, &Row), &Vec<Kernel>)| carried(before, view(*from), to);
+        let here: Vec<_> = neighbours.iter().zip(&before).map(carry).collect();
+        let fit = target.fit().in_sets(settings.sets, self.share).no_sharper_than(sharpest_level(
+            &targets.lobe,
+            settings.count,
+            to.theta_o,
+        ));
+        let start = match &here[..] {
             [] => {
                 let [_, lobes] = Slice::with_lobes_of_view(brdf, &targets.lobe, to, Resolution::FULL);
                 let starts = in_sets(&lobes, settings.count, settings.sets);
@@ -178,11 +218,11 @@ fn fit_all(
             [a, b, ..] => all_between(a, b, 0.5),
         };
         let mut free = start.clone();
-        let (tied, effort) = match neighbours[..] {
+        let (tied, effort) = match here[..] {
             [] => (fit, FIRST),
             _ => (fit.tied(&start, TIED), NEXT),
         };
-        if !neighbours.is_empty() {
+        if !here.is_empty() {
             tied.solve(&mut free, effort, observer)?;
         }
         if settings.kind == ThreadKind::Fitted {
@@ -191,31 +231,18 @@ fn fit_all(
         let is_steady = |kernels: &[Kernel]| match (&before[..], targets.azimuths) {
             ([before], 1) => {
                 let moved = most_moved([before, &start], kernels, *albedo / lights.unit);
-                moved < MOST_MOVED * (90.0 / rows as f64).powi(2)
+                moved < MOST_MOVED * (90.0 / settings.rows as f64).powi(2)
             }
-            _ => neighbours.iter().all(|neighbour| {
+            _ => here.iter().all(|neighbour| {
                 let worse = fit.relative_error(kernels).max(fit.relative_error(neighbour));
                 fit.relative_error(&all_between(neighbour, kernels, 0.5)) < MOST_BETWEEN * worse
             }),
         };
         let kernels = fit.part_of_the_way(&start, &free, is_steady);
-        let error = fit.relative_error(&kernels);
-        rows_done.advance()?;
-        Ok((scaled(&kernels, lights.unit), *albedo, error))
-    };
-    let column = |azimuth: usize, beside: Neighbour<Vec<Row>>| -> Result<Vec<Row>> {
-        from_the_middle(rows, &|row, before| {
-            let before = before.map(|(before, row)| (azimuth * rows + before, row));
-            let beside = beside.map(|(beside, column)| (beside * rows + row, &column[row]));
-            fit(azimuth * rows + row, &before.into_iter().chain(beside).collect::<Vec<_>>())
-        })
-    };
-    let mut fitted = from_the_middle(targets.azimuths, &column)?.concat();
-    if targets.are_diffuse() {
-        // Where kernels are is kept, for drafts to start from.
-        fitted.iter_mut().for_each(|(kernels, ..)| *kernels = scaled(kernels, 0.0));
+        let relative_error = fit.relative_error(&kernels);
+        self.done.advance()?;
+        Ok(Row { kernels: scaled(&kernels, lights.unit), albedo: *albedo, relative_error })
     }
-    Ok(FittedTable::pack(&fitted, targets.azimuths, settings.sets, targets.rim_power, targets.base))
 }
 
 /// f (n . w) of `brdf` for a view.

@@ -8,9 +8,10 @@ use std::f64::consts::PI;
 use glam::DVec3;
 
 use crate::brdf::{LobeShape, MIN_COS_THETA_D};
+use crate::shader_constants::vmf_pyramid;
 
 /// Width of the kernel of level 0 in radians: 0.22 degrees, two texels in the middle of a face of 1024.
-pub const FINEST_WIDTH_RAD: f64 = 1.0 / 256.0;
+pub const FINEST_WIDTH_RAD: f64 = vmf_pyramid::FINEST_WIDTH_RAD as f64;
 
 /// The sharpest level: no blur, for lobes that are mirrors.
 pub const SHARPEST_LEVEL: f64 = -1.0;
@@ -81,8 +82,7 @@ pub fn level_of_variance(variance: f32) -> f32 {
 /// How much of a kernel of `level` is the environment as it is, where a pyramid begins at level `finest`: see `sharp_part` in
 /// glsl/vmf_pyramid.glsl, whose twin it is.
 pub fn sharp_part(level: f32, finest: f32) -> f32 {
-    const AS_SHARP: f32 = 0.625;
-    (1.0 - variance_of_level(level) / (AS_SHARP * variance_of_level(finest))).max(0.0)
+    (1.0 - variance_of_level(level) / (vmf_pyramid::AS_SHARP * variance_of_level(finest))).max(0.0)
 }
 
 /// No kernel is narrower than this part of the lobe's width in half vectors: a Gaussian as wide as the lobe has 2.6 times that. Narrower

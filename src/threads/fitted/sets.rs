@@ -51,7 +51,6 @@ pub fn shared_deviation(lobe: &LobeShape, table: &FittedTable) -> f64 {
 
 /// Up to this deviation of their normals, in radians, sub-pixels are one surface to any lobe that is not narrower in half vectors across the
 /// plane of incidence. Normals are farther apart in the pixels of most meshes, so that of narrower lobes these have a sum for each sub-pixel.
-/// The same in glsl/methods/fitted.glsl.
 pub const NEARLY_FLAT_RAD: f64 = 0.01;
 
 /// Whether pixels that share one sum have threads of their own, not in sets. Not of a narrow lobe, for which there are few such pixels, and whose

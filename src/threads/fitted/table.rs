@@ -4,6 +4,7 @@
 use glam::{DVec3, Vec2, Vec3};
 use half::f16;
 
+use super::generate::Row;
 use super::kernel::{Kernel, SHARPEST_LEVEL, WIDEST_LEVEL, all_between, sharp_part};
 use crate::brdf::BaseProfile;
 use crate::packing::{
@@ -217,25 +218,19 @@ impl FittedTable {
         })
     }
 
-    /// Packs rows of kernels, with the albedo and the relative error of each; as many rows for each of `azimuths`.
-    pub(super) fn pack(
-        rows: &[(Vec<Kernel>, DVec3, f64)],
-        azimuths: usize,
-        sets: usize,
-        rim_power: f32,
-        base: BaseProfile,
-    ) -> Self {
-        let kernels: Vec<_> = rows.iter().flat_map(|(kernels, ..)| kernels.iter().map(PackedKernel::new)).collect();
+    /// Packs `rows`, as many for each of `azimuths`.
+    pub(super) fn pack(rows: &[Row], azimuths: usize, sets: usize, rim_power: f32, base: BaseProfile) -> Self {
+        let kernels: Vec<_> = rows.iter().flat_map(|row| row.kernels.iter().map(PackedKernel::new)).collect();
         Self {
             rows: rows.len() / azimuths,
             azimuths,
-            count: rows.first().map_or(0, |(kernels, ..)| kernels.len()),
+            count: rows.first().map_or(0, |row| row.kernels.len()),
             sets,
             material: String::new(),
             rim_power,
             base,
-            albedo: rows.iter().map(|(_, albedo, _)| albedo.as_vec3().to_array()).collect(),
-            relative_error: rows.iter().map(|&(.., error)| error as f32).collect(),
+            albedo: rows.iter().map(|row| row.albedo.as_vec3().to_array()).collect(),
+            relative_error: rows.iter().map(|row| row.relative_error as f32).collect(),
             kernels,
             of_subpixels: None,
         }
