@@ -4,7 +4,7 @@
 //! shading adds theirs exactly.
 use std::ops::Range;
 
-use glam::{DVec3, Vec3, Vec4};
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::cube::{direction_of, face_of};
@@ -32,13 +32,16 @@ struct Cell {
     centroid: Vec3,
 }
 
-/// Four cells side by side.
+/// Cells that are summed over at once.
+const LANES: usize = 8;
+
+/// So many cells side by side.
 #[derive(Clone, Copy, Default)]
 struct Block {
-    centroid: [Vec4; 3],
-    power: [Vec4; 3],
-    middle: [Vec4; 3],
-    solid_angle: Vec4,
+    centroid: [[f32; LANES]; 3],
+    power: [[f32; LANES]; 3],
+    middle: [[f32; LANES]; 3],
+    solid_angle: [f32; LANES],
 }
 
 impl Block {
@@ -68,15 +71,11 @@ impl LightMoments {
     /// Those of `environment`. The only error is that `observer` cancels it.
     pub fn of(environment: &Environment, observer: &dyn Observer) -> Result<Self> {
         let cells = gather(environment, observer)?;
-        let blocks: Vec<_> = cells.chunks(4).map(Block::of).collect();
+        let blocks: Vec<_> = cells.chunks(LANES).map(Block::of).collect();
         let mut texels = vec![Moments::default(); 6 * FACE_SIZE * FACE_SIZE];
         texels.par_chunks_mut(FACE_SIZE).enumerate().try_for_each(|(row, texels)| {
             observer.check()?;
-            for (column, texel) in texels.iter_mut().enumerate() {
-                let middle = |index: usize| (index as f64 + 0.5) / FACE_SIZE as f64;
-                let normal = direction_of(row / FACE_SIZE, middle(column), middle(row % FACE_SIZE)).as_vec3();
-                *texel = moments(&blocks, normal);
-            }
+            pulp::Arch::new().dispatch(MomentsRow { blocks: &blocks, row, texels });
             Ok::<_, Error>(())
         })?;
         Ok(Self(texels))
@@ -94,35 +93,88 @@ impl LightMoments {
     }
 }
 
+/// A call of what makes a row of texels, counted over all faces, compiled for the vector instructions that are there.
+struct MomentsRow<'a> {
+    blocks: &'a [Block],
+    row: usize,
+    texels: &'a mut [Moments],
+}
+
+impl pulp::NullaryFnOnce for MomentsRow<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Self { blocks, row, texels } = self;
+        for (column, texel) in texels.iter_mut().enumerate() {
+            let middle = |index: usize| (index as f64 + 0.5) / FACE_SIZE as f64;
+            let normal = direction_of(row / FACE_SIZE, middle(column), middle(row % FACE_SIZE)).as_vec3();
+            *texel = moments(blocks, normal);
+        }
+    }
+}
+
 /// What of the light in `blocks` reaches a surface of this normal.
+#[inline(always)]
 fn moments(blocks: &[Block], normal: Vec3) -> Moments {
-    let cosines = |[x, y, z]: [Vec4; 3]| (normal.x * x + normal.y * y + normal.z * z).max(Vec4::ZERO);
-    let mut sums = [[Vec4::ZERO; TERMS]; 4];
-    let [red, green, blue, constant] = &mut sums;
+    // Short loops over lanes, of which compilers make vector instructions.
+    let mut sums = [[[0.0; LANES]; TERMS]; 4];
     for block in blocks {
-        let cosines = cosines(block.centroid);
-        // Half of all blocks are below the horizon.
-        if cosines != Vec4::ZERO {
-            let mut powers = cosines;
-            for term in 0..TERMS {
-                red[term] += powers * block.power[0];
-                green[term] += powers * block.power[1];
-                blue[term] += powers * block.power[2];
-                powers *= cosines;
+        let cosines = cosines(&block.centroid, normal);
+        if is_below_horizon(&cosines) {
+            continue;
+        }
+        let mut powers = cosines;
+        for term in 0..TERMS {
+            for channel in 0..3 {
+                for j in 0..LANES {
+                    sums[channel][term][j] += powers[j] * block.power[channel][j];
+                }
+            }
+            for j in 0..LANES {
+                powers[j] *= cosines[j];
             }
         }
     }
     for block in blocks {
-        let cosines = cosines(block.middle);
-        if cosines != Vec4::ZERO {
-            let mut powers = cosines * block.solid_angle;
-            for term in constant.iter_mut() {
-                *term += powers;
-                powers *= cosines;
+        let cosines = cosines(&block.middle, normal);
+        if is_below_horizon(&cosines) {
+            continue;
+        }
+        let mut powers = [0.0; LANES];
+        for j in 0..LANES {
+            powers[j] = cosines[j] * block.solid_angle[j];
+        }
+        for term in 0..TERMS {
+            for j in 0..LANES {
+                sums[3][term][j] += powers[j];
+            }
+            for j in 0..LANES {
+                powers[j] *= cosines[j];
             }
         }
     }
-    sums.map(|terms| terms.map(Vec4::element_sum))
+    sums.map(|terms| terms.map(|lanes| lanes.iter().sum()))
+}
+
+/// Of these directions to the normal; 0 below the horizon.
+#[inline(always)]
+fn cosines([xs, ys, zs]: &[[f32; LANES]; 3], normal: Vec3) -> [f32; LANES] {
+    let mut cosines = [0.0; LANES];
+    for j in 0..LANES {
+        cosines[j] = (normal.x * xs[j] + normal.y * ys[j] + normal.z * zs[j]).max(0.0);
+    }
+    cosines
+}
+
+/// Whether all of a block is: half of all blocks are.
+#[inline(always)]
+fn is_below_horizon(cosines: &[f32; LANES]) -> bool {
+    let mut is_above = false;
+    for cosine in cosines {
+        is_above |= *cosine > 0.0;
+    }
+    !is_above
 }
 
 /// The light of `environment` in cells.
