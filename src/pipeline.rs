@@ -259,12 +259,12 @@ impl Rendering {
 
     /// Time on the GPU of pass 2 alone, in milliseconds.
     pub fn shade_ms(&self) -> f64 {
-        self.pass_ms("shade")
+        self.pass_ms(SHADE_PASS)
     }
 
     /// Time on the GPU of the pass of this name, in milliseconds; 0 if there is none.
     pub fn pass_ms(&self, name: &str) -> f64 {
-        self.passes.iter().filter(|pass| pass.name == name).map(|pass| pass.gpu_ms).sum()
+        PassTime::ms_of(&self.passes, name)
     }
 }
 

@@ -6,6 +6,7 @@ use std::fmt;
 use super::Row;
 use super::speed::{TimedFrame, Timings};
 use crate::method::Method;
+use crate::passes::SHADE_PASS;
 
 /// Tables under one heading.
 #[derive(Clone, Debug, PartialEq)]
@@ -173,7 +174,8 @@ pub fn frame_tables(timings: &Timings) -> Vec<Section> {
     let section = |of: (&String, String)| {
         let frames: Vec<_> = timings.frames.iter().filter(|frame| place(frame) == of).collect();
         let row = |frame: &&TimedFrame| {
-            let floor = [format!("{:.2}", frame.floor_ms), format!("{:.2}", frame.pass_ms("shade") / frame.floor_ms)];
+            let shade_ms = frame.pass_ms(SHADE_PASS);
+            let floor = [format!("{:.2}", frame.floor_ms), format!("{:.2}", shade_ms / frame.floor_ms)];
             (frame.threads.to_string(), costs(frame).into_iter().chain(floor).collect())
         };
         let head = cost_heads(&frames).into_iter().chain(["floor", "shade/floor"].map(str::to_owned)).collect();

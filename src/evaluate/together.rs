@@ -8,6 +8,7 @@ use super::speed::render;
 use super::tables::{Section, Table};
 use crate::error::Result;
 use crate::memo::{Memo, Round};
+use crate::passes::{CLASSIFY_PASS, SHADE_PASS};
 use crate::pipeline::{DeviceScene, Rendering, median};
 use crate::prepare::prepare;
 use crate::progress::{Observer, OnlyCancels, Parts};
@@ -102,11 +103,11 @@ pub fn run(
         let alone = together.materials.iter().zip(&alone).map(|((material, _), entrant)| TimedAlone {
             material: material.clone(),
             lookups: entrant.first.lookups,
-            classify_ms: entrant.median_ms("classify"),
-            shade_ms: entrant.median_ms("shade"),
+            classify_ms: entrant.median_ms(CLASSIFY_PASS),
+            shade_ms: entrant.median_ms(SHADE_PASS),
         });
         let alone: Vec<_> = alone.collect();
-        let shade_ms = all.median_ms("shade");
+        let shade_ms = all.median_ms(SHADE_PASS);
         found.push(TimedTogether {
             environment: environment.clone(),
             threads: together.threads,
@@ -115,7 +116,7 @@ pub fn run(
             covered_pixels: all.first.counters.covered_pixels(),
             lookups: all.first.lookups,
             device_memory_bytes: all.first.device_memory_bytes,
-            classify_ms: all.median_ms("classify"),
+            classify_ms: all.median_ms(CLASSIFY_PASS),
             shade_ms,
             ratio: shade_ms / mean(&alone, |alone| alone.shade_ms),
             alone,
@@ -193,7 +194,7 @@ pub fn tables(found: &[TimedTogether]) -> Vec<Section> {
             .alone
             .iter()
             .map(|alone| (alone.material.clone(), cells(alone.lookups as f64, alone.classify_ms, alone.shade_ms)));
-        let head = ["lookups a pixel", "classify", "shade"].map(str::to_owned).to_vec();
+        let head = ["lookups a pixel", CLASSIFY_PASS, SHADE_PASS].map(str::to_owned).to_vec();
         let rows = [together, ("mean of each alone".to_owned(), alone)].into_iter().chain(each).collect();
         let TimedTogether { environment, threads, width, height, ratio, device_memory_bytes, .. } = timed;
         let title = format!(
