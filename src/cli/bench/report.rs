@@ -96,8 +96,8 @@ impl BenchReport {
         let highest = of_method.map(|estimator| estimator.count).max().unwrap_or(variant.method.default_count());
         let estimator = Estimator { variant, count: highest };
 
-        let device = self.cases.open_device()?;
-        let memo = self.cases.memo();
+        let device = self.cases.device.open()?;
+        let memo = self.cases.device.memo();
         let progress = TerminalProgress::of("errors", "done")?;
         let mut measured = Measured::default();
         let mut report = Report { facts: facts(&device), ..Report::default() };
