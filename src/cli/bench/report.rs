@@ -135,7 +135,7 @@ impl BenchReport {
 
 /// Rows that `bench error --json` wrote.
 fn read_rows(path: &Path) -> Result<Vec<Row>> {
-    let bytes = std::fs::read(path).map_err(|cause| Error::unreadable(path, cause))?;
+    let bytes = files::read(path)?;
     let remedy = "give a file that `threadlight bench error --json` wrote";
     let rows: Vec<Row> = serde_json::from_slice(&bytes)
         .map_err(|cause| Error::in_file(path, format!("holds no measurements ({cause})"), remedy))?;
