@@ -29,6 +29,13 @@ pub struct Wanted {
     pub geometry: bool,
 }
 
+impl Wanted {
+    /// Linear radiance alone.
+    pub const RADIANCE: Self = Self { radiance: true, display: false, geometry: false };
+    /// Display values alone.
+    pub const DISPLAY: Self = Self { radiance: false, display: true, geometry: false };
+}
+
 /// The frame: pass 1 and pass 2 of the paper and what surrounds them.
 pub(crate) fn declare<'a>(
     graph: &mut FrameGraph<'a>,

@@ -149,7 +149,7 @@ fn truth(
 
 fn picture(prepared: &Prepared, device: &Arc<Device>, round: &Round) -> Result<Comparable> {
     let renderer = DeviceScene::new(device, prepared, round)?;
-    let rendering = renderer.render(Wanted { radiance: true, ..Wanted::default() }, 1)?;
+    let rendering = renderer.render(Wanted::RADIANCE, 1)?;
     Ok(comparable(prepared, &rendering.radiance))
 }
 

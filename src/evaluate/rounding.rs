@@ -123,8 +123,8 @@ pub fn run(
 
 /// RMS and largest difference of display values by each rounding that the method has.
 fn differences(place: &mut Place, device: &Arc<Device>) -> Result<Vec<(Rounding, [f64; 2])>> {
-    let wanted = Wanted { radiance: true, ..Wanted::default() };
-    let of_device: Vec<_> = place.renderer(device)?.render(wanted, 1)?.radiance.into_iter().map(Vec4::from).collect();
+    let rendering = place.renderer(device)?.render(Wanted::RADIANCE, 1)?;
+    let of_device: Vec<_> = rendering.radiance.into_iter().map(Vec4::from).collect();
     let (prepared, round) = (&*place.prepared, place.round());
     let geometry = render_geometry(device, prepared, &round)?;
     let twin = || CpuShader::new(prepared, &round);
@@ -151,8 +151,8 @@ fn differences(place: &mut Place, device: &Arc<Device>) -> Result<Vec<(Rounding,
     Ok(found)
 }
 
-/// The pixels that see a surface, of these texels.
-fn shade(twin: &CpuShader, prepared: &Prepared, geometry: &[[u32; 2]]) -> Vec<Vec4> {
+/// All pixels by the CPU's form of the method, of these texels of the geometry cache.
+pub(super) fn shade(twin: &CpuShader, prepared: &Prepared, geometry: &[[u32; 2]]) -> Vec<Vec4> {
     let (width, height) = (prepared.view.width, prepared.view.height);
     let pixel = |index: u32| {
         let pixel = UVec2::new(index % width, index / width);

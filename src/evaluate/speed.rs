@@ -323,7 +323,7 @@ impl TimedFrame {
 
 /// A frame with what a window shows of it.
 pub(super) fn render(renderer: &DeviceScene) -> Result<Rendering> {
-    renderer.render(Wanted { display: true, ..Wanted::default() }, 1)
+    renderer.render(Wanted::DISPLAY, 1)
 }
 
 /// The frames of `entrants`, each of which has `repeat` turns.

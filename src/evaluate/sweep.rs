@@ -165,10 +165,9 @@ pub fn run(
         for estimator in sweep.cases.estimators() {
             place.choose(estimator)?;
             let renderer = place.renderer(device)?;
-            let wanted = Wanted { radiance: true, ..Wanted::default() };
             // A frame that does not count: drivers compile then.
-            renderer.render(wanted, 1)?;
-            let rendering = renderer.render(wanted, sweep.repeat)?;
+            renderer.render(Wanted::RADIANCE, 1)?;
+            let rendering = renderer.render(Wanted::RADIANCE, sweep.repeat)?;
             let metrics = compare(&comparable(&rendering.radiance), &truth, !sweep.whole_picture)
                 .map_err(|error| error.within(format!("{} on {}", place.material, place.scene)))?;
             // Beyond surfaces there is no error.

@@ -6,12 +6,12 @@ mod cases;
 
 use std::sync::Arc;
 
-use glam::{UVec2, Vec4};
-use rayon::prelude::*;
+use glam::Vec4;
 use serde::Serialize;
 
 use self::cases::Case;
 use super::metrics::Display;
+use super::rounding::shade;
 use super::tables::{Section, Table};
 use crate::environment::{Environment, RepairCounts};
 use crate::error::{Error, Result};
@@ -21,7 +21,7 @@ use crate::passes::check_aliases;
 use crate::pipeline::{DeviceScene, Wanted};
 use crate::prepare::prepare;
 use crate::progress::{Observer, Parts};
-use crate::shading::{CpuShader, texels_of_pixel};
+use crate::shading::CpuShader;
 use crate::vulkan::{Device, DeviceKind};
 
 /// What differences may be: RMS over the covered pixels, each relative to the largest of its radiance, the picture's mean, and a millionth
@@ -152,12 +152,7 @@ fn stress(
     let rendering = DeviceScene::new(device, &prepared, &round)?.render(wanted, 1)?;
     let twin = CpuShader::new(&prepared, &round)?;
     *held = round.held();
-    let width = prepared.view.width;
-    let expected = |pixel: usize| {
-        let pixel = UVec2::new(pixel as u32 % width, pixel as u32 / width);
-        twin.shade(pixel, &texels_of_pixel(&prepared.view, &rendering.geometry, pixel))
-    };
-    let expected: Vec<Vec4> = (0..rendering.radiance.len()).into_par_iter().map(expected).collect();
+    let expected = shade(&twin, &prepared, &rendering.geometry);
     let most = (prepared.view.intensity * prepared.environment.max_radiance()).min(f32::MAX.into());
     let least = 1e-6 * most;
     let display = Display::of(&prepared.view);
