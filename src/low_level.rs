@@ -39,6 +39,8 @@ pub mod scene;
 pub mod shading;
 #[path = "specialise.rs"]
 pub(crate) mod specialise;
+#[path = "statistics.rs"]
+pub(crate) mod statistics;
 #[path = "steps/mod.rs"]
 pub mod steps;
 #[path = "tangent.rs"]

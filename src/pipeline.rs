@@ -9,6 +9,7 @@ use crate::prepare::Prepared;
 use crate::progress::Observer;
 use crate::scene::{ImageSettings, Mesh, Scene};
 use crate::specialise::{ShadersOfMaterials, classify_constants};
+use crate::statistics::median;
 use crate::steps::{
     CheckDevice, CompileCompute, CompileGeometryCache, UploadBackground, UploadIrradiance, UploadLight,
     UploadMaterials, UploadMesh, UploadShaders, light, pipelines,
@@ -214,7 +215,7 @@ impl DeviceScene {
         }
         let pass_median = |index: usize| PassTime {
             name: passes[0][index].name.clone(),
-            gpu_ms: median(passes.iter().map(|frame| frame[index].gpu_ms).collect()),
+            gpu_ms: median(passes.iter().map(|frame| frame[index].gpu_ms)),
         };
         Ok(Rendering {
             radiance: texels(radiance.as_deref()),
@@ -352,13 +353,6 @@ pub fn time_bare_lookups(device: &Arc<Device>, bare: &BareLookups) -> Result<(f6
     let passes = executable.execute_timed(device, &mut frames, &())?;
     let gpu_ms = passes.iter().filter(|pass| !pass.is_readback()).map(|pass| pass.gpu_ms).sum();
     Ok((gpu_ms, texels(Some(&target))))
-}
-
-/// The middle value; of an even number, the mean of the two in the middle.
-pub(crate) fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    let middle = values.len() / 2;
-    if values.len() % 2 == 1 { values[middle] } else { (values[middle - 1] + values[middle]) / 2.0 }
 }
 
 #[cfg(test)]

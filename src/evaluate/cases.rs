@@ -228,6 +228,15 @@ impl Cases {
     }
 }
 
+/// `scene` by `method`, with no more threads than that can have.
+pub(super) fn by_method(scene: &Scene, method: Method) -> Scene {
+    let mut scene = scene.clone();
+    scene.shading.method = method;
+    let most = method.max_count(scene.image.subpixels);
+    scene.shading.threads = scene.shading.threads.map(|count| count.min(most));
+    scene
+}
+
 /// A material in an environment in a scene.
 pub struct Place<'a> {
     /// Name of the material.

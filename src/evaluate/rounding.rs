@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::cases::{Cases, Place};
-use super::tables::{Section, Table, mean};
+use super::tables::{Section, Table};
 use crate::environment::FractionBits;
 use crate::error::Result;
 use crate::memo::{Key, Keyed, Memo};
@@ -18,6 +18,7 @@ use crate::prepare::Prepared;
 use crate::progress::{Observer, Parts};
 use crate::shading::random::pcg4d;
 use crate::shading::{CpuShader, texels_of_pixel};
+use crate::statistics::{largest, mean};
 use crate::threads::Threads;
 use crate::threads::fitted::{FittedTable, PackedKernel};
 use crate::vulkan::Device;
@@ -250,18 +251,18 @@ pub fn tables(found: &[Rounded]) -> Section {
                     == (method, count, environment, &name)
             };
             let rows: Vec<_> = found.iter().filter(is_of).collect();
-            let mean = mean(&rows.iter().map(|row| row.rms).collect::<Vec<_>>());
-            let largest = |of: fn(&Rounded) -> f64| rows.iter().map(|row| of(row)).fold(0.0, f64::max);
-            let worst = largest(|row| row.rms);
+            let rms = || rows.iter().map(|row| row.rms);
+            let worst = largest(rms());
             let of_worst = &rows.iter().find(|row| row.rms == worst)?.material;
-            let cells = [mean, worst, largest(|row| row.most)].map(|value| format!("{value:.1e}"));
-            let cells = cells.into_iter().chain([rows.iter().filter(|row| row.rms > 1e-3).count().to_string()]);
+            let most = largest(rows.iter().map(|row| row.most));
+            let cells = [mean(rms()), worst, most].map(|value| format!("{value:.1e}"));
+            let cells = cells.into_iter().chain([rms().filter(|rms| *rms > 1e-3).count().to_string()]);
             Some((format!("{environment}, {name}"), cells.chain([of_worst.clone()]).collect()))
         };
         let rows =
             environments.iter().flat_map(|environment| Rounding::ALL.iter().filter_map(|it| row(environment, it)));
-        let head = ["mean RMS", "worst", "of a pixel", "above 1e-3", "which"].map(str::to_owned).to_vec();
-        Table { title: format!("{method}, {count}"), head, rows: rows.collect() }
+        let head = ["mean RMS", "worst", "of a pixel", "above 1e-3", "which"];
+        Table::new(format!("{method}, {count}"), head, rows)
     };
     Section {
         title: "What each rounding does to display values:".to_owned(),

@@ -10,8 +10,9 @@ use crate::environment::width_rad_of;
 use crate::error::{Error, Result};
 use crate::memo::{Key, Keyed, Memo};
 use crate::passes::{BareLookup, BareLookups, PlacedMesh, SHADE_PASS};
-use crate::pipeline::{DeviceScene, Rendering, Wanted, median, time_bare_lookups};
+use crate::pipeline::{DeviceScene, Rendering, Wanted, time_bare_lookups};
 use crate::progress::{Observer, Parts};
+use crate::statistics::median;
 use crate::steps::{BoxFilter, CheckDevice, pipelines};
 use crate::threads::fitted::kernel::FINEST_WIDTH_RAD;
 use crate::threads::fitted::{FittedTable, PackedKernel};
@@ -273,7 +274,7 @@ impl Entrant {
     /// The medians of all turns.
     fn finish(self) -> TimedFrame {
         let Self { mut frame, renderings, floor_ms, .. } = self;
-        let median_of = |value: &dyn Fn(&Rendering) -> f64| median(renderings.iter().map(value).collect());
+        let median_of = |value: &dyn Fn(&Rendering) -> f64| median(renderings.iter().map(value));
         let passes = renderings.first().map(|rendering| rendering.passes.as_slice()).unwrap_or_default();
         let pass = |(index, pass): (usize, &PassTime)| PassTime {
             name: pass.name.clone(),

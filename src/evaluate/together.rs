@@ -9,10 +9,11 @@ use super::tables::{Section, Table};
 use crate::error::Result;
 use crate::memo::{Memo, Round};
 use crate::passes::{CLASSIFY_PASS, SHADE_PASS};
-use crate::pipeline::{DeviceScene, Rendering, median};
+use crate::pipeline::{DeviceScene, Rendering};
 use crate::prepare::prepare;
 use crate::progress::{Observer, OnlyCancels, Parts};
 use crate::scene::{EnvironmentSource, MaterialSettings, MaterialSource, ObjectSettings, Scene, Source};
+use crate::statistics::{mean, median};
 use crate::vulkan::Device;
 
 /// What to measure, and how often.
@@ -118,7 +119,7 @@ pub fn run(
             device_memory_bytes: all.first.device_memory_bytes,
             classify_ms: all.median_ms(CLASSIFY_PASS),
             shade_ms,
-            ratio: shade_ms / mean(&alone, |alone| alone.shade_ms),
+            ratio: shade_ms / mean(alone.iter().map(|alone| alone.shade_ms)),
             alone,
         });
     }
@@ -171,12 +172,8 @@ impl Entrant {
     }
 
     fn median_ms(&self, pass: &str) -> f64 {
-        median(self.renderings.iter().map(|rendering| rendering.pass_ms(pass)).collect())
+        median(self.renderings.iter().map(|rendering| rendering.pass_ms(pass)))
     }
-}
-
-fn mean(alone: &[TimedAlone], value: impl Fn(&TimedAlone) -> f64) -> f64 {
-    alone.iter().map(value).sum::<f64>() / alone.len() as f64
 }
 
 /// For each environment all materials together, then the mean over each alone, and each.
@@ -186,7 +183,7 @@ pub fn tables(found: &[TimedTogether]) -> Vec<Section> {
             let a_pixel = lookups / timed.covered_pixels as f64;
             vec![format!("{a_pixel:.1}"), format!("{classify_ms:.2}"), format!("{shade_ms:.2}")]
         };
-        let mean = |value: fn(&TimedAlone) -> f64| mean(&timed.alone, value);
+        let mean = |value: fn(&TimedAlone) -> f64| mean(timed.alone.iter().map(value));
         let together = ("together".to_owned(), cells(timed.lookups as f64, timed.classify_ms, timed.shade_ms));
         let alone =
             cells(mean(|alone| alone.lookups as f64), mean(|alone| alone.classify_ms), mean(|alone| alone.shade_ms));
@@ -194,8 +191,7 @@ pub fn tables(found: &[TimedTogether]) -> Vec<Section> {
             .alone
             .iter()
             .map(|alone| (alone.material.clone(), cells(alone.lookups as f64, alone.classify_ms, alone.shade_ms)));
-        let head = ["lookups a pixel", CLASSIFY_PASS, SHADE_PASS].map(str::to_owned).to_vec();
-        let rows = [together, ("mean of each alone".to_owned(), alone)].into_iter().chain(each).collect();
+        let rows = [together, ("mean of each alone".to_owned(), alone)].into_iter().chain(each);
         let TimedTogether { environment, threads, width, height, ratio, device_memory_bytes, .. } = timed;
         let title = format!(
             "{} materials, {environment}, {width} x {height} pixels, {threads} threads: together {ratio:.2} times as long as alone, {:.0} MB on \
@@ -203,7 +199,8 @@ pub fn tables(found: &[TimedTogether]) -> Vec<Section> {
             timed.alone.len(),
             *device_memory_bytes as f64 * 1e-6
         );
-        Section { title, tables: vec![Table { title: "materials".to_owned(), head, rows }] }
+        let table = Table::new("materials", ["lookups a pixel", CLASSIFY_PASS, SHADE_PASS], rows);
+        Section { title, tables: vec![table] }
     };
     found.iter().map(section).collect()
 }

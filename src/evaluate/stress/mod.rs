@@ -10,6 +10,7 @@ use glam::Vec4;
 use serde::Serialize;
 
 use self::cases::Case;
+use super::cases::by_method;
 use super::metrics::Display;
 use super::rounding::shade;
 use super::tables::{Section, Table};
@@ -135,12 +136,8 @@ fn stress(
     bright: bool,
     held: &mut Held,
 ) -> Result<Option<Stressed>> {
-    let mut scene = case.scene.clone();
-    scene.shading.method = method;
-    let most = method.max_count(scene.image.subpixels);
-    scene.shading.threads = scene.shading.threads.map(|count| count.min(most));
     let round = memo.round(&());
-    let mut prepared = prepare(&scene, &round)?;
+    let mut prepared = prepare(&by_method(&case.scene, method), &round)?;
     let light = case.light.as_ref().map_or_else(|| (*prepared.environment).clone(), |light| light());
     let light = if bright { brightened(&light) } else { Some(light) };
     let Some(light) = light else { return Ok(None) };
@@ -212,11 +209,11 @@ pub fn tables(found: &[Stressed]) -> Section {
             let differences = [case.rms, case.most].map(|difference| format!("{difference:.1e}"));
             (case.case.clone(), [&counts[..], &differences, &[verdict.to_owned()]].concat())
         };
-        let head = ["pixels", "not finite", "wrongly shown", "RMS", "most", ""].map(str::to_owned).to_vec();
+        let head = ["pixels", "not finite", "wrongly shown", "RMS", "most", ""];
         let is_of = |case: &&Stressed| (case.method, case.bright) == (method, bright);
         let rows: Vec<_> = found.iter().filter(is_of).map(row).collect();
         let title = if bright { format!("{method}, bright") } else { method.to_owned() };
-        (!rows.is_empty()).then_some(Table { title, head, rows })
+        (!rows.is_empty()).then(|| Table::new(title, head, rows))
     };
     let title = format!(
         "Device and CPU, relative to radiance; {MOST_RMS:.0e} RMS is allowed, {MOST_RMS_DRAWN:.0e} where samples are drawn, {MOST_RMS_ON_GPUS:.0e} on GPUs:"
