@@ -9,6 +9,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::cases::{Cases, Place};
+use super::metrics::Display;
 use super::tables::{Section, Table};
 use crate::environment::FractionBits;
 use crate::error::Result;
@@ -146,7 +147,7 @@ fn differences(place: &mut Place, device: &Arc<Device>) -> Result<Vec<(Rounding,
     let mut found = Vec::new();
     for rounding in Rounding::ALL {
         if let Some(picture) = by(rounding)? {
-            found.push((rounding, difference(place, &exact, &picture)));
+            found.push((rounding, difference(place.display(), &exact, &picture)));
         }
     }
     Ok(found)
@@ -162,11 +163,11 @@ pub(super) fn shade(twin: &CpuShader, prepared: &Prepared, geometry: &[[u32; 2]]
     (0..width * height).into_par_iter().map(pixel).collect()
 }
 
-fn difference(place: &Place, exact: &[Vec4], found: &[Vec4]) -> [f64; 2] {
+fn difference(display: Display, exact: &[Vec4], found: &[Vec4]) -> [f64; 2] {
     let (mut squares, mut most, mut count) = (0.0, 0.0_f64, 0);
     for (exact, found) in exact.iter().zip(found).filter(|(exact, _)| exact.w > 0.0) {
         for channel in 0..3 {
-            let [exact, found] = [exact[channel], found[channel]].map(|value| place.display.value(value.into()));
+            let [exact, found] = [exact[channel], found[channel]].map(|value| display.value(value.into()));
             squares += (found - exact).powi(2);
             most = most.max((found - exact).abs());
             count += 1;

@@ -150,7 +150,7 @@ pub fn run(
     }
     let rows = Parts::new(sweep.row_count(), observer);
     sweep.cases.for_each_place(memo, observer, &mut |place| {
-        let (width, height, display) = (place.prepared.view.width, place.prepared.view.height, place.display);
+        let (width, height, display) = (place.prepared.view.width, place.prepared.view.height, place.display());
         let comparable =
             |radiance: &[[f32; 4]]| Comparable::from_radiance(width as usize, height as usize, radiance, true, display);
         let truth = reference(place.prepared, &place.round())?;
