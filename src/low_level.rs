@@ -41,6 +41,8 @@ pub(crate) mod shader_constants;
 pub mod shading;
 #[path = "specialise.rs"]
 pub(crate) mod specialise;
+#[path = "statistics.rs"]
+pub(crate) mod statistics;
 #[path = "steps/mod.rs"]
 pub mod steps;
 #[path = "tangent.rs"]

@@ -9,6 +9,7 @@ use crate::prepare::Prepared;
 use crate::progress::Observer;
 use crate::scene::{ImageSettings, Mesh, Scene};
 use crate::specialise::{ShadersOfMaterials, classify_constants};
+use crate::statistics::median;
 use crate::steps::{
     CheckDevice, CompileCompute, CompileGeometryCache, UploadBackground, UploadIrradiance, UploadLight,
     UploadMaterials, UploadMesh, UploadShaders, light, pipelines,
@@ -27,6 +28,13 @@ pub struct Wanted {
     pub display: bool,
     /// The geometry cache, for the shader's CPU twin.
     pub geometry: bool,
+}
+
+impl Wanted {
+    /// Linear radiance alone.
+    pub const RADIANCE: Self = Self { radiance: true, display: false, geometry: false };
+    /// Display values alone.
+    pub const DISPLAY: Self = Self { radiance: false, display: true, geometry: false };
 }
 
 /// The frame: pass 1 and pass 2 of the paper and what surrounds them.
@@ -207,7 +215,7 @@ impl DeviceScene {
         }
         let pass_median = |index: usize| PassTime {
             name: passes[0][index].name.clone(),
-            gpu_ms: median(passes.iter().map(|frame| frame[index].gpu_ms).collect()),
+            gpu_ms: median(passes.iter().map(|frame| frame[index].gpu_ms)),
         };
         Ok(Rendering {
             radiance: texels(radiance.as_deref()),
@@ -259,12 +267,12 @@ impl Rendering {
 
     /// Time on the GPU of pass 2 alone, in milliseconds.
     pub fn shade_ms(&self) -> f64 {
-        self.pass_ms("shade")
+        self.pass_ms(SHADE_PASS)
     }
 
     /// Time on the GPU of the pass of this name, in milliseconds; 0 if there is none.
     pub fn pass_ms(&self, name: &str) -> f64 {
-        self.passes.iter().filter(|pass| pass.name == name).map(|pass| pass.gpu_ms).sum()
+        PassTime::ms_of(&self.passes, name)
     }
 }
 
@@ -345,13 +353,6 @@ pub fn time_bare_lookups(device: &Arc<Device>, bare: &BareLookups) -> Result<(f6
     let passes = executable.execute_timed(device, &mut frames, &())?;
     let gpu_ms = passes.iter().filter(|pass| !pass.is_readback()).map(|pass| pass.gpu_ms).sum();
     Ok((gpu_ms, texels(Some(&target))))
-}
-
-/// The middle value; of an even number, the mean of the two in the middle.
-pub(crate) fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    let middle = values.len() / 2;
-    if values.len() % 2 == 1 { values[middle] } else { (values[middle - 1] + values[middle]) / 2.0 }
 }
 
 #[cfg(test)]

@@ -340,6 +340,11 @@ pub fn view_of(scene: &Scene, (centre, radius): (DVec3, f64)) -> Result<View> {
 }
 
 impl Prepared {
+    /// The same without the environment behind the objects, as pictures are compared.
+    pub fn objects_alone(&self) -> Self {
+        Self { show_environment: false, ..self.clone() }
+    }
+
     /// Centre and radius of a sphere around each object, in world space.
     pub fn spheres(&self) -> Vec<(DVec3, f64)> {
         world_spheres(&self.meshes, &self.objects)

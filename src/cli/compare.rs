@@ -39,10 +39,10 @@ pub struct Compare {
     #[arg(long)]
     json: bool,
     /// Factor on radiance before display.
-    #[arg(long, value_name = "X", default_value_t = 1.0, value_parser = number(f64::MIN_POSITIVE..=*EXPOSURE.end(), "a number above 0, at most 3.4e38"))]
+    #[arg(long, value_name = "X", default_value_t = Display::default().exposure, value_parser = number(f64::MIN_POSITIVE..=*EXPOSURE.end(), "a number above 0, at most 3.4e38"))]
     exposure: f64,
     /// Display values are radiance to the power of 1/X.
-    #[arg(long, value_name = "X", default_value_t = 2.2, value_parser = number(GAMMA, "a finite number above 0: 1.2e-38 to 3.4e38"))]
+    #[arg(long, value_name = "X", default_value_t = Display::default().gamma, value_parser = number(GAMMA, "a finite number above 0: 1.2e-38 to 3.4e38"))]
     gamma: f64,
     /// Picture to write of where they differ.
     #[arg(long, value_name = "FILE.png")]

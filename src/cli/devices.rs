@@ -1,6 +1,6 @@
 //! `threadlight devices`: the Vulkan devices of this machine, and whether they can be trusted.
 use std::sync::Arc;
-use threadlight::low_level::memo::{Memo, default_folder};
+use threadlight::low_level::memo::Memo;
 use threadlight::low_level::passes::WayAround;
 use threadlight::low_level::steps::CheckDevice;
 use threadlight::low_level::vulkan::{Device, DeviceDescription, Instance, describe_devices};
@@ -15,7 +15,7 @@ pub struct Devices {}
 impl Devices {
     pub fn run(self) -> anyhow::Result<()> {
         let instance = Instance::new(false).map_err(Error::from)?;
-        let memo = Memo::new(default_folder().as_deref());
+        let memo = super::memo(false);
         for device in describe_devices(&instance).map_err(Error::from)? {
             let verdict = match way_around(&instance, &device, &memo) {
                 _ if !device.lacks.is_empty() => format!("; cannot be used, lacks {}", device.lacks.join(" and ")),

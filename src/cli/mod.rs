@@ -20,6 +20,7 @@ use clap::{Parser, Subcommand};
 use std::io::{self, ErrorKind, IsTerminal, Write};
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
+use threadlight::low_level::memo::{Memo, default_folder};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -141,7 +142,12 @@ pub fn start_logging(verbose: u8) {
 
 /// The folder that threads, blurred environments and pipelines are cached in; none with `--no-cache`.
 fn cache_folder(no_cache: bool) -> Option<PathBuf> {
-    (!no_cache).then(threadlight::low_level::memo::default_folder).flatten()
+    (!no_cache).then(default_folder).flatten()
+}
+
+/// What commands ask for what takes long to make; with `--no-cache` it knows nothing of earlier runs, and leaves nothing to later ones.
+fn memo(no_cache: bool) -> Memo {
+    Memo::new(cache_folder(no_cache).as_deref())
 }
 
 /// Parses a number in `range`; the error is that it must be `what`.

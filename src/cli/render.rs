@@ -74,7 +74,7 @@ impl Render {
         let scene = self.checked_scene()?;
         let (device, messages) = self.machine.open()?;
         check_picture(&device, &scene)?;
-        let memo = Memo::new(self.machine.cache().as_deref());
+        let memo = self.machine.device.memo();
         // Closing what was made and the device is part of what validation checks.
         let rendered = self.render(&scene, format, &device, &memo)?;
         drop(device);

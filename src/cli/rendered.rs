@@ -6,6 +6,7 @@ use threadlight::low_level::memo::{Asked, Origin};
 use threadlight::low_level::passes::WayAround;
 use threadlight::low_level::pipeline::Rendering;
 use threadlight::low_level::prepare::Prepared;
+use threadlight::low_level::vulkan::PassTime;
 
 /// All that a rendering leaves.
 pub struct Rendered {
@@ -56,7 +57,7 @@ pub struct Stats<'a> {
     edge_pixels: u32,
     /// Lookups in the environment that shading made.
     lookups: u64,
-    passes: Vec<Pass<'a>>,
+    passes: &'a [PassTime],
     frame_ms: f64,
     #[serde(flatten)]
     thread_stats: Option<ThreadStats>,
@@ -88,12 +89,6 @@ pub struct ReferenceStats {
     reference_cache: &'static str,
 }
 
-#[derive(serde::Serialize)]
-struct Pass<'a> {
-    name: &'a str,
-    gpu_ms: f64,
-}
-
 impl<'a> Stats<'a> {
     pub fn new(rendered: &'a Rendered, validation_messages: usize) -> Self {
         let Rendered { prepared, rendering, reference, expected_rms, threads, device } = rendered;
@@ -111,7 +106,7 @@ impl<'a> Stats<'a> {
             interior_pixels: counters.interior_pixels,
             edge_pixels: counters.edge_pixels,
             lookups: rendering.lookups,
-            passes: rendering.passes.iter().map(|pass| Pass { name: &pass.name, gpu_ms: pass.gpu_ms }).collect(),
+            passes: &rendering.passes,
             frame_ms: rendering.frame_ms,
             thread_stats: reference.is_none().then(|| ThreadStats::new(threads)),
             device_memory_bytes: rendering.device_memory_bytes,

@@ -1,11 +1,12 @@
 //! The flags that say what is rendered, and on what: `render` and `view` have them in common.
-use super::{cache_folder, nameable, number};
+use super::{memo, nameable, number};
 use clap::builder::{PossibleValue, PossibleValuesParser, RangedI64ValueParser, TypedValueParser};
 use clap::value_parser;
 use std::path::PathBuf;
 use std::sync::Arc;
 use threadlight::Error;
 use threadlight::low_level::environment;
+use threadlight::low_level::memo::Memo;
 use threadlight::low_level::method::Method;
 use threadlight::low_level::scene::{
     Background, EXPOSURE, GAMMA, MAX_SAMPLES, MAX_SIZE_PX, MAX_SUBPIXELS, MaterialSource, Pattern, Scene, Source, mesh,
@@ -54,30 +55,44 @@ pub struct SceneFlags {
     pub seed: Option<u64>,
 }
 
-/// On what it is rendered.
+/// On what it is rendered, and what is kept on disk for the next time.
 #[derive(clap::Args)]
-pub struct MachineFlags {
+pub struct DeviceFlags {
     /// Vulkan device: its index or part of its name, as `threadlight devices` lists them.
     #[arg(long, value_name = "NAME|INDEX")]
     pub device: Option<String>,
-    /// Turn on Vulkan's validation layer, with synchronisation validation; any message is a failure.
-    #[arg(long)]
-    pub validate: bool,
     /// Neither read nor write cached threads, blurred environments and pipelines.
     #[arg(long)]
     pub no_cache: bool,
 }
 
-impl MachineFlags {
-    /// The folder for what takes long to make, if there is to be one.
-    pub fn cache(&self) -> Option<PathBuf> {
-        cache_folder(self.no_cache)
+impl DeviceFlags {
+    /// The device, not validated: that would take time that is measured.
+    pub fn open(&self) -> threadlight::Result<Arc<Device>> {
+        Ok(Device::new(&Instance::new(false)?, self.device.as_deref())?)
     }
 
+    /// What keeps, and finds again, what takes long to make.
+    pub fn memo(&self) -> Memo {
+        memo(self.no_cache)
+    }
+}
+
+/// The same, with validation on request.
+#[derive(clap::Args)]
+pub struct MachineFlags {
+    #[command(flatten)]
+    pub device: DeviceFlags,
+    /// Turn on Vulkan's validation layer, with synchronisation validation; any message is a failure.
+    #[arg(long)]
+    pub validate: bool,
+}
+
+impl MachineFlags {
     /// The device, and what the validation layer says.
     pub fn open(&self) -> threadlight::Result<(Arc<Device>, Messages)> {
         let instance = Instance::new(self.validate)?;
-        Ok((Device::new(&instance, self.device.as_deref())?, instance.messages()))
+        Ok((Device::new(&instance, self.device.device.as_deref())?, instance.messages()))
     }
 }
 

@@ -1,11 +1,11 @@
 //! `threadlight threads`: makes, writes and draws the sample threads of a material.
 use super::progress::TerminalProgress;
 use super::scene_flags::subpixels;
-use super::{cache_folder, nameable, say, stem};
+use super::{memo, nameable, say, stem};
 use std::path::{Path, PathBuf};
 use threadlight::Error;
 use threadlight::low_level::files;
-use threadlight::low_level::memo::{Asked, Memo, Origin, Step};
+use threadlight::low_level::memo::{Asked, Origin, Step};
 use threadlight::low_level::method::Method;
 use threadlight::low_level::picture;
 use threadlight::low_level::prepare::threads_of;
@@ -78,7 +78,7 @@ impl Threads {
             _ => self.material.clone(),
         };
         let progress = TerminalProgress::new("threads")?;
-        let memo = Memo::new(cache_folder(self.no_cache).as_deref());
+        let memo = memo(self.no_cache);
         let round = memo.round(&progress);
         let settings = ThreadSettings { kind, count, seed: self.seed, ..Default::default() };
         let threads = threads_of(&source, settings, self.subpixels, &round)?;

@@ -1,6 +1,6 @@
 //! `threadlight view`: a window to look at a scene and change it.
 use super::scene_flags::{MachineFlags, SceneFlags};
-use super::{json, none_of, signals};
+use super::{cache_folder, json, none_of, signals};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::value_parser;
 use std::path::PathBuf;
@@ -80,8 +80,8 @@ impl ViewArguments {
         };
         let settings = ViewerSettings {
             scene,
-            cache: self.machine.cache(),
-            device: self.machine.device,
+            cache: cache_folder(self.machine.device.no_cache),
+            device: self.machine.device.device,
             validate: self.machine.validate,
             present_mode: self.present_mode,
             frames: self.frames,

@@ -174,8 +174,7 @@ impl Cases {
         }
         let mut scenes = Vec::new();
         for (name, scene) in &self.scenes {
-            let display = Display { exposure: scene.image.exposure, gamma: scene.image.gamma };
-            scenes.push((name, self.prepare_scene(scene, &round)?, display));
+            scenes.push((name, self.prepare_scene(scene, &round)?));
         }
         self.check_materials(memo)?;
         for (number, (material_name, source)) in self.own_materials() {
@@ -183,7 +182,7 @@ impl Cases {
             let brdf = of_material.ask(&LoadMaterial(source))?;
             let mut material = vec![PreparedMaterial::new(material_name.clone(), brdf, &of_material)?];
             let mut tables = Vec::new();
-            for (scene, prepared, display) in &mut scenes {
+            for (scene, prepared) in &mut scenes {
                 // The scene borrows the material and the environment while they are looked at together.
                 std::mem::swap(&mut prepared.materials, &mut material);
                 prepared.place_tangents(&round)?;
@@ -195,7 +194,6 @@ impl Cases {
                         material: material_name,
                         environment: environment_name,
                         scene,
-                        display: *display,
                         prepared,
                         memo,
                         cases: self,
@@ -228,6 +226,15 @@ impl Cases {
     }
 }
 
+/// `scene` by `method`, with no more threads than that can have.
+pub(super) fn by_method(scene: &Scene, method: Method) -> Scene {
+    let mut scene = scene.clone();
+    scene.shading.method = method;
+    let most = method.max_count(scene.image.subpixels);
+    scene.shading.threads = scene.shading.threads.map(|count| count.min(most));
+    scene
+}
+
 /// A material in an environment in a scene.
 pub struct Place<'a> {
     /// Name of the material.
@@ -236,8 +243,6 @@ pub struct Place<'a> {
     pub environment: &'a str,
     /// Name of the scene.
     pub scene: &'a str,
-    /// How the scene is displayed.
-    pub display: Display,
     /// All that is to be rendered; method and threads are those that [`Place::choose`] was last called with. Whoever
     /// changes anything else changes it back.
     pub prepared: &'a mut Prepared,
@@ -267,6 +272,11 @@ impl Place<'_> {
         self.prepared.method = method;
         self.prepared.sampling = sampling;
         Ok(())
+    }
+
+    /// How the scene is displayed.
+    pub fn display(&self) -> Display {
+        Display::of_image(&self.prepared.scene.image)
     }
 
     /// Asks for something of this place.

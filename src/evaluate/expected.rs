@@ -34,8 +34,7 @@ impl TrueSample {
         let view = &prepared.view;
         let geometry = render_geometry(device, prepared, round)?;
         let observer = round.observer();
-        let brdfs = prepared.materials.iter().map(|material| &*material.brdf);
-        let integrator = Integrator::new(&prepared.environment, view.intensity, brdfs, view.subpixels);
+        let integrator = Integrator::of(prepared);
         let place = |pixel: usize| [pixel % view.width as usize, pixel / view.width as usize];
         let is_covered = |pixel: &usize| {
             let [x, y] = place(*pixel);
@@ -91,14 +90,14 @@ pub fn prepare_within(scene: &Scene, most: f64, device: &Arc<Device>, round: &Ro
         scene.shading.threads = Some(count);
         let prepared = prepare(&scene, round)?;
         // Only surfaces are looked at.
-        let alone = Prepared { show_environment: false, ..prepared.clone() };
+        let alone = prepared.objects_alone();
         let renderer = DeviceScene::new(device, &alone, round)?;
         let sample = match &sample {
             Some(sample) => sample,
             // What it is off by itself is not to decide.
             None => sample.insert(TrueSample::new(&alone, device, TOLERANCE.min(0.25 * most), round)?),
         };
-        let rendering = renderer.render(Wanted { radiance: true, ..Wanted::default() }, 1)?;
+        let rendering = renderer.render(Wanted::RADIANCE, 1)?;
         let rms = sample.expected_rms(&rendering.radiance);
         tracing::info!("{count} threads or samples: expected RMS {rms:.2e}");
         if rms <= most {

@@ -1,13 +1,13 @@
 //! What threads cost to make, beside what they are worth: `threadlight bench fit`.
 use std::time::Instant;
 
-use super::tables::{Section, Table, mean};
+use super::tables::{Section, Table};
 use crate::error::Result;
 use crate::memo::Memo;
-use crate::pipeline::median;
 use crate::prepare::in_own_axes;
 use crate::progress::{Observer, OnlyCancels, Parts};
 use crate::scene::{ImageSettings, MaterialSource};
+use crate::statistics::{largest, mean, median};
 use crate::steps::{FindLobe, LoadMaterial};
 use crate::threads::fitted::{generate, validation_error};
 use crate::threads::{ThreadKind, ThreadSettings};
@@ -92,17 +92,11 @@ pub fn tables(found: &[TimedFit]) -> Section {
                 cells(value(|fit| fit.fit_ms), value(|fit| fit.fitted_error), value(|fit| fit.validation_error));
             (name.to_owned(), cells)
         };
-        let worst = |values: Vec<f64>| values.into_iter().fold(0.0, f64::max);
         let mut rows: Vec<_> = fits.iter().map(row).collect();
         if fits.len() > 1 {
-            rows.extend([
-                over_all("median", median),
-                over_all("mean", |values| mean(&values)),
-                over_all("worst", worst),
-            ]);
+            rows.extend([over_all("median", median), over_all("mean", mean), over_all("worst", largest)]);
         }
-        let head = ["ms", "its lights", "others"].map(str::to_owned).to_vec();
-        Table { title: format!("{count} threads"), head, rows }
+        Table::new(format!("{count} threads"), ["ms", "its lights", "others"], rows)
     };
     let tables = counts.into_iter().map(of_count).collect();
     Section { title: "Time to fit, and error relative to the radiance:".into(), tables }

@@ -37,7 +37,7 @@ pub fn material_sheets(
         place.prepared.show_environment = true;
         let renderer = place.renderer(device);
         place.prepared.show_environment = false;
-        let rendering = renderer?.render(Wanted { display: true, ..Wanted::default() }, 1)?;
+        let rendering = renderer?.render(Wanted::DISPLAY, 1)?;
         let rgba = rendering.display.as_chunks::<4>().0;
         let width = place.prepared.view.width;
         let picture = RgbImage::from_fn(width, place.prepared.view.height, |x, y| {

@@ -9,10 +9,11 @@ use super::{Comparable, Display, compare};
 use crate::error::{Error, Result};
 use crate::memo::{Memo, Round, Step};
 use crate::method::Method;
-use crate::pipeline::{DeviceScene, Wanted, median};
+use crate::pipeline::{DeviceScene, Wanted};
 use crate::prepare::{Prepared, prepare, prepare_draft};
 use crate::progress::{Observer, OnlyCancels, Parts};
 use crate::scene::{Background, Scene};
+use crate::statistics::{largest, mean, median};
 use crate::steps::FitThreads;
 use crate::vulkan::Device;
 
@@ -149,7 +150,7 @@ fn truth(
 
 fn picture(prepared: &Prepared, device: &Arc<Device>, round: &Round) -> Result<Comparable> {
     let renderer = DeviceScene::new(device, prepared, round)?;
-    let rendering = renderer.render(Wanted { radiance: true, ..Wanted::default() }, 1)?;
+    let rendering = renderer.render(Wanted::RADIANCE, 1)?;
     Ok(comparable(prepared, &rendering.radiance))
 }
 
@@ -160,46 +161,35 @@ fn comparable(prepared: &Prepared, radiance: &[[f32; 4]]) -> Comparable {
 
 fn largest_change(before: &Comparable, after: &Comparable) -> f64 {
     let values = before.display.as_flattened().iter().zip(after.display.as_flattened());
-    values.map(|(before, after)| f64::from((after - before).abs())).fold(0.0, f64::max)
+    largest(values.map(|(before, after)| f64::from((after - before).abs())))
 }
 
 /// One row of medians and worst cases.
 pub fn table(drag: &Drag, found: &[LiveStep]) -> Section {
-    let of = |part: fn(&LiveStep) -> f64| found.iter().map(part).collect::<Vec<_>>();
-    let worst = |values: Vec<f64>| values.into_iter().fold(0.0, f64::max);
-    let mean = |values: Vec<f64>| values.iter().sum::<f64>() / values.len() as f64;
+    let of = |part: fn(&LiveStep) -> f64| found.iter().map(part);
     let ratio = |step: &LiveStep| step.draft_rms / step.finished_rms.max(f64::MIN_POSITIVE);
     let row = |name: &str, cells: [String; 2]| (name.to_owned(), cells.to_vec());
-    let ms = |part: fn(&LiveStep) -> f64| [format!("{:.1}", median(of(part))), format!("{:.1}", worst(of(part)))];
-    let error = |part: fn(&LiveStep) -> f64| [format!("{:.5}", mean(of(part))), format!("{:.5}", worst(of(part)))];
-    let change = [of(|step| step.draft_change), of(|step| step.reference_change)].map(worst);
-    let table = |title: &str, head: [&str; 2], rows| Table {
-        title: title.to_owned(),
-        head: head.map(str::to_owned).to_vec(),
-        rows,
-    };
+    let ms = |part: fn(&LiveStep) -> f64| [format!("{:.1}", median(of(part))), format!("{:.1}", largest(of(part)))];
+    let error = |part: fn(&LiveStep) -> f64| [format!("{:.5}", mean(of(part))), format!("{:.5}", largest(of(part)))];
+    let change = [of(|step| step.draft_change), of(|step| step.reference_change)].map(largest);
     Section {
         title: format!("{} of {}, {} steps there and back:", drag.key, drag.material, drag.values.len()),
         tables: vec![
-            table(
+            Table::new(
                 "time, ms",
                 ["median", "worst"],
-                vec![row("draft", ms(|step| step.draft_ms)), row("fit", ms(|step| step.fit_ms))],
+                [row("draft", ms(|step| step.draft_ms)), row("fit", ms(|step| step.fit_ms))],
             ),
-            table(
+            Table::new(
                 "RMS",
                 ["mean", "worst"],
-                vec![
+                [
                     row("drafts", error(|step| step.draft_rms)),
                     row("finished", error(|step| step.finished_rms)),
-                    row(
-                        "ratio",
-                        [mean(found.iter().map(ratio).collect()), worst(found.iter().map(ratio).collect())]
-                            .map(|value| format!("{value:.2}")),
-                    ),
+                    row("ratio", [mean(of(ratio)), largest(of(ratio))].map(|value| format!("{value:.2}"))),
                 ],
             ),
-            table("change", ["drafts", "reference"], vec![row("largest", change.map(|value| format!("{value:.4}")))]),
+            Table::new("change", ["drafts", "reference"], [row("largest", change.map(|value| format!("{value:.4}")))]),
         ],
     }
 }

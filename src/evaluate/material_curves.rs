@@ -3,6 +3,7 @@ use std::f64::consts::FRAC_PI_2;
 
 use glam::{DMat3, DVec3, dvec3};
 
+use super::metrics::Display;
 use crate::brdf::{Brdf, luminance};
 
 /// Angles of the light whose lobes are drawn, in degrees, and their colours (Okabe and Ito 2008).
@@ -57,7 +58,7 @@ impl<'a> Side<'a> {
                 [index % CELLS, index / CELLS].map(|cell| (cell as f64 + 0.5) / CELLS as f64 * FRAC_PI_2);
             let along = theta_d.cos() * theta_h.sin();
             let [w_i, w_o] = [1.0, -1.0].map(|sign| dvec3(along, sign * theta_d.sin(), theta_d.cos() * theta_h.cos()));
-            self.evaluate(w_i, w_o).to_array().map(|f| (255.0 * f.clamp(0.0, 1.0).powf(1.0 / 2.2)).round() as u8)
+            self.evaluate(w_i, w_o).to_array().map(|f| (255.0 * Display::default().value(f)).round() as u8)
         };
         (0..CELLS * CELLS).map(cell).collect()
     }

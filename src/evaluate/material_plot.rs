@@ -8,12 +8,11 @@ use plotters::prelude::*;
 use rayon::prelude::*;
 
 use super::material_curves::{CELLS, CHANNELS, LIGHTS, Side, albedo_angles_deg, in_plane};
+use super::plots::{GRID, TEXT};
 use crate::brdf::Brdf;
 use crate::error::{Error, Result};
 
 const SIDE_PX: u32 = 420;
-const TEXT: RGBColor = RGBColor(40, 42, 48);
-const GRID: RGBColor = RGBColor(222, 223, 226);
 
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 type Drawn = std::result::Result<(), Box<dyn Cause>>;
@@ -54,15 +53,22 @@ fn draw(area: &Area, sides: &[Side], name: &str) -> Drawn {
     Ok(area.present()?)
 }
 
+/// A chart in `area`, with as much room in pixels for labels below and at the left.
+fn panel<'a, 'b>(
+    area: &'a Area<'b>,
+    caption: &str,
+    [below, left]: [u32; 2],
+) -> ChartBuilder<'a, 'static, SVGBackend<'b>> {
+    let mut chart = ChartBuilder::on(area);
+    let font = ("sans-serif", 15).into_font().color(&TEXT);
+    chart.caption(caption, font).margin(8).x_label_area_size(below).y_label_area_size(left);
+    chart
+}
+
 fn lobes(area: &Area, side: &Side, caption: &str) -> Drawn {
     let drawn = LIGHTS.map(|(theta_i, rgb)| (theta_i, colour(rgb), side.lobe(theta_i)));
     let reach = drawn.iter().flat_map(|(_, _, points)| points).fold(1e-3, |reach: f64, [x, z]| reach.max(x.hypot(*z)));
-    let mut chart = ChartBuilder::on(area)
-        .caption(caption, ("sans-serif", 15).into_font().color(&TEXT))
-        .margin(8)
-        .x_label_area_size(22)
-        .y_label_area_size(34)
-        .build_cartesian_2d(-reach..reach, 0.0..1.7 * reach)?;
+    let mut chart = panel(area, caption, [22, 34]).build_cartesian_2d(-reach..reach, 0.0..1.7 * reach)?;
     chart.configure_mesh().light_line_style(WHITE).bold_line_style(GRID).x_labels(5).y_labels(5).draw()?;
     for (theta_i, colour, points) in drawn {
         let line =
@@ -77,12 +83,7 @@ fn lobes(area: &Area, side: &Side, caption: &str) -> Drawn {
 }
 
 fn image(area: &Area, side: &Side, caption: &str) -> Drawn {
-    let mut chart = ChartBuilder::on(area)
-        .caption(caption, ("sans-serif", 15).into_font().color(&TEXT))
-        .margin(8)
-        .x_label_area_size(32)
-        .y_label_area_size(38)
-        .build_cartesian_2d(0..CELLS, 0..CELLS)?;
+    let mut chart = panel(area, caption, [32, 38]).build_cartesian_2d(0..CELLS, 0..CELLS)?;
     chart.configure_mesh().disable_mesh().x_desc("theta_h, degrees").y_desc("theta_d, degrees").draw()?;
     let cell = |(index, rgb): (usize, [u8; 3])| {
         let (h, d) = (index % CELLS, index / CELLS);
@@ -96,12 +97,7 @@ fn albedo(area: &Area, side: &Side, caption: &str) -> Drawn {
     let angles: Vec<f64> = albedo_angles_deg().collect();
     let albedos: Vec<DVec3> = angles.par_iter().map(|&angle| side.albedo(angle)).collect();
     let most = albedos.iter().fold(1.0, |most: f64, albedo| most.max(albedo.max_element()));
-    let mut chart = ChartBuilder::on(area)
-        .caption(caption, ("sans-serif", 15).into_font().color(&TEXT))
-        .margin(8)
-        .x_label_area_size(22)
-        .y_label_area_size(34)
-        .build_cartesian_2d(0.0..90.0, 0.0..1.02 * most)?;
+    let mut chart = panel(area, caption, [22, 34]).build_cartesian_2d(0.0..90.0, 0.0..1.02 * most)?;
     chart.configure_mesh().light_line_style(WHITE).bold_line_style(GRID).x_labels(10).y_labels(6).draw()?;
     for (channel, (name, rgb)) in CHANNELS.into_iter().enumerate() {
         let colour = colour(rgb);

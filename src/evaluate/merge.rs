@@ -7,9 +7,6 @@ use super::cases::Shard;
 use super::sweep::Settings;
 use crate::error::{Error, Result};
 
-/// Which part a row is of, and how many combinations of materials and environments all parts have, if that is known.
-type Part = (Shard, Option<usize>);
-
 /// All rows of `files`, in their order, as those of a whole sweep.
 ///
 /// # Errors
@@ -17,18 +14,16 @@ type Part = (Shard, Option<usize>);
 /// that was interrupted.
 pub fn merged<'a>(files: impl IntoIterator<Item = (&'a Path, Vec<Row>)>) -> Result<Vec<Row>> {
     // The first file of each scene with its settings, and the file of each row.
-    let mut scenes: HashMap<String, (&Path, Option<Settings>)> = HashMap::new();
+    let mut scenes: HashMap<String, (&Path, Settings)> = HashMap::new();
     let mut known: HashMap<([String; 4], u32), &Path> = HashMap::new();
-    // The rows of each method and count on each scene, and of so many parts.
-    let mut parts: BTreeMap<(String, u32, String, usize), Vec<Part>> = BTreeMap::new();
+    // Of which part each row of a method and count on a scene is, where so many parts have so many combinations of materials and environments.
+    let mut parts: BTreeMap<(String, u32, String, usize, usize), Vec<Shard>> = BTreeMap::new();
     let mut all = Vec::new();
     for (path, rows) in files {
         for row in rows {
             let (first, settings) = scenes.entry(row.scene.clone()).or_insert_with(|| (path, row.settings.clone()));
             if *settings != row.settings {
-                let text =
-                    |settings: &Option<Settings>| settings.as_ref().map_or("unknown".to_owned(), Settings::to_string);
-                let [here, there] = [&row.settings, &*settings].map(text);
+                let (here, there) = (&row.settings, &*settings);
                 let problem = format!("was measured with other settings ({here}) than {} ({there})", first.display());
                 return Err(Error::in_file(path, problem, "give files of one sweep"));
             }
@@ -39,21 +34,17 @@ pub fn merged<'a>(files: impl IntoIterator<Item = (&'a Path, Vec<Row>)>) -> Resu
                 let problem = format!("has {what}, as {} has", other.display());
                 return Err(Error::in_file(path, problem, "give each part of a sweep once"));
             }
-            if let Some(shard) = row.shard {
-                parts
-                    .entry((method.clone(), *threads, scene.clone(), shard.count))
-                    .or_default()
-                    .push((shard, row.combinations));
+            if let Some((shard, combinations)) = row.shard.zip(row.combinations) {
+                let of = (method.clone(), *threads, scene.clone(), shard.count, combinations);
+                parts.entry(of).or_default().push(shard);
             }
             all.push(Row { shard: None, combinations: None, ..row });
         }
     }
-    for ((method, threads, scene, count), there) in parts {
-        let combinations = there.iter().filter_map(|(_, combinations)| *combinations).max();
+    for ((method, threads, scene, count, combinations), there) in parts {
         for shard in Shard::all(count) {
-            let rows = there.iter().filter(|(part, _)| *part == shard).count();
-            // Each part has some combination.
-            let wanted = combinations.map_or(1, |combinations| shard.of(combinations).len());
+            let rows = there.iter().filter(|part| **part == shard).count();
+            let wanted = shard.of(combinations).len();
             if rows < wanted {
                 let extent = if rows == 0 { String::new() } else { format!("{} of the {wanted} of ", wanted - rows) };
                 let problem = format!("lack {extent}{shard} of {method} with {threads} on {scene}");
@@ -73,6 +64,7 @@ mod tests {
         let text = format!(
             r#"{{"method": "paper", "threads": 4, "material": "{material}", "environment": "e", "scene": "s", "rms": 0.1,
             "rms_linear": 0.1, "ssim": 0.9, "flip": 0.1, "max": 0.3, "nan": 0, "gpu_ms": 1, "frame_ms": 1, "lookups": 1,
+            "covered_pixels": 1, "shade_ms": 1,
             "settings": {{"width": {width}, "height": 60, "subpixels": 2, "seed": 0, "repeat": 3, "whole_picture": false}}}}"#
         );
         serde_json::from_str(&text).unwrap()
@@ -80,7 +72,10 @@ mod tests {
 
     #[test]
     fn a_part_that_is_missing_is_named() {
-        let part = |material: &str, shard: &str| Row { shard: Some(shard.parse().unwrap()), ..row(material, 80) };
+        let part = |material: &str, shard: &str| {
+            let shard: Shard = shard.parse().unwrap();
+            Row { shard: Some(shard), combinations: Some(shard.count), ..row(material, 80) }
+        };
         let merge = |rows: Vec<Row>| merged([(Path::new("a.json"), rows)]);
         let all = [part("gold", "1/3"), part("clay", "2/3"), part("satin", "3/3")];
         assert!(merge(all.to_vec()).unwrap().iter().all(|row| row.shard.is_none()));
@@ -115,7 +110,6 @@ mod tests {
         assert_eq!(materials, ["gold", "clay"]);
         for (second, names) in [
             (row("clay", 40), ["b.json", "40x60", "a.json", "80x60"]),
-            (Row { settings: None, ..row("clay", 80) }, ["b.json", "unknown", "a.json", "80x60"]),
             (row("gold", 80), ["b.json", "paper with 4 of gold in e on s", "a.json", "once"]),
         ] {
             let error = merge(second).unwrap_err().to_string();

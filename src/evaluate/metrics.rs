@@ -5,6 +5,7 @@ use super::ssim::{RADIUS, WINDOW, ssim_map};
 use crate::error::{Error, Result};
 use crate::passes::View;
 use crate::picture::{Format, PictureFile};
+use crate::scene::ImageSettings;
 
 /// How radiance L is displayed: clamp(exposure L, 0, 1)^(1/gamma).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -16,6 +17,11 @@ pub struct Display {
 }
 
 impl Display {
+    /// How a picture of these settings shows it.
+    pub fn of_image(image: &ImageSettings) -> Self {
+        Self { exposure: image.exposure, gamma: image.gamma }
+    }
+
     /// How `view` shows it.
     pub fn of(view: &View) -> Self {
         Self { exposure: f64::from(view.exposure), gamma: f64::from(view.gamma) }
@@ -28,9 +34,9 @@ impl Display {
 }
 
 impl Default for Display {
-    /// Exposure 1, gamma 2.2.
+    /// That of a scene that says nothing of it.
     fn default() -> Self {
-        Self { exposure: 1.0, gamma: 2.2 }
+        Self::of_image(&ImageSettings::default())
     }
 }
 

@@ -10,15 +10,16 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::Row;
 use super::speed::{Growth, TimedFrame, Timings};
-use super::tables::{by_count, in_order, mean};
+use super::tables::{by_count, in_order};
 use crate::error::{Error, Result};
 use crate::files::{file_in, write_whole};
+use crate::statistics::mean;
 
 const SIZE_PX: (u32, u32) = (960, 600);
 /// At the right, for names: the longest is about "environment, floor".
 const LEGEND_PX: u32 = 190;
-const TEXT: RGBColor = RGBColor(40, 42, 48);
-const GRID: RGBColor = RGBColor(222, 223, 226);
+pub(super) const TEXT: RGBColor = RGBColor(40, 42, 48);
+pub(super) const GRID: RGBColor = RGBColor(222, 223, 226);
 /// Distinguishable with any kind of colour vision (Okabe and Ito 2008), with grey for their yellow, which is too pale for lines.
 const COLOURS: [RGBColor; 8] = [
     RGBColor(213, 94, 0),
@@ -154,7 +155,7 @@ pub fn expectation_chart(rows: &[Row]) -> Option<Chart> {
 fn error_curves(rows: &[&Row], x: fn(&Row) -> f64) -> Vec<Curve> {
     let curve = |(style, method): (usize, &String)| {
         let (x, errors) = (by_count(rows, method, x), by_count(rows, method, |row| row.rms));
-        let points = x.values().zip(errors.values()).map(|(x, rms)| (mean(x), mean(rms))).collect();
+        let points = x.into_values().zip(errors.into_values()).map(|(x, rms)| (mean(x), mean(rms))).collect();
         Curve { name: method.clone(), points, style, drawn: Drawn::Line }
     };
     in_order(rows.iter().map(|row| &row.method)).into_iter().enumerate().map(curve).collect()
@@ -169,7 +170,7 @@ pub fn speed_charts(timings: &Timings) -> Vec<Chart> {
         let points = |value: fn(&TimedFrame) -> f64| {
             let point = |count: f64| {
                 let here = frames.iter().filter(|frame| f64::from(frame.threads) == count);
-                (count, mean(&here.map(|frame| value(frame)).collect::<Vec<_>>()))
+                (count, mean(here.map(|frame| value(frame))))
             };
             counts(frames.iter().map(|frame| frame.threads)).into_iter().map(point).collect()
         };
@@ -232,7 +233,7 @@ fn mean_growth(growths: &[&Growth]) -> Vec<(f64, f64)> {
             times.push(growth.frame.gpu_ms / first.frame.gpu_ms);
         }
     }
-    steps.iter().map(|(quantities, times)| (mean(quantities), mean(times))).collect()
+    steps.into_iter().map(|(quantities, times)| (mean(quantities), mean(times))).collect()
 }
 
 /// Each number once, in rising order.

@@ -9,7 +9,8 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::cases::{Cases, Place};
-use super::tables::{Section, Table, mean};
+use super::metrics::Display;
+use super::tables::{Section, Table};
 use crate::environment::FractionBits;
 use crate::error::Result;
 use crate::memo::{Key, Keyed, Memo};
@@ -18,6 +19,7 @@ use crate::prepare::Prepared;
 use crate::progress::{Observer, Parts};
 use crate::shading::random::pcg4d;
 use crate::shading::{CpuShader, texels_of_pixel};
+use crate::statistics::{largest, mean};
 use crate::threads::Threads;
 use crate::threads::fitted::{FittedTable, PackedKernel};
 use crate::vulkan::Device;
@@ -123,8 +125,8 @@ pub fn run(
 
 /// RMS and largest difference of display values by each rounding that the method has.
 fn differences(place: &mut Place, device: &Arc<Device>) -> Result<Vec<(Rounding, [f64; 2])>> {
-    let wanted = Wanted { radiance: true, ..Wanted::default() };
-    let of_device: Vec<_> = place.renderer(device)?.render(wanted, 1)?.radiance.into_iter().map(Vec4::from).collect();
+    let rendering = place.renderer(device)?.render(Wanted::RADIANCE, 1)?;
+    let of_device: Vec<_> = rendering.radiance.into_iter().map(Vec4::from).collect();
     let (prepared, round) = (&*place.prepared, place.round());
     let geometry = render_geometry(device, prepared, &round)?;
     let twin = || CpuShader::new(prepared, &round);
@@ -145,14 +147,14 @@ fn differences(place: &mut Place, device: &Arc<Device>) -> Result<Vec<(Rounding,
     let mut found = Vec::new();
     for rounding in Rounding::ALL {
         if let Some(picture) = by(rounding)? {
-            found.push((rounding, difference(place, &exact, &picture)));
+            found.push((rounding, difference(place.display(), &exact, &picture)));
         }
     }
     Ok(found)
 }
 
-/// The pixels that see a surface, of these texels.
-fn shade(twin: &CpuShader, prepared: &Prepared, geometry: &[[u32; 2]]) -> Vec<Vec4> {
+/// All pixels by the CPU's form of the method, of these texels of the geometry cache.
+pub(super) fn shade(twin: &CpuShader, prepared: &Prepared, geometry: &[[u32; 2]]) -> Vec<Vec4> {
     let (width, height) = (prepared.view.width, prepared.view.height);
     let pixel = |index: u32| {
         let pixel = UVec2::new(index % width, index / width);
@@ -161,11 +163,11 @@ fn shade(twin: &CpuShader, prepared: &Prepared, geometry: &[[u32; 2]]) -> Vec<Ve
     (0..width * height).into_par_iter().map(pixel).collect()
 }
 
-fn difference(place: &Place, exact: &[Vec4], found: &[Vec4]) -> [f64; 2] {
+fn difference(display: Display, exact: &[Vec4], found: &[Vec4]) -> [f64; 2] {
     let (mut squares, mut most, mut count) = (0.0, 0.0_f64, 0);
     for (exact, found) in exact.iter().zip(found).filter(|(exact, _)| exact.w > 0.0) {
         for channel in 0..3 {
-            let [exact, found] = [exact[channel], found[channel]].map(|value| place.display.value(value.into()));
+            let [exact, found] = [exact[channel], found[channel]].map(|value| display.value(value.into()));
             squares += (found - exact).powi(2);
             most = most.max((found - exact).abs());
             count += 1;
@@ -250,18 +252,18 @@ pub fn tables(found: &[Rounded]) -> Section {
                     == (method, count, environment, &name)
             };
             let rows: Vec<_> = found.iter().filter(is_of).collect();
-            let mean = mean(&rows.iter().map(|row| row.rms).collect::<Vec<_>>());
-            let largest = |of: fn(&Rounded) -> f64| rows.iter().map(|row| of(row)).fold(0.0, f64::max);
-            let worst = largest(|row| row.rms);
+            let rms = || rows.iter().map(|row| row.rms);
+            let worst = largest(rms());
             let of_worst = &rows.iter().find(|row| row.rms == worst)?.material;
-            let cells = [mean, worst, largest(|row| row.most)].map(|value| format!("{value:.1e}"));
-            let cells = cells.into_iter().chain([rows.iter().filter(|row| row.rms > 1e-3).count().to_string()]);
+            let most = largest(rows.iter().map(|row| row.most));
+            let cells = [mean(rms()), worst, most].map(|value| format!("{value:.1e}"));
+            let cells = cells.into_iter().chain([rms().filter(|rms| *rms > 1e-3).count().to_string()]);
             Some((format!("{environment}, {name}"), cells.chain([of_worst.clone()]).collect()))
         };
         let rows =
             environments.iter().flat_map(|environment| Rounding::ALL.iter().filter_map(|it| row(environment, it)));
-        let head = ["mean RMS", "worst", "of a pixel", "above 1e-3", "which"].map(str::to_owned).to_vec();
-        Table { title: format!("{method}, {count}"), head, rows: rows.collect() }
+        let head = ["mean RMS", "worst", "of a pixel", "above 1e-3", "which"];
+        Table::new(format!("{method}, {count}"), head, rows)
     };
     Section {
         title: "What each rounding does to display values:".to_owned(),

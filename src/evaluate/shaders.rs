@@ -4,6 +4,7 @@
 //! it is measured: the driver needs no GPU, and nothing runs.
 use serde::Serialize;
 
+use super::cases::by_method;
 use super::tables::{Section, Table, in_order};
 use crate::error::Result;
 use crate::memo::{Memo, Round};
@@ -75,12 +76,8 @@ pub fn run(
     };
     add(compute(&compiled::BARE_LOOKUPS, "any", Vec::new())?)?;
     for (index, &method) in methods.iter().enumerate() {
-        let mut scene = scene.clone();
-        scene.shading.method = method;
-        let most = method.max_count(scene.image.subpixels);
-        scene.shading.threads = scene.shading.threads.map(|count| count.min(most));
         let round = memo.round(observer);
-        let prepared = prepare(&scene, &round)?;
+        let prepared = prepare(&by_method(scene, method), &round)?;
         let shader = method.shader()?;
         let shaders = shaders_of(&prepared, &round)?;
         // Those that say how much is in a scene; the rest stay as in GLSL, where nothing is left out.
@@ -154,11 +151,10 @@ pub fn table(device: &str, costs: &[ShaderCost]) -> Section {
         }
         (cost.shader.to_owned(), cells)
     };
-    let mut head = vec!["for".to_owned(), "wave".to_owned()];
-    head.extend(columns.iter().map(|(head, _)| head.clone()));
-    head.extend(floor.map(|_| "/ bare".to_owned()));
+    let of_columns = columns.iter().map(|(head, _)| head.as_str());
+    let head = ["for", "wave"].into_iter().chain(of_columns).chain(floor.map(|_| "/ bare"));
     Section {
         title: format!("What the compiler of {device} says of shaders (nothing ran):"),
-        tables: vec![Table { title: "shader".to_owned(), head, rows: costs.iter().map(row).collect() }],
+        tables: vec![Table::new("shader", head, costs.iter().map(row))],
     }
 }

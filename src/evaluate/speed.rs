@@ -9,9 +9,10 @@ use super::cases::{Cases, Estimator, Place};
 use crate::environment::width_rad_of;
 use crate::error::{Error, Result};
 use crate::memo::{Key, Keyed, Memo};
-use crate::passes::{BareLookup, BareLookups, PlacedMesh};
-use crate::pipeline::{DeviceScene, Rendering, Wanted, median, time_bare_lookups};
+use crate::passes::{BareLookup, BareLookups, PlacedMesh, SHADE_PASS};
+use crate::pipeline::{DeviceScene, Rendering, Wanted, time_bare_lookups};
 use crate::progress::{Observer, Parts};
+use crate::statistics::median;
 use crate::steps::{BoxFilter, CheckDevice, pipelines};
 use crate::threads::fitted::kernel::FINEST_WIDTH_RAD;
 use crate::threads::fitted::{FittedTable, PackedKernel};
@@ -55,7 +56,7 @@ pub struct TimedFrame {
     /// Pixels that see a surface.
     pub covered_pixels: u64,
     /// Time on the GPU of each pass that makes the picture, in milliseconds.
-    pub passes: Vec<Pass>,
+    pub passes: Vec<PassTime>,
     /// The sum of these.
     pub gpu_ms: f64,
     /// From the start of recording until the GPU is done and has copied the picture back, in milliseconds.
@@ -64,15 +65,6 @@ pub struct TimedFrame {
     pub floor_ms: f64,
     /// Time of the shade pass for each lookup, in nanoseconds.
     pub ns_per_lookup: f64,
-}
-
-/// Time of a pass.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Pass {
-    /// Its name.
-    pub name: String,
-    /// Milliseconds on the GPU.
-    pub gpu_ms: f64,
 }
 
 /// A frame of a series in which one quantity grows.
@@ -282,9 +274,9 @@ impl Entrant {
     /// The medians of all turns.
     fn finish(self) -> TimedFrame {
         let Self { mut frame, renderings, floor_ms, .. } = self;
-        let median_of = |value: &dyn Fn(&Rendering) -> f64| median(renderings.iter().map(value).collect());
+        let median_of = |value: &dyn Fn(&Rendering) -> f64| median(renderings.iter().map(value));
         let passes = renderings.first().map(|rendering| rendering.passes.as_slice()).unwrap_or_default();
-        let pass = |(index, pass): (usize, &PassTime)| Pass {
+        let pass = |(index, pass): (usize, &PassTime)| PassTime {
             name: pass.name.clone(),
             gpu_ms: median_of(&|rendering| rendering.passes[index].gpu_ms),
         };
@@ -292,7 +284,7 @@ impl Entrant {
         frame.gpu_ms = frame.passes.iter().map(|pass| pass.gpu_ms).sum();
         frame.frame_ms = median_of(&|rendering| rendering.frame_ms);
         frame.floor_ms = median(floor_ms);
-        frame.ns_per_lookup = 1e6 * frame.pass_ms("shade") / frame.lookups as f64;
+        frame.ns_per_lookup = 1e6 * frame.pass_ms(SHADE_PASS) / frame.lookups as f64;
         frame
     }
 }
@@ -326,13 +318,13 @@ fn lookups_all_around(count: u32, face_size: usize) -> Vec<BareLookup> {
 impl TimedFrame {
     /// Time of the pass of that name, in milliseconds; 0 if there is none.
     pub fn pass_ms(&self, name: &str) -> f64 {
-        self.passes.iter().filter(|pass| pass.name == name).map(|pass| pass.gpu_ms).sum()
+        PassTime::ms_of(&self.passes, name)
     }
 }
 
 /// A frame with what a window shows of it.
 pub(super) fn render(renderer: &DeviceScene) -> Result<Rendering> {
-    renderer.render(Wanted { display: true, ..Wanted::default() }, 1)
+    renderer.render(Wanted::DISPLAY, 1)
 }
 
 /// The frames of `entrants`, each of which has `repeat` turns.

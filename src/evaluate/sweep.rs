@@ -68,20 +68,16 @@ pub struct Row {
     pub frame_ms: f64,
     /// Lookups in the environment that shading made.
     pub lookups: u64,
-    /// Pixels that see a surface; 0 in measurements that were written before this was counted.
-    #[serde(default)]
+    /// Pixels that see a surface.
     pub covered_pixels: u64,
-    /// What of `gpu_ms` is shading: the rest hardly depends on the method. 0 in measurements that were written before this was kept.
-    #[serde(default)]
+    /// What of `gpu_ms` is shading: the rest hardly depends on the method.
     pub shade_ms: f64,
-    /// How it was measured; none in measurements that were written before this was kept.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub settings: Option<Settings>,
+    /// How it was measured.
+    pub settings: Settings,
     /// Which part of a sweep it is of; none of a whole one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shard: Option<Shard>,
-    /// How many combinations of materials and environments the whole sweep has; none where `shard` is none, or in measurements that were
-    /// written before this was kept.
+    /// How many combinations of materials and environments the whole sweep has; none where `shard` is none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub combinations: Option<usize>,
     /// What `rms` was expected to be, where that was asked for: see [`TrueSample::expected_rms`].
@@ -115,9 +111,9 @@ impl fmt::Display for Settings {
 }
 
 impl Row {
-    /// Lookups in the environment for each pixel that sees a surface; NaN if these were not counted.
+    /// Lookups in the environment for each pixel that sees a surface.
     pub fn lookups_a_pixel(&self) -> f64 {
-        if self.covered_pixels > 0 { self.lookups as f64 / self.covered_pixels as f64 } else { f64::NAN }
+        self.lookups as f64 / self.covered_pixels as f64
     }
 }
 
@@ -154,7 +150,7 @@ pub fn run(
     }
     let rows = Parts::new(sweep.row_count(), observer);
     sweep.cases.for_each_place(memo, observer, &mut |place| {
-        let (width, height, display) = (place.prepared.view.width, place.prepared.view.height, place.display);
+        let (width, height, display) = (place.prepared.view.width, place.prepared.view.height, place.display());
         let comparable =
             |radiance: &[[f32; 4]]| Comparable::from_radiance(width as usize, height as usize, radiance, true, display);
         let truth = reference(place.prepared, &place.round())?;
@@ -169,20 +165,19 @@ pub fn run(
         for estimator in sweep.cases.estimators() {
             place.choose(estimator)?;
             let renderer = place.renderer(device)?;
-            let wanted = Wanted { radiance: true, ..Wanted::default() };
             // A frame that does not count: drivers compile then.
-            renderer.render(wanted, 1)?;
-            let rendering = renderer.render(wanted, sweep.repeat)?;
+            renderer.render(Wanted::RADIANCE, 1)?;
+            let rendering = renderer.render(Wanted::RADIANCE, sweep.repeat)?;
             let metrics = compare(&comparable(&rendering.radiance), &truth, !sweep.whole_picture)
                 .map_err(|error| error.within(format!("{} on {}", place.material, place.scene)))?;
             // Beyond surfaces there is no error.
             let part = |sample: &TrueSample| if sweep.whole_picture { sample.covered_part() } else { 1.0 };
             let expected_rms =
                 sample.as_ref().map(|sample| part(sample).sqrt() * sample.expected_rms(&rendering.radiance));
-            let settings = Some(sweep.settings(place.prepared));
             let shard = Some(sweep.cases.shard).filter(|shard| *shard != Shard::WHOLE);
             let combinations = shard.map(|_| sweep.cases.combination_count());
-            measured.rows.push(Row { settings, shard, combinations, expected_rms, ..row(place, &metrics, &rendering) });
+            let row = row(place, sweep.settings(place.prepared), &metrics, &rendering);
+            measured.rows.push(Row { shard, combinations, expected_rms, ..row });
             if sweep.keep_pictures {
                 measured.pictures.push(over_grey(&rendering.radiance, width, height, display));
             }
@@ -205,7 +200,7 @@ impl Sweep {
     }
 }
 
-fn row(place: &Place, metrics: &Metrics, rendering: &Rendering) -> Row {
+fn row(place: &Place, settings: Settings, metrics: &Metrics, rendering: &Rendering) -> Row {
     let &Metrics { rms, rms_linear, max, ssim, flip, nan, .. } = metrics;
     Row {
         method: place.prepared.variant().name(),
@@ -224,7 +219,7 @@ fn row(place: &Place, metrics: &Metrics, rendering: &Rendering) -> Row {
         lookups: rendering.lookups,
         covered_pixels: rendering.counters.covered_pixels(),
         shade_ms: rendering.shade_ms(),
-        settings: None,
+        settings,
         shard: None,
         combinations: None,
         expected_rms: None,

@@ -6,6 +6,8 @@ use std::fmt;
 use super::Row;
 use super::speed::{TimedFrame, Timings};
 use crate::method::Method;
+use crate::passes::SHADE_PASS;
+use crate::statistics::{largest, mean};
 
 /// Tables under one heading.
 #[derive(Clone, Debug, PartialEq)]
@@ -49,6 +51,18 @@ impl fmt::Display for Table {
         };
         line(&self.title, &self.head)?;
         self.rows.iter().try_for_each(|(label, cells)| line(label, cells))
+    }
+}
+
+impl Table {
+    /// A table of this title, with these heads above the columns.
+    pub fn new(
+        title: impl Into<String>,
+        head: impl IntoIterator<Item: Into<String>>,
+        rows: impl IntoIterator<Item = (String, Vec<String>)>,
+    ) -> Self {
+        let head = head.into_iter().map(Into::into).collect();
+        Self { title: title.into(), head, rows: rows.into_iter().collect() }
     }
 }
 
@@ -98,21 +112,19 @@ pub fn error_tables(rows: &[Row]) -> Vec<Section> {
 fn error_table(
     title: &str,
     rows: &[&Row],
-    summary: impl Fn(&[f64]) -> f64,
+    summary: fn(Vec<f64>) -> f64,
     value: impl Fn(&Row) -> f64,
     decimals: usize,
 ) -> Table {
     let counts: BTreeSet<u32> = rows.iter().map(|row| row.threads).collect();
     let row = |method: &String| {
-        let values = by_count(rows, method, &value);
-        let cell = |count| values.get(count).map_or("-".to_owned(), |values| format!("{:.decimals$}", summary(values)));
+        let mut values = by_count(rows, method, &value);
+        let cell =
+            |count| values.remove(count).map_or("-".to_owned(), |values| format!("{:.decimals$}", summary(values)));
         (method.clone(), counts.iter().map(cell).collect())
     };
-    Table {
-        title: title.to_owned(),
-        head: counts.iter().map(u32::to_string).collect(),
-        rows: in_order(rows.iter().map(|row| &row.method)).into_iter().map(row).collect(),
-    }
+    let methods = in_order(rows.iter().map(|row| &row.method));
+    Table::new(title, counts.iter().map(u32::to_string), methods.into_iter().map(row))
 }
 
 /// How many times as long as fitted threads the other methods shade for the same error: a column for each count of fitted threads, in
@@ -121,7 +133,7 @@ fn error_table(
 fn equal_error_table(rows: &[&Row]) -> Option<Table> {
     let curve = |method: &str| -> Vec<(u32, f64, f64)> {
         let (errors, times) = (by_count(rows, method, |row| row.rms), by_count(rows, method, |row| row.shade_ms));
-        errors.iter().zip(times.values()).map(|((&count, rms), ms)| (count, mean(rms), mean(ms))).collect()
+        errors.into_iter().zip(times.into_values()).map(|((count, rms), ms)| (count, mean(rms), mean(ms))).collect()
     };
     let fitted = curve(Method::Fitted.name());
     let others =
@@ -134,14 +146,8 @@ fn equal_error_table(rows: &[&Row]) -> Option<Table> {
         };
         (method.clone(), fitted.iter().map(cell).collect())
     };
-    let table = Table {
-        title: "time, same RMS".to_owned(),
-        head: fitted.iter().map(|(count, ..)| count.to_string()).collect(),
-        rows: others.map(row).collect(),
-    };
-    // Measurements of earlier versions have no time of shading.
-    let is_timed = fitted.iter().all(|&(.., ms)| ms > 0.0);
-    (is_timed && !table.head.is_empty() && !table.rows.is_empty()).then_some(table)
+    let table = Table::new("time, same RMS", fitted.iter().map(|(count, ..)| count.to_string()), others.map(row));
+    (!table.head.is_empty() && !table.rows.is_empty()).then_some(table)
 }
 
 /// The time at which `curve`, of counts, errors and times, comes down to `rms`; or a bound of it.
@@ -175,11 +181,12 @@ pub fn frame_tables(timings: &Timings) -> Vec<Section> {
     let section = |of: (&String, String)| {
         let frames: Vec<_> = timings.frames.iter().filter(|frame| place(frame) == of).collect();
         let row = |frame: &&TimedFrame| {
-            let floor = [format!("{:.2}", frame.floor_ms), format!("{:.2}", frame.pass_ms("shade") / frame.floor_ms)];
+            let shade_ms = frame.pass_ms(SHADE_PASS);
+            let floor = [format!("{:.2}", frame.floor_ms), format!("{:.2}", shade_ms / frame.floor_ms)];
             (frame.threads.to_string(), costs(frame).into_iter().chain(floor).collect())
         };
-        let head = cost_heads(&frames).into_iter().chain(["floor", "shade/floor"].map(str::to_owned)).collect();
-        let table = Table { title: "threads".to_owned(), head, rows: frames.iter().map(row).collect() };
+        let head = cost_heads(&frames).chain(["floor", "shade/floor"]);
+        let table = Table::new("threads", head, frames.iter().map(row));
         let TimedFrame { width, height, subpixels, triangles, .. } = frames[0];
         let size = format!("{width} x {height} pixels, {subpixels} x {subpixels} sub-pixels, {triangles} triangles");
         Section { title: format!("{}, {}: {size}; times in ms", of.0, of.1), tables: vec![table] }
@@ -198,11 +205,8 @@ pub fn growth_tables(timings: &Timings) -> Vec<Section> {
                 let ratio = growth.ratio.map_or("-".to_owned(), |ratio| format!("{ratio:.2}"));
                 (growth.quantity.to_string(), costs(&growth.frame).into_iter().chain([ratio]).collect())
             };
-            Table {
-                title: what.clone(),
-                head: cost_heads(&frames).into_iter().chain(["ratio".to_owned()]).collect(),
-                rows: here.iter().filter(|growth| growth.what == *what).map(|growth| row(&growth)).collect(),
-            }
+            let of_what = here.iter().filter(|growth| growth.what == *what);
+            Table::new(what, cost_heads(&frames).chain(["ratio"]), of_what.map(|growth| row(&growth)))
         };
         let tables = in_order(here.iter().map(|growth| &growth.what)).into_iter().map(table).collect();
         Section { title: format!("{}, {}: cost as one thing grows; times in ms", of.0, of.1), tables }
@@ -221,13 +225,8 @@ fn pass_names<'a>(frames: &[&'a TimedFrame]) -> Vec<&'a str> {
     all.into_iter().filter(|name| !name.starts_with("clear_")).collect()
 }
 
-fn cost_heads(frames: &[&TimedFrame]) -> Vec<String> {
-    ["lookups/pixel", "ns/lookup"]
-        .into_iter()
-        .chain(pass_names(frames))
-        .chain(["all passes"])
-        .map(str::to_owned)
-        .collect()
+fn cost_heads<'a>(frames: &[&'a TimedFrame]) -> impl Iterator<Item = &'a str> {
+    ["lookups/pixel", "ns/lookup"].into_iter().chain(pass_names(frames)).chain(["all passes"])
 }
 
 /// A cell for each of `cost_heads`.
@@ -248,15 +247,6 @@ pub(super) fn by_count(rows: &[&Row], method: &str, value: impl Fn(&Row) -> f64)
     values
 }
 
-/// Arithmetic mean.
-pub(super) fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len() as f64
-}
-
-fn largest(values: &[f64]) -> f64 {
-    values.iter().copied().fold(f64::NEG_INFINITY, f64::max)
-}
-
 /// Each value once, in the order in which they first come.
 pub(super) fn in_order<T: PartialEq>(values: impl Iterator<Item = T>) -> Vec<T> {
     let mut seen = Vec::new();
@@ -271,9 +261,11 @@ pub(super) fn in_order<T: PartialEq>(values: impl Iterator<Item = T>) -> Vec<T> 
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
+    use crate::evaluate::sweep::Settings;
 
     /// Made-up measurements of two methods, three counts, two materials and two environments.
     pub(in super::super) fn rows() -> Vec<Row> {
+        let settings = Settings { width: 40, height: 30, subpixels: 2, seed: 0, repeat: 3, whole_picture: false };
         let mut rows = Vec::new();
         for (material, harder) in [("matt", 1.0), ("shiny", 3.0)] {
             for (environment, brighter) in [("sky", 1.0), ("sun", 2.0)] {
@@ -297,7 +289,7 @@ pub(super) mod tests {
                             lookups: u64::from(threads) * 1000,
                             covered_pixels: 800,
                             shade_ms: 0.11 + cost * f64::from(threads),
-                            settings: None,
+                            settings: settings.clone(),
                             shard: None,
                             combinations: None,
                             expected_rms: None,
@@ -372,8 +364,6 @@ mean of 2 materials, mean over 2 lights and scenes
             "{text}"
         );
         assert!(!text.contains("expected"), "{text}");
-        let untimed = rows.map(|row| Row { shade_ms: 0.0, ..row });
-        assert!(!super::text(&error_tables(&untimed)).contains("same RMS"));
     }
 
     #[test]
@@ -426,6 +416,13 @@ mean of 2 materials, mean over 2 lights and scenes
             "lookups",
             "covered_pixels",
             "shade_ms",
+            "settings",
+            "width",
+            "height",
+            "subpixels",
+            "seed",
+            "repeat",
+            "whole_picture",
         ];
         let places: Vec<_> = names.iter().map(|name| json.find(&format!("\"{name}\":")).unwrap()).collect();
         assert!(places.is_sorted(), "{json}");

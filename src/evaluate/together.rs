@@ -8,10 +8,12 @@ use super::speed::render;
 use super::tables::{Section, Table};
 use crate::error::Result;
 use crate::memo::{Memo, Round};
-use crate::pipeline::{DeviceScene, Rendering, median};
+use crate::passes::{CLASSIFY_PASS, SHADE_PASS};
+use crate::pipeline::{DeviceScene, Rendering};
 use crate::prepare::prepare;
 use crate::progress::{Observer, OnlyCancels, Parts};
 use crate::scene::{EnvironmentSource, MaterialSettings, MaterialSource, ObjectSettings, Scene, Source};
+use crate::statistics::{mean, median};
 use crate::vulkan::Device;
 
 /// What to measure, and how often.
@@ -102,11 +104,11 @@ pub fn run(
         let alone = together.materials.iter().zip(&alone).map(|((material, _), entrant)| TimedAlone {
             material: material.clone(),
             lookups: entrant.first.lookups,
-            classify_ms: entrant.median_ms("classify"),
-            shade_ms: entrant.median_ms("shade"),
+            classify_ms: entrant.median_ms(CLASSIFY_PASS),
+            shade_ms: entrant.median_ms(SHADE_PASS),
         });
         let alone: Vec<_> = alone.collect();
-        let shade_ms = all.median_ms("shade");
+        let shade_ms = all.median_ms(SHADE_PASS);
         found.push(TimedTogether {
             environment: environment.clone(),
             threads: together.threads,
@@ -115,9 +117,9 @@ pub fn run(
             covered_pixels: all.first.counters.covered_pixels(),
             lookups: all.first.lookups,
             device_memory_bytes: all.first.device_memory_bytes,
-            classify_ms: all.median_ms("classify"),
+            classify_ms: all.median_ms(CLASSIFY_PASS),
             shade_ms,
-            ratio: shade_ms / mean(&alone, |alone| alone.shade_ms),
+            ratio: shade_ms / mean(alone.iter().map(|alone| alone.shade_ms)),
             alone,
         });
     }
@@ -170,12 +172,8 @@ impl Entrant {
     }
 
     fn median_ms(&self, pass: &str) -> f64 {
-        median(self.renderings.iter().map(|rendering| rendering.pass_ms(pass)).collect())
+        median(self.renderings.iter().map(|rendering| rendering.pass_ms(pass)))
     }
-}
-
-fn mean(alone: &[TimedAlone], value: impl Fn(&TimedAlone) -> f64) -> f64 {
-    alone.iter().map(value).sum::<f64>() / alone.len() as f64
 }
 
 /// For each environment all materials together, then the mean over each alone, and each.
@@ -185,7 +183,7 @@ pub fn tables(found: &[TimedTogether]) -> Vec<Section> {
             let a_pixel = lookups / timed.covered_pixels as f64;
             vec![format!("{a_pixel:.1}"), format!("{classify_ms:.2}"), format!("{shade_ms:.2}")]
         };
-        let mean = |value: fn(&TimedAlone) -> f64| mean(&timed.alone, value);
+        let mean = |value: fn(&TimedAlone) -> f64| mean(timed.alone.iter().map(value));
         let together = ("together".to_owned(), cells(timed.lookups as f64, timed.classify_ms, timed.shade_ms));
         let alone =
             cells(mean(|alone| alone.lookups as f64), mean(|alone| alone.classify_ms), mean(|alone| alone.shade_ms));
@@ -193,8 +191,7 @@ pub fn tables(found: &[TimedTogether]) -> Vec<Section> {
             .alone
             .iter()
             .map(|alone| (alone.material.clone(), cells(alone.lookups as f64, alone.classify_ms, alone.shade_ms)));
-        let head = ["lookups a pixel", "classify", "shade"].map(str::to_owned).to_vec();
-        let rows = [together, ("mean of each alone".to_owned(), alone)].into_iter().chain(each).collect();
+        let rows = [together, ("mean of each alone".to_owned(), alone)].into_iter().chain(each);
         let TimedTogether { environment, threads, width, height, ratio, device_memory_bytes, .. } = timed;
         let title = format!(
             "{} materials, {environment}, {width} x {height} pixels, {threads} threads: together {ratio:.2} times as long as alone, {:.0} MB on \
@@ -202,7 +199,8 @@ pub fn tables(found: &[TimedTogether]) -> Vec<Section> {
             timed.alone.len(),
             *device_memory_bytes as f64 * 1e-6
         );
-        Section { title, tables: vec![Table { title: "materials".to_owned(), head, rows }] }
+        let table = Table::new("materials", ["lookups a pixel", CLASSIFY_PASS, SHADE_PASS], rows);
+        Section { title, tables: vec![table] }
     };
     found.iter().map(section).collect()
 }

@@ -12,6 +12,9 @@ use ash::vk;
 use bytemuck::{Pod, Zeroable};
 use std::sync::Arc;
 
+/// Name of the pass.
+pub const CLASSIFY_PASS: &str = "classify";
+
 /// Sub-pixels whose normals differ by less share one partitioned sum over the threads. Narrower than this, and curved
 /// parts of a mesh count as edges and cost as much as all sub-pixels shaded alone; wider, and the parts of the sum
 /// belong to visibly different normals.
@@ -195,7 +198,7 @@ pub fn classify<'a>(
     let mut pixels = graph.kept_buffer("pixel_list", BufferDesc { size_bytes: 4 * tile_pixels * tile_count });
     let mut coverage = graph.kept_buffer("coverage", BufferDesc { size_bytes: tile_pixels * tile_count / 4 });
     graph
-        .compute("classify", &classify.pipeline)
+        .compute(CLASSIFY_PASS, &classify.pipeline)
         .read("geometry", geometry)
         .bind("Shaders", &*classify.shaders)
         .modify("counters", &mut counters)

@@ -24,8 +24,8 @@ mod vmf_pyramid;
 pub use background::{Background, BackgroundMap, background};
 pub use bare_lookups::{BareLookup, BareLookups, bare_lookups};
 pub use classify::{
-    Classify, Counters, MAX_SHADERS, SMOOTH_DEG, ShaderOfMaterial, SmoothVariance, Tiles, classify, most_shaders,
-    upload_shaders,
+    CLASSIFY_PASS, Classify, Counters, MAX_SHADERS, SMOOTH_DEG, ShaderOfMaterial, SmoothVariance, Tiles, classify,
+    most_shaders, upload_shaders,
 };
 pub use cube_borders::WayAround;
 pub use device_check::{Answers, Questions, Volume, ask};
@@ -36,7 +36,7 @@ pub use light::{DeviceIrradiance, DeviceLight, check_aliases};
 pub use present::{Area, present};
 pub use readback::{Readbacks, is_readback, texels};
 pub use region::Region;
-pub use shade::{DeviceMaterials, Sampling, Shade, Shaded, ShadedMaterial, models_used, shade};
+pub use shade::{DeviceMaterials, SHADE_PASS, Sampling, Shade, Shaded, ShadedMaterial, models_used, shade};
 pub use tone_map::{ToneMap, tone_map};
 #[cfg(feature = "viewer")]
 pub use ui::ui;

@@ -13,6 +13,9 @@ use ash::vk;
 use bytemuck::{Pod, Zeroable};
 use std::sync::Arc;
 
+/// Name of the pass.
+pub const SHADE_PASS: &str = "shade";
+
 /// Materials, their threads, CDFs or split sums, and their tables on the device.
 pub struct DeviceMaterials {
     records: Buffer,
@@ -287,8 +290,11 @@ pub fn shade<'a>(
             (&*pipelines[pixel_class], Counters::arguments_of(pixel_class), push)
         };
         let pass = match portion {
-            0 => graph.compute("shade", &pipelines[0]),
-            _ => graph.compute(&format!("shade, portion {}", portion + 1), &pipelines[0]).portion_of("shade"),
+            0 => graph.compute(SHADE_PASS, &pipelines[0]),
+            _ => {
+                let name = format!("{SHADE_PASS}, portion {}", portion + 1);
+                graph.compute(&name, &pipelines[0]).portion_of(SHADE_PASS)
+            }
         };
         let pass = pass
             .read("geometry", geometry)

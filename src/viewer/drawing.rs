@@ -5,9 +5,9 @@ use super::input::Input;
 use super::interaction::{UnsavedPicture, Viewer};
 use super::latency::{Answer, Latency, Record, Stats};
 use super::loaded::Loaded;
-use super::presenter::{Drawn, Extras, Presenter, SHADE, ShownPicture};
+use super::presenter::{Drawn, Extras, Presenter, ShownPicture};
 use crate::files;
-use crate::passes::{Area, View};
+use crate::passes::{Area, SHADE_PASS, View};
 use crate::picture::Format;
 use crate::pipeline::{Wanted, check_size};
 use crate::prepare::view_of;
@@ -165,7 +165,7 @@ impl Viewer {
 
     /// Notes what is known of a frame whose picture has this `size`, which took `time` in all.
     fn note(&mut self, drawn: &Drawn, size: [u32; 2], time: Duration) {
-        self.is_compiled |= drawn.ran.iter().any(|pass| pass == SHADE);
+        self.is_compiled |= drawn.ran.iter().any(|pass| pass == SHADE_PASS);
         if let Some(cost) = drawn.cost {
             let full = &self.session.shown().image;
             self.dynamic_resolution.drawn(cost.size, [full.width, full.height], cost.time);

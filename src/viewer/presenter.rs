@@ -1,6 +1,6 @@
 //! The stage: draws frames into the window.
 use crate::graph::{Access, DeviceResource, Executable, FrameGraph, ImageDesc, ImageHandle, Store};
-use crate::passes::{Area, Counters, Readbacks, View, present, texels, ui};
+use crate::passes::{Area, Counters, Readbacks, SHADE_PASS, View, present, texels, ui};
 use crate::pipeline::{DeviceScene, Frame, declare};
 use crate::vulkan::{
     Buffer, Device, Frames, Image, PassTime, PresentMode, Presented, Surface, Swapchain, UiFrame, UiPainter,
@@ -16,9 +16,6 @@ use std::time::Duration;
 const FRAMES: usize = 2;
 
 const NO_SIZES: [Option<[u32; 2]>; FRAMES] = [None; FRAMES];
-
-/// The pass by which a picture is known to be made anew.
-pub const SHADE: &str = "shade";
 
 /// What a frame shows.
 #[derive(Clone, Copy)]
@@ -64,7 +61,7 @@ impl PictureCost {
         let is_of_window = |pass: &&PassTime| ["clear_window", "present", "ui"].contains(&pass.name.as_str());
         let of_picture = passes.iter().filter(|pass| !is_of_window(pass) && !pass.is_readback());
         let ms: f64 = of_picture.map(|pass| pass.gpu_ms).sum();
-        let shades = passes.iter().any(|pass| pass.name == SHADE);
+        let shades = passes.iter().any(|pass| pass.name == SHADE_PASS);
         shades.then(|| Self { size, time: Duration::from_secs_f64(ms * 1e-3) })
     }
 }
@@ -224,7 +221,7 @@ impl Presenter {
         }
         let ReadyFrame { executable, counts, screenshot } = ready?;
         let ran: Vec<_> = executable.plan.passes.iter().map(|pass| pass.name.clone()).collect();
-        let shades = ran.iter().any(|pass| pass == SHADE);
+        let shades = ran.iter().any(|pass| pass == SHADE_PASS);
         let told = picture.filter(|picture| shades && picture.is_compiled);
         let size = told.map(|picture| [picture.view.width, picture.view.height]);
         let (passes, size) = match self.device.times_passes() && !executable.is_in_portions() {

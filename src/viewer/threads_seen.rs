@@ -91,9 +91,8 @@ pub fn thumbnail(environment: &Environment, intensity: f64, display: Display) ->
         let texels = down.flat_map(|row| across.clone().map(move |column| row * environment.width + column));
         let sum =
             texels.fold(DVec3::ZERO, |sum, texel| sum + DVec3::from_array(environment.texels[texel].map(f64::from)));
-        let [r, g, b] = (sum * (intensity / count)).to_array().map(|radiance| {
-            (255.0 * (display.exposure * radiance).clamp(0.0, 1.0).powf(1.0 / display.gamma)).round() as u8
-        });
+        let mean = (sum * (intensity / count)).to_array();
+        let [r, g, b] = mean.map(|radiance| (255.0 * display.value(radiance)).round() as u8);
         Color32::from_rgb(r, g, b)
     };
     ColorImage::new([columns, rows], (0..columns * rows).map(pixel).collect())

@@ -22,12 +22,19 @@ const DESCRIPTOR_KINDS: [vk::DescriptorType; 5] = [
 ];
 
 /// How long one pass took on the GPU.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct PassTime {
     /// Name of the pass.
     pub name: String,
     /// Milliseconds between the timestamps before and after it.
     pub gpu_ms: f64,
+}
+
+impl PassTime {
+    /// Time of the pass of that name among `passes`, in milliseconds on the GPU; 0 if there is none.
+    pub fn ms_of(passes: &[Self], name: &str) -> f64 {
+        passes.iter().filter(|pass| pass.name == name).map(|pass| pass.gpu_ms).sum()
+    }
 }
 
 /// What one frame in flight owns.

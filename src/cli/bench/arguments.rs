@@ -1,7 +1,7 @@
 //! What the measurements have in common on the command line: what to measure, on which device, and where to write it.
 use crate::cli::render::processor;
-use crate::cli::scene_flags::parse_size;
-use crate::cli::{cache_folder, json, nameable, number, print, stem};
+use crate::cli::scene_flags::{DeviceFlags, parse_size};
+use crate::cli::{json, nameable, number, print, stem};
 use clap::value_parser;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -17,7 +17,7 @@ use threadlight::low_level::scene::{
     EnvironmentSource, MAX_SAMPLES, MAX_SUBPIXELS, MaterialSettings, MaterialSource, ObjectSettings, Scene, Source,
     mesh,
 };
-use threadlight::low_level::vulkan::{Device, Instance};
+use threadlight::low_level::vulkan::Device;
 use threadlight::{Error, Result};
 
 /// What to measure. Where a flag is left out, the command says what is taken: see [`Defaults`].
@@ -44,12 +44,8 @@ pub struct CasesArguments {
     /// Seed of everything random.
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
-    /// Vulkan device: its index or part of its name, as `threadlight devices` lists them.
-    #[arg(long, value_name = "NAME|INDEX")]
-    device: Option<String>,
-    /// Neither read nor write cached threads, blurred environments and pipelines.
-    #[arg(long)]
-    no_cache: bool,
+    #[command(flatten)]
+    pub device: DeviceFlags,
 }
 
 /// What a command measures where it is not told.
@@ -104,11 +100,6 @@ impl CasesArguments {
         of_scenes.chain(named).chain(files_of_materials(&self.materials, &cases.materials)).collect()
     }
 
-    /// What measurements ask for what they need.
-    pub fn memo(&self) -> Memo {
-        Memo::new(cache_folder(self.no_cache).as_deref())
-    }
-
     /// The scene that `text` names: a scene file, or a mesh in the built-in scene.
     fn scene_of(&self, text: &str, size: Option<(u32, u32)>) -> Result<Scene> {
         let path = Path::new(text);
@@ -126,15 +117,6 @@ impl CasesArguments {
         scene.image.subpixels = self.subpixels.unwrap_or(scene.image.subpixels);
         Ok(scene)
     }
-
-    pub fn open_device(&self) -> Result<Arc<Device>> {
-        open_device(self.device.as_deref())
-    }
-}
-
-/// The device of this name or index, or the one that the program prefers; not validated, which would take time that is measured.
-pub fn open_device(device: Option<&str>) -> Result<Arc<Device>> {
-    Ok(Device::new(&Instance::new(false)?, device)?)
 }
 
 /// Each of `texts` with the name that it has in tables: without folder and extension.

@@ -81,8 +81,8 @@ impl BenchError {
             expected: self.expected,
             keep_pictures: false,
         };
-        let device = self.cases.open_device()?;
-        let memo = self.cases.memo();
+        let device = self.cases.device.open()?;
+        let memo = self.cases.device.memo();
         let progress = TerminalProgress::of("bench error", "pictures")?;
         let mut measured = Measured::default();
         let result = self.truth.sweep(reference::TOLERANCE, &sweep, &device, &memo, &progress, &mut measured);

@@ -82,9 +82,9 @@ impl BenchGallery {
             keep_pictures: true,
         };
 
-        let memo = self.cases.memo();
+        let memo = self.cases.device.memo();
         sweep.cases.check_materials(&memo)?;
-        let device = self.cases.open_device()?;
+        let device = self.cases.device.open()?;
         let progress = TerminalProgress::of("materials", "pictures")?;
         let mut sheets = gallery::material_sheets(&materials, estimator, &device, &memo, &progress)?;
         if self.materials_only {

@@ -7,7 +7,6 @@ use crate::cli::scene_flags::{MachineFlags, SceneFlags};
 use clap::value_parser;
 use threadlight::low_level::evaluate::live::{self, Drag};
 use threadlight::low_level::evaluate::reference::ReferenceSettings;
-use threadlight::low_level::memo::Memo;
 use threadlight::low_level::scene::Scene;
 use threadlight::{Error, Result};
 
@@ -67,7 +66,7 @@ impl BenchLive {
         let values = between(&from?, &to?, self.steps)?;
         let drag = Drag { scene, material: material.to_owned(), key: key.to_owned(), values };
         let (device, messages) = self.machine.open()?;
-        let memo = Memo::new(self.machine.cache().as_deref());
+        let memo = self.machine.device.memo();
         let settings = ReferenceSettings { tolerance: self.reference_tolerance, ..ReferenceSettings::default() };
         let progress = TerminalProgress::of("bench live", "pictures")?;
         let mut found = Vec::new();

@@ -96,8 +96,8 @@ impl BenchReport {
         let highest = of_method.map(|estimator| estimator.count).max().unwrap_or(variant.method.default_count());
         let estimator = Estimator { variant, count: highest };
 
-        let device = self.cases.open_device()?;
-        let memo = self.cases.memo();
+        let device = self.cases.device.open()?;
+        let memo = self.cases.device.memo();
         let progress = TerminalProgress::of("errors", "done")?;
         let mut measured = Measured::default();
         let mut report = Report { facts: facts(&device), ..Report::default() };
@@ -135,7 +135,7 @@ impl BenchReport {
 
 /// Rows that `bench error --json` wrote.
 fn read_rows(path: &Path) -> Result<Vec<Row>> {
-    let bytes = std::fs::read(path).map_err(|cause| Error::unreadable(path, cause))?;
+    let bytes = files::read(path)?;
     let remedy = "give a file that `threadlight bench error --json` wrote";
     let rows: Vec<Row> = serde_json::from_slice(&bytes)
         .map_err(|cause| Error::in_file(path, format!("holds no measurements ({cause})"), remedy))?;

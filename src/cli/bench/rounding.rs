@@ -40,7 +40,7 @@ impl BenchRounding {
             size: Some((80, 60)),
         })?;
         self.json.check(&self.cases.files(&cases))?;
-        let (device, memo) = (self.cases.open_device()?, self.cases.memo());
+        let (device, memo) = (self.cases.device.open()?, self.cases.device.memo());
         let progress = TerminalProgress::of("bench rounding", "pictures")?;
         let mut found = Vec::new();
         let result = rounding::run(&cases, &device, &memo, &progress, &mut found);

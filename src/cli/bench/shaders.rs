@@ -1,11 +1,10 @@
 //! `threadlight bench shaders`: what a driver's compiler makes of the shaders that a scene needs.
 use super::arguments::JsonArgument;
-use crate::cli::cache_folder;
+use crate::cli::memo;
 use crate::cli::progress::TerminalProgress;
 use crate::cli::scene_flags::SceneFlags;
 use threadlight::Error;
 use threadlight::low_level::evaluate::shaders;
-use threadlight::low_level::memo::Memo;
 use threadlight::low_level::method::Method;
 use threadlight::low_level::vulkan::{CompilingDevice, Instance};
 
@@ -55,7 +54,7 @@ impl BenchShaders {
         };
         let instance = Instance::new(false).map_err(Error::from)?;
         let device = CompilingDevice::new(&instance, self.device.as_deref()).map_err(Error::from)?;
-        let memo = Memo::new(cache_folder(self.no_cache).as_deref());
+        let memo = memo(self.no_cache);
         let progress = TerminalProgress::of("bench shaders", "shaders")?;
         let mut costs = Vec::new();
         let result = shaders::run(&scene, &methods, &device, &memo, &progress, &mut costs);

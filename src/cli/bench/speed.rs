@@ -67,8 +67,8 @@ impl BenchSpeed {
         })?;
         self.output.check(&self.cases.files(&cases))?;
         let speed = Speed { cases, threads: self.threads, repeat: self.repeat };
-        let device = self.cases.open_device()?;
-        let memo = self.cases.memo();
+        let device = self.cases.device.open()?;
+        let memo = self.cases.device.memo();
         let progress = TerminalProgress::of("bench speed", "frames")?;
         let mut timings = Timings::default();
         let result = speed::run(&speed, &device, &memo, &progress, &mut timings);

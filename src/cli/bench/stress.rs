@@ -4,7 +4,6 @@ use crate::cli::none_of;
 use crate::cli::progress::TerminalProgress;
 use crate::cli::scene_flags::MachineFlags;
 use threadlight::low_level::evaluate::stress::{self, Extent, Stressed};
-use threadlight::low_level::memo::Memo;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -48,7 +47,7 @@ impl BenchStress {
         let progress = TerminalProgress::of("bench stress", "cases")?;
         let mut found = Vec::new();
         let extent = Extent { all: self.all, only: self.only };
-        let result = stress::run(&extent, &device, &Memo::new(self.machine.cache().as_deref()), &progress, &mut found);
+        let result = stress::run(&extent, &device, &self.machine.device.memo(), &progress, &mut found);
         drop(device);
         progress.finish();
         self.json.report(result, &found, |found| vec![stress::tables(found)])?;

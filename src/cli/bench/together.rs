@@ -1,13 +1,12 @@
 //! `threadlight bench together`: what many materials in one picture cost, beside each alone.
-use super::arguments::{JsonArgument, files_of_materials, named_environments, named_materials, open_device};
+use super::arguments::{JsonArgument, files_of_materials, named_environments, named_materials};
+use crate::cli::nameable;
 use crate::cli::progress::TerminalProgress;
-use crate::cli::scene_flags::parse_size;
-use crate::cli::{cache_folder, nameable};
+use crate::cli::scene_flags::{DeviceFlags, parse_size};
 use clap::value_parser;
 use std::path::PathBuf;
 use threadlight::low_level::brdf::Brdf;
 use threadlight::low_level::evaluate::together::{self, Together};
-use threadlight::low_level::memo::Memo;
 use threadlight::low_level::threads::fitted::MAX_COUNT;
 
 const EXAMPLES: &str = "\
@@ -45,12 +44,8 @@ pub struct BenchTogether {
     /// Render each picture this often; times are medians.
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = value_parser!(u32).range(1..))]
     repeat: u32,
-    /// Vulkan device: its index or part of its name, as `threadlight devices` lists them.
-    #[arg(long, value_name = "NAME|INDEX")]
-    device: Option<String>,
-    /// Neither read nor write cached threads, blurred environments and pipelines.
-    #[arg(long)]
-    no_cache: bool,
+    #[command(flatten)]
+    device: DeviceFlags,
     #[command(flatten)]
     json: JsonArgument,
 }
@@ -71,11 +66,10 @@ impl BenchTogether {
         let environments = self.environments.iter().map(PathBuf::from);
         let read: Vec<_> = environments.chain(files_of_materials(&self.materials, &together.materials)).collect();
         self.json.check(&read)?;
-        let device = open_device(self.device.as_deref())?;
+        let device = self.device.open()?;
         let progress = TerminalProgress::of("bench together", "pictures")?;
-        let memo = Memo::new(cache_folder(self.no_cache).as_deref());
         let mut found = Vec::new();
-        let result = together::run(&together, &device, &memo, &progress, &mut found);
+        let result = together::run(&together, &device, &self.device.memo(), &progress, &mut found);
         progress.finish();
         self.json.report(result, &found, together::tables)
     }

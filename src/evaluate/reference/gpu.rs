@@ -36,7 +36,7 @@ pub fn reference_on_gpu(
     }
     let start = Instant::now();
     let sampling = Sampling { count: FRAME_SAMPLES, seed: 0, pattern: Pattern::PerPixel };
-    let objects = Prepared { method: Method::Mis, sampling, show_environment: false, ..prepared.clone() };
+    let objects = Prepared { method: Method::Mis, sampling, ..prepared.objects_alone() };
     let (mut renderer, observer) = (DeviceScene::new(device, &objects, round)?, round.observer());
     let display = Display::of(&prepared.view);
     let mut evaluations = 0;
@@ -46,7 +46,7 @@ pub fn reference_on_gpu(
         observer.check()?;
         frame += 1;
         renderer.reseed(frame.into());
-        let rendering = renderer.render(Wanted { radiance: true, ..Wanted::default() }, 1)?;
+        let rendering = renderer.render(Wanted::RADIANCE, 1)?;
         evaluations += rendering.lookups;
         sums.resize(rendering.radiance.len(), Sums::default());
         sums.iter_mut().zip(&rendering.radiance).for_each(|(sums, &texel)| sums.add(texel.into()));

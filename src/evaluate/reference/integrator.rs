@@ -8,6 +8,7 @@ use crate::Result;
 use crate::brdf::{Brdf, MAX_THETA_O_DEG};
 use crate::environment::Environment;
 use crate::evaluate::metrics::Display;
+use crate::prepare::Prepared;
 use crate::progress::Observer;
 
 /// A pixel gives up at so many cells.
@@ -97,6 +98,12 @@ pub struct Integrator<'a> {
 }
 
 impl<'a> Integrator<'a> {
+    /// For the light and the materials of `prepared`.
+    pub fn of(prepared: &'a Prepared) -> Self {
+        let Prepared { view, environment, materials, .. } = prepared;
+        Self::new(environment, view.intensity, materials.iter().map(|material| &*material.brdf), view.subpixels)
+    }
+
     /// For `environment` times `intensity`, materials `brdfs`, and pixels of up to `subpixels` squared points.
     pub fn new(
         environment: &'a Environment,

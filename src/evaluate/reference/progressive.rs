@@ -49,8 +49,7 @@ pub fn progressive(
     observer: &dyn Observer,
     publish: &mut dyn FnMut(Estimate),
 ) -> Result<()> {
-    let brdfs = prepared.materials.iter().map(|material| &*material.brdf);
-    let integrator = Integrator::new(&prepared.environment, prepared.view.intensity, brdfs, prepared.view.subpixels);
+    let integrator = Integrator::of(prepared);
     let view = &prepared.view;
     let (width, height) = (view.width as usize, view.height as usize);
     // Radiance and squared error (none where no surface is seen) of the pixels so far.

@@ -40,10 +40,8 @@ impl Step for Integrate<'_> {
     }
 
     fn make(&self, round: &Round) -> Result<ReferenceImage> {
-        let Prepared { view, environment, materials, .. } = self.prepared;
-        let brdfs = materials.iter().map(|material| &*material.brdf);
-        let integrator = Integrator::new(environment, view.intensity, brdfs, view.subpixels);
-        integrator.image(view, self.geometry, self.tolerance, round.observer())
+        let integrator = Integrator::of(self.prepared);
+        integrator.image(&self.prepared.view, self.geometry, self.tolerance, round.observer())
     }
 
     fn stored(&self) -> Option<Stored<'_, ReferenceImage>> {

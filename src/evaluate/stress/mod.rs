@@ -6,12 +6,13 @@ mod cases;
 
 use std::sync::Arc;
 
-use glam::{UVec2, Vec4};
-use rayon::prelude::*;
+use glam::Vec4;
 use serde::Serialize;
 
 use self::cases::Case;
+use super::cases::by_method;
 use super::metrics::Display;
+use super::rounding::shade;
 use super::tables::{Section, Table};
 use crate::environment::{Environment, RepairCounts};
 use crate::error::{Error, Result};
@@ -21,7 +22,7 @@ use crate::passes::check_aliases;
 use crate::pipeline::{DeviceScene, Wanted};
 use crate::prepare::prepare;
 use crate::progress::{Observer, Parts};
-use crate::shading::{CpuShader, texels_of_pixel};
+use crate::shading::CpuShader;
 use crate::vulkan::{Device, DeviceKind};
 
 /// What differences may be: RMS over the covered pixels, each relative to the largest of its radiance, the picture's mean, and a millionth
@@ -135,12 +136,8 @@ fn stress(
     bright: bool,
     held: &mut Held,
 ) -> Result<Option<Stressed>> {
-    let mut scene = case.scene.clone();
-    scene.shading.method = method;
-    let most = method.max_count(scene.image.subpixels);
-    scene.shading.threads = scene.shading.threads.map(|count| count.min(most));
     let round = memo.round(&());
-    let mut prepared = prepare(&scene, &round)?;
+    let mut prepared = prepare(&by_method(&case.scene, method), &round)?;
     let light = case.light.as_ref().map_or_else(|| (*prepared.environment).clone(), |light| light());
     let light = if bright { brightened(&light) } else { Some(light) };
     let Some(light) = light else { return Ok(None) };
@@ -152,12 +149,7 @@ fn stress(
     let rendering = DeviceScene::new(device, &prepared, &round)?.render(wanted, 1)?;
     let twin = CpuShader::new(&prepared, &round)?;
     *held = round.held();
-    let width = prepared.view.width;
-    let expected = |pixel: usize| {
-        let pixel = UVec2::new(pixel as u32 % width, pixel as u32 / width);
-        twin.shade(pixel, &texels_of_pixel(&prepared.view, &rendering.geometry, pixel))
-    };
-    let expected: Vec<Vec4> = (0..rendering.radiance.len()).into_par_iter().map(expected).collect();
+    let expected = shade(&twin, &prepared, &rendering.geometry);
     let most = (prepared.view.intensity * prepared.environment.max_radiance()).min(f32::MAX.into());
     let least = 1e-6 * most;
     let display = Display::of(&prepared.view);
@@ -217,11 +209,11 @@ pub fn tables(found: &[Stressed]) -> Section {
             let differences = [case.rms, case.most].map(|difference| format!("{difference:.1e}"));
             (case.case.clone(), [&counts[..], &differences, &[verdict.to_owned()]].concat())
         };
-        let head = ["pixels", "not finite", "wrongly shown", "RMS", "most", ""].map(str::to_owned).to_vec();
+        let head = ["pixels", "not finite", "wrongly shown", "RMS", "most", ""];
         let is_of = |case: &&Stressed| (case.method, case.bright) == (method, bright);
         let rows: Vec<_> = found.iter().filter(is_of).map(row).collect();
         let title = if bright { format!("{method}, bright") } else { method.to_owned() };
-        (!rows.is_empty()).then_some(Table { title, head, rows })
+        (!rows.is_empty()).then(|| Table::new(title, head, rows))
     };
     let title = format!(
         "Device and CPU, relative to radiance; {MOST_RMS:.0e} RMS is allowed, {MOST_RMS_DRAWN:.0e} where samples are drawn, {MOST_RMS_ON_GPUS:.0e} on GPUs:"
