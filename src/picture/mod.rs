@@ -10,7 +10,7 @@ mod primaries;
 
 pub(crate) use exr_file::parse_exr;
 pub use exr_file::{ExrHeader, write_exr};
-pub use png_file::write_png;
+pub use png_file::{write_png, write_png_of_gamma};
 pub(crate) use primaries::Primaries;
 
 /// What deflate makes of a byte at most. A sample takes a byte or more, and so do most pixels: it bounds how many there are.

@@ -2,37 +2,60 @@
 use std::io::Cursor;
 use std::path::Path;
 
-use image::codecs::png::{PngDecoder, PngEncoder};
-use image::{DynamicImage, ExtendedColorType, ImageDecoder, ImageEncoder};
+use image::codecs::png::PngDecoder;
+use image::{DynamicImage, ImageDecoder};
+use png::{BitDepth, ColorType, Compression, Encoder, ScaledFloat, SrgbRenderingIntent};
 
 use super::{DEFLATED, Format, PictureFile, check_pixels};
 use crate::error::{Error, Result};
 use crate::files::write_whole;
 
-/// The bytes of a PNG before its first optional chunk: signature (8) and the IHDR chunk (25).
-const AFTER_HEADER: usize = 8 + 25;
-/// The chunk that says "these values are sRGB, perceptual intent": length 1, name, intent 0, CRC-32.
-const SRGB_CHUNK: [u8; 13] = [0, 0, 0, 1, b's', b'R', b'G', b'B', 0, 0xae, 0xce, 0x1c, 0xe9];
-
 /// Where the bits of a channel stand: behind the signature (8), the chunk's length and name (8), width and height (8).
 const BITS: usize = 24;
 
-/// Writes a PNG of `width` x `height` pixels, rows from the top, straight alpha; without `alpha` only RGB.
+/// The gamma of display values that sRGB is near to.
+const SRGB_GAMMA: f64 = 2.2;
+
+/// Writes a PNG of `width` x `height` pixels of sRGB, rows from the top, straight alpha; without `alpha` only RGB.
 ///
 /// # Panics
 /// If `rgba8` does not hold 4 bytes for each pixel.
 pub fn write_png(path: &Path, width: u32, height: u32, rgba8: &[u8], alpha: bool) -> Result<()> {
+    write_png_of_gamma(path, width, height, rgba8, alpha, SRGB_GAMMA)
+}
+
+/// The same of display values that are light to the power of 1 over `gamma`: the file says so, or that it is sRGB where that is near.
+///
+/// # Panics
+/// If `rgba8` does not hold 4 bytes for each pixel.
+pub fn write_png_of_gamma(
+    path: &Path,
+    width: u32,
+    height: u32,
+    rgba8: &[u8],
+    alpha: bool,
+    gamma: f64,
+) -> Result<()> {
     assert_eq!(rgba8.len(), width as usize * height as usize * 4, "4 bytes a pixel");
     let mut bytes = Vec::new();
-    let encoder = PngEncoder::new(&mut bytes);
-    let encoded = if alpha {
-        encoder.write_image(rgba8, width, height, ExtendedColorType::Rgba8)
+    let mut encoder = Encoder::new(&mut bytes, width, height);
+    encoder.set_depth(BitDepth::Eight);
+    encoder.set_compression(Compression::Fast);
+    if gamma == SRGB_GAMMA {
+        encoder.set_source_srgb(SrgbRenderingIntent::Perceptual);
     } else {
-        let rgb8: Vec<u8> = rgba8.chunks_exact(4).flat_map(|pixel| [pixel[0], pixel[1], pixel[2]]).collect();
-        encoder.write_image(&rgb8, width, height, ExtendedColorType::Rgb8)
+        encoder.set_source_gamma(ScaledFloat::new((1.0 / gamma) as f32));
+    }
+    let rgb8: Vec<u8>;
+    let (color, data) = if alpha {
+        (ColorType::Rgba, rgba8)
+    } else {
+        rgb8 = rgba8.chunks_exact(4).flat_map(|pixel| [pixel[0], pixel[1], pixel[2]]).collect();
+        (ColorType::Rgb, &rgb8[..])
     };
-    encoded.map_err(|cause| Error::unwritable(path, cause))?;
-    bytes.splice(AFTER_HEADER..AFTER_HEADER, SRGB_CHUNK);
+    encoder.set_color(color);
+    let written = encoder.write_header().and_then(|mut writer| writer.write_image_data(data));
+    written.map_err(|cause| Error::unwritable(path, cause))?;
     write_whole(path, &bytes)
 }
 
@@ -83,6 +106,19 @@ mod tests {
     }
 
     #[test]
+    fn a_picture_is_marked_as_srgb_or_with_its_gamma() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("marked.png");
+        let of_gamma = |gamma: f64| {
+            write_png_of_gamma(&path, 2, 1, &[9; 8], true, gamma).unwrap();
+            let file = std::io::BufReader::new(std::fs::File::open(&path).unwrap());
+            let reader = png::Decoder::new(file).read_info().unwrap();
+            (reader.info().srgb.is_some(), reader.info().gamma().map(|gamma| gamma.into_scaled()))
+        };
+        assert_eq!([2.2, 1.0, 1.8].map(of_gamma), [(true, Some(45455)), (false, Some(100_000)), (false, Some(55556))]);
+    }
+
+    #[test]
     fn a_picture_that_claims_more_pixels_than_its_bytes_can_hold_is_refused() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("claims.png");
@@ -91,8 +127,8 @@ mod tests {
         assert!(parse(&path, &bytes).is_ok());
         // Width and height stand behind the signature (8), the chunk's length (4) and its name (4), its checksum at its end.
         bytes[16..24].copy_from_slice(&[16000_u32; 2].map(u32::to_be_bytes).concat());
-        let checksum = crc(&bytes[12..AFTER_HEADER - 4]);
-        bytes[AFTER_HEADER - 4..AFTER_HEADER].copy_from_slice(&checksum.to_be_bytes());
+        let checksum = crc(&bytes[12..29]);
+        bytes[29..33].copy_from_slice(&checksum.to_be_bytes());
         let error = parse(&path, &bytes).unwrap_err().to_string();
         assert!(error.contains("claims.png") && error.contains("more than 1032 pixels"), "{error}");
     }
