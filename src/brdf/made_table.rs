@@ -8,6 +8,10 @@ use rayon::prelude::*;
 /// What the greatest value is stored as. Half precision then keeps eleven bits of all that is above a billionth of it.
 pub(super) const GREATEST_TEXEL: f64 = 6e4;
 
+/// Greater values count as this, which leaves single precision room for products with light: f that grows without bound towards the horizon may
+/// have any value there.
+const GREATEST_VALUE: f64 = 1e30;
+
 /// Tables of all shapes have so many texels along x and y, so that an image packs them without gaps.
 pub const MADE_TABLE_SIZE: [usize; 2] = [17, 75];
 
@@ -23,6 +27,7 @@ pub struct MadeTable {
 impl MadeTable {
     /// The table of `value` at each of `count` texels.
     pub(super) fn of(count: usize, value: impl Fn(usize) -> DVec3 + Send + Sync) -> Self {
+        let value = |index: usize| value(index).min(DVec3::splat(GREATEST_VALUE));
         let values: Vec<DVec3> = (0..count).into_par_iter().map(value).collect();
         let greatest = values.iter().fold(0.0, |greatest: f64, value| greatest.max(value.max_element()));
         // A table that is black has any scale.
@@ -105,4 +110,16 @@ pub(super) const FROM_HORIZON: f64 = 1e-2;
 pub(super) fn of_half_tangent(tangent: f64) -> (f64, f64) {
     let square = tangent * tangent;
     (2.0 * tangent / (1.0 + square), (1.0 - square) / (1.0 + square))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_beyond_single_precision_are_finite_in_a_table() {
+        let table = MadeTable::of(3, |index| DVec3::splat([1e300, f64::INFINITY, 0.5][index]));
+        assert!((table.scale as f32).is_finite(), "{}", table.scale);
+        assert!(table.texels().iter().flatten().all(|channel| channel.is_finite()), "{:?}", table.texels());
+    }
 }
