@@ -19,7 +19,7 @@ pub mod graph;
 pub mod light;
 #[path = "memo/mod.rs"]
 pub mod memo;
-#[path = "method.rs"]
+#[path = "method/mod.rs"]
 pub mod method;
 #[path = "packing.rs"]
 pub mod packing;

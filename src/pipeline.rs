@@ -104,7 +104,7 @@ impl DeviceScene {
         let compile = |shader: &'static Shader, constants: &[(&'static str, u32)]| {
             round.ask(&CompileCompute { device, shader, constants })
         };
-        let shader = method.shader()?;
+        let shader = shade_shader(method)?;
         // Held, so that it is opened once for all that is compiled.
         pipelines(round, device)?;
         let way_around = round.ask(&CheckDevice(device))?.way_around(device)?;

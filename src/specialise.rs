@@ -1,8 +1,8 @@
 //! By which constants shaders are specialised for what a scene has: what it does not need is compiled out.
 use crate::light::{BlurredLight, KernelNeeds, sharp_from};
+use crate::method::Pattern;
 use crate::passes::{ShaderOfMaterial, models_used};
 use crate::prepare::{Prepared, PreparedMaterial};
-use crate::scene::Pattern;
 use crate::threads::Threads;
 
 /// Views from this angle on are grazing, in radians: a quarter of a sphere is seen at 60 degrees or more. Kernels that look up the environment as it is

@@ -7,7 +7,7 @@ use threadlight::Method;
 use threadlight::low_level::evaluate::reference::{ReferenceSettings, reference};
 use threadlight::low_level::evaluate::{Comparable, Display, compare};
 use threadlight::low_level::geometry_texel::GeometryTexel;
-use threadlight::low_level::passes::Sampling;
+use threadlight::low_level::method::Sampling;
 use threadlight::low_level::picture::write_exr;
 use threadlight::low_level::pipeline::Rendering;
 use threadlight::low_level::prepare::{Prepared, prepare};

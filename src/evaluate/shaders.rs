@@ -8,7 +8,7 @@ use super::tables::{Section, Table, in_order};
 use crate::error::Result;
 use crate::memo::{Memo, Round};
 use crate::method::Method;
-use crate::passes::{GEOMETRY_STATE, MAX_SHADERS, geometry_shaders};
+use crate::passes::{GEOMETRY_STATE, MAX_SHADERS, geometry_shaders, shade_shader};
 use crate::prepare::{Prepared, prepare};
 use crate::progress::Observer;
 use crate::scene::{Background, Scene};
@@ -81,7 +81,7 @@ pub fn run(
         scene.shading.threads = scene.shading.threads.map(|count| count.min(most));
         let round = memo.round(observer);
         let prepared = prepare(&scene, &round)?;
-        let shader = method.shader()?;
+        let shader = shade_shader(method)?;
         let shaders = shaders_of(&prepared, &round)?;
         // Those that say how much is in a scene; the rest stay as in GLSL, where nothing is left out.
         let of_any =

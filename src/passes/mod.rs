@@ -36,7 +36,7 @@ pub use light::{DeviceIrradiance, DeviceLight, check_aliases};
 pub use present::{Area, present};
 pub use readback::{Readbacks, is_readback, texels};
 pub use region::Region;
-pub use shade::{DeviceMaterials, Sampling, Shade, Shaded, ShadedMaterial, models_used, shade};
+pub use shade::{DeviceMaterials, Shade, Shaded, ShadedMaterial, models_used, shade, shade_shader};
 pub use tone_map::{ToneMap, tone_map};
 #[cfg(feature = "viewer")]
 pub use ui::ui;

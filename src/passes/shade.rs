@@ -1,14 +1,13 @@
 //! Pass 2 of the paper (section 4.2): the radiance of every listed pixel, by its partition of the sample threads.
 use super::brdf_atlas::BrdfAtlas;
 use super::{CameraRays, Counters, DeviceIrradiance, DeviceLight, Tiles, View};
-use crate::Result;
 use crate::brdf::{Brdf, LobeShape, MADE_TABLE_SIZE, MaterialRecord, ThreadTableRecord, merl};
 use crate::graph::{BufferDesc, BufferHandle, FrameGraph, ImageDesc, ImageHandle};
 use crate::memo::Keyed;
-use crate::method::Method;
-use crate::scene::Pattern;
+use crate::method::{Method, Sampling};
 use crate::threads::{FittedTable, SliceTable, SplitSum, Threads};
-use crate::vulkan::{self, Bound, Buffer, ComputePipeline, Device, Sampler, SamplerKind};
+use crate::vulkan::{self, Bound, Buffer, ComputePipeline, Device, Sampler, SamplerKind, Shader, compiled};
+use crate::{Error, Result};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 use std::sync::Arc;
@@ -168,15 +167,19 @@ impl DeviceThreads {
     }
 }
 
-/// How a method samples.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Sampling {
-    /// Threads of a pixel, or samples of methods that have none.
-    pub count: u32,
-    /// What the random numbers of those start from.
-    pub seed: u64,
-    /// Where samples are drawn, by methods that have the choice. The shader is specialised by it.
-    pub pattern: Pattern,
+/// The variant of shade.comp that runs `method`.
+///
+/// # Errors
+/// The reference runs on the CPU.
+///
+/// # Panics
+/// A method in the table has no file in `glsl/methods/`.
+pub fn shade_shader(method: Method) -> Result<&'static Shader> {
+    if method == Method::Reference {
+        return Err(Error::input("method \"reference\"", "does not run on the GPU", "use another here"));
+    }
+    let variant = |shader: &&Shader| shader.name().strip_prefix("shade_") == Some(method.name());
+    Ok(compiled::ALL.iter().find(variant).expect("a test looks for the shader of every method"))
 }
 
 /// What the pass is made of.
@@ -306,4 +309,48 @@ pub fn shade<'a>(
             .indirect(counters, (0..pipelines.len()).map(dispatch));
     }
     Shaded { radiance, lookups }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::method::Lookups;
+
+    #[test]
+    fn every_method_has_a_shader_and_every_shader_a_method() {
+        let variants = compiled::ALL.iter().filter_map(|shader| shader.name().strip_prefix("shade_"));
+        for name in variants {
+            assert!(Method::from_name(name).is_ok_and(|method| method.name() == name), "{name} is not in the table");
+        }
+        for &method in Method::ALL.iter().filter(|method| method.runs_on_gpu()) {
+            assert_eq!(shade_shader(method).unwrap().name(), format!("shade_{}", method.name()));
+        }
+        assert!(shade_shader(Method::Reference).is_err());
+    }
+
+    #[test]
+    fn methods_have_a_pattern_where_their_shaders_declare_one() {
+        let declares = |shader: &Shader| shader.declares("FIXED_PATTERN").unwrap();
+        for &method in Method::ALL {
+            assert_eq!(shade_shader(method).is_ok_and(declares), method.has_pattern(), "{}", method.name());
+        }
+    }
+
+    #[test]
+    fn what_methods_look_up_is_what_their_shaders_declare() {
+        for &method in Method::ALL.iter().filter(|method| method.runs_on_gpu()) {
+            let declares = |name| shade_shader(method).unwrap().declares(name).unwrap();
+            let split_sum = declares("SplitSums");
+            let blurred = declares("irradiance_maps");
+            let declared = Lookups {
+                box_filtered: declares("environment_pyramid") && !blurred && !split_sum,
+                blurred,
+                map: declares("environment_map") && !blurred,
+                aliases: declares("LightAliases"),
+                slices: declares("Slices"),
+                split_sum,
+            };
+            assert_eq!(method.lookups(), declared, "{}", method.name());
+        }
+    }
 }

@@ -2,11 +2,10 @@
 use serde::{Deserialize, Serialize};
 
 use crate::error::Result;
-use crate::method::Method;
+use crate::method::{Method, Pattern};
 use crate::prepare::check_count;
 use crate::scene::{
-    Background, Camera, EnvironmentSource, MAX_SAMPLES, MAX_SIZE_PX, MaterialSource, MeshSource, Pattern, Scene,
-    Source, within,
+    Background, Camera, EnvironmentSource, MAX_SAMPLES, MAX_SIZE_PX, MaterialSource, MeshSource, Scene, Source, within,
 };
 use std::path::PathBuf;
 

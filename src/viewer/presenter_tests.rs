@@ -1,8 +1,9 @@
 //! Plans of frames in a window, one after another: what changes runs again, and nothing else does.
 use super::*;
 use crate::graph::{Kept, MemoryRequirement, Plan, ResourceInfo, ResourceKind, Work};
+use crate::method::Method;
 use crate::prepare::prepare;
-use crate::scene::{Method, Scene};
+use crate::scene::Scene;
 use crate::vulkan::Instance;
 
 /// Memory as a plain device would ask for it, so that plans are the same on all: 16 bytes a texel, multiples of 64 KiB.

@@ -187,8 +187,9 @@ mod tests {
     use std::f64::consts::FRAC_PI_2;
 
     use super::*;
+    use crate::method::Method;
     use crate::prepare::prepare;
-    use crate::scene::{Method, Scene, Source};
+    use crate::scene::{Scene, Source};
 
     /// The built-in sphere, with few threads.
     fn sphere(method: Method) -> Prepared {
