@@ -33,6 +33,8 @@ pub mod pipeline;
 pub mod prepare;
 #[path = "progress.rs"]
 pub mod progress;
+#[path = "rendering.rs"]
+pub mod rendering;
 #[path = "scene/mod.rs"]
 pub mod scene;
 #[path = "shading/mod.rs"]

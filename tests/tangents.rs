@@ -9,8 +9,8 @@ use threadlight::low_level::evaluate::{Comparable, Display, compare};
 use threadlight::low_level::geometry_texel::GeometryTexel;
 use threadlight::low_level::method::Sampling;
 use threadlight::low_level::picture::write_exr;
-use threadlight::low_level::pipeline::Rendering;
 use threadlight::low_level::prepare::{Prepared, prepare};
+use threadlight::low_level::rendering::Rendering;
 use threadlight::low_level::scene::{Background, Camera, MaterialSource, ObjectSettings, Scene, Source, TangentRule};
 use threadlight::low_level::shading::{CpuShader, Surface};
 

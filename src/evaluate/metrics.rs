@@ -73,7 +73,7 @@ pub struct Comparable {
 }
 
 impl Comparable {
-    /// Linear radiance times coverage, and coverage (as [`Rendering::radiance`](crate::pipeline::Rendering::radiance) has it), row by
+    /// Linear radiance times coverage, and coverage (as [`Rendering::radiance`](crate::rendering::Rendering::radiance) has it), row by
     /// row; coverage tells surface from background only if `alpha`.
     ///
     /// # Panics

@@ -5,13 +5,15 @@ use std::sync::Arc;
 use glam::DVec2;
 use serde::Serialize;
 
+use super::bare_lookups::time_bare_lookups;
 use super::cases::{Cases, Estimator, Place};
 use crate::environment::width_rad_of;
 use crate::error::{Error, Result};
 use crate::memo::{Key, Keyed, Memo};
 use crate::passes::{BareLookup, BareLookups, PlacedMesh};
-use crate::pipeline::{DeviceScene, Rendering, Wanted, median, time_bare_lookups};
+use crate::pipeline::{DeviceScene, Wanted, median};
 use crate::progress::{Observer, Parts};
+use crate::rendering::Rendering;
 use crate::steps::{BoxFilter, CheckDevice, pipelines};
 use crate::threads::fitted::kernel::FINEST_WIDTH_RAD;
 use crate::threads::fitted::{FittedTable, PackedKernel};

@@ -13,9 +13,10 @@ use super::sheet::over_grey;
 use crate::error::Result;
 use crate::memo::{Memo, Round};
 use crate::passes::View;
-use crate::pipeline::{Rendering, Wanted};
+use crate::pipeline::Wanted;
 use crate::prepare::Prepared;
 use crate::progress::{Observer, Parts};
+use crate::rendering::Rendering;
 use crate::vulkan::Device;
 
 /// What to measure, and how.

@@ -8,9 +8,10 @@ use super::speed::render;
 use super::tables::{Section, Table};
 use crate::error::Result;
 use crate::memo::{Memo, Round};
-use crate::pipeline::{DeviceScene, Rendering, median};
+use crate::pipeline::{DeviceScene, median};
 use crate::prepare::prepare;
 use crate::progress::{Observer, OnlyCancels, Parts};
+use crate::rendering::Rendering;
 use crate::scene::{EnvironmentSource, MaterialSettings, MaterialSource, ObjectSettings, Scene, Source};
 use crate::vulkan::Device;
 

@@ -11,6 +11,7 @@ mod device_check;
 mod geometry_cache;
 mod light;
 mod materials;
+mod picture_size;
 #[cfg(feature = "viewer")]
 mod present;
 mod readback;
@@ -34,9 +35,11 @@ pub use geometry_cache::{DeviceMesh, GeometryCache, PlacedMesh, PlacedTangent, g
 pub(crate) use geometry_cache::{GEOMETRY_STATE, geometry_shaders};
 pub use light::{DeviceIrradiance, DeviceLight, check_aliases};
 pub use materials::{DeviceMaterials, ShadedMaterial};
+pub(crate) use picture_size::check_cache_size;
+pub use picture_size::check_picture;
 #[cfg(feature = "viewer")]
 pub use present::{Area, present};
-pub use readback::{Readbacks, is_readback, texels};
+pub use readback::{Readbacks, texels};
 pub use region::Region;
 pub use shade::{Shade, Shaded, shade, shade_shader};
 pub use tone_map::{ToneMap, tone_map};
