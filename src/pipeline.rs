@@ -2,15 +2,14 @@
 use crate::Result;
 use crate::graph::{BufferHandle, Executable, FrameGraph, ImageHandle};
 use crate::light::finest_level;
-use crate::memo::{Held, Keyed, Round};
+use crate::memo::{Held, Round};
 use crate::passes::*;
-use crate::prepare::Prepared;
+use crate::prepare::{NamedMesh, Prepared};
 use crate::progress::Observer;
 use crate::rendering::Rendering;
-use crate::scene::Mesh;
 use crate::specialise::{ShadersOfMaterials, classify_constants};
 use crate::steps::{
-    CheckDevice, CompileCompute, CompileGeometryCache, UploadBackground, UploadIrradiance, UploadLight,
+    CheckDevice, CompileCompute, CompileGeometryCache, KeyedMaterial, UploadBackground, UploadIrradiance, UploadLight,
     UploadMaterials, UploadMesh, UploadShaders, light, pipelines,
 };
 use crate::vulkan::{Device, Frames, PassTime, Shader, compiled};
@@ -82,7 +81,9 @@ impl DeviceScene {
         pipelines(round, device)?;
         let way_around = round.ask(&CheckDevice(device))?.way_around(device)?;
         let geometry_cache = ask_geometry_cache(device, prepared, round)?;
-        let materials: Vec<_> = prepared.materials.iter().map(|m| (&m.brdf, m.threads.as_ref())).collect();
+        let materials = prepared.materials.iter();
+        let materials: Vec<_> =
+            materials.map(|m| KeyedMaterial { brdf: &m.brdf, threads: m.threads.as_ref() }).collect();
         let evaluates_brdf = method.evaluates_brdf(environment);
         let shaded = prepared.shaded();
         // Drafts follow each other faster than light could be uploaded and shaders compiled for what each of them needs.
@@ -200,7 +201,7 @@ impl DeviceScene {
 /// The pass that draws the objects of `prepared`, where the geometry cache of its view is within what `device` can do.
 fn ask_geometry_cache(device: &Arc<Device>, prepared: &Prepared, round: &Round) -> Result<GeometryCache> {
     check_cache_size(device, prepared.view.cache_size())?;
-    let upload = |(name, mesh): &(String, Keyed<Mesh>)| round.ask(&UploadMesh { device, name, mesh });
+    let upload = |NamedMesh { name, mesh }: &NamedMesh| round.ask(&UploadMesh { device, name, mesh });
     Ok(GeometryCache {
         pipeline: round.ask(&CompileGeometryCache { device, has_tangents: prepared.has_tangents() })?,
         meshes: prepared.meshes.iter().map(upload).collect::<Result<_>>()?,

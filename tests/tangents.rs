@@ -364,7 +364,7 @@ fn tangents_of_texture_coordinates_are_those_of_the_mesh_and_only_where_a_materi
         (Mat3::from_mat4(scene.objects[0].transform()), ready(&scene))
     };
     let (to_world, textured) = globe_of(true, "alpha_x = 0.1; alpha_y = 0.4; rotation_deg = 20");
-    assert!(textured.meshes.len() == 1 && !textured.meshes[0].1.tangents.is_empty());
+    assert!(textured.meshes.len() == 1 && !textured.meshes[0].mesh.tangents.is_empty());
     let rendering = gpu.render(&textured, EVERYTHING);
     let texels = seen(&textured, &rendering);
     let (mut compared, (sin, cos)) = (0, 20f32.to_radians().sin_cos());
@@ -380,9 +380,9 @@ fn tangents_of_texture_coordinates_are_those_of_the_mesh_and_only_where_a_materi
     }
     assert!(compared > 300, "{compared}");
     let (_, isotropic) = globe_of(true, "alpha = 0.2");
-    assert!(isotropic.meshes[0].1.tangents.is_empty() && !isotropic.has_tangents());
+    assert!(isotropic.meshes[0].mesh.tangents.is_empty() && !isotropic.has_tangents());
     let (_, plain) = globe_of(false, "alpha_x = 0.1; alpha_y = 0.4");
-    assert!(plain.meshes.len() == 1 && plain.meshes[0].1.tangents.is_empty());
+    assert!(plain.meshes.len() == 1 && plain.meshes[0].mesh.tangents.is_empty());
     assert_eq!(plain.objects[0].tangent.expect("a tangent").rule, TangentRule::DEFAULT);
     gpu.finish();
 }

@@ -185,8 +185,8 @@ impl Growing {
             Self::Subpixels => place.prepared.view.subpixels = step,
             Self::Threads => {}
             Self::Triangles => {
-                for (_, mesh) in &mut place.prepared.meshes {
-                    *mesh = (0..step).fold(mesh.clone(), |mesh, _| {
+                for named in &mut place.prepared.meshes {
+                    named.mesh = (0..step).fold(named.mesh.clone(), |mesh, _| {
                         Keyed::new(Key::builder("subdivided").key(mesh.key).build(), mesh.subdivided())
                     });
                 }
@@ -253,7 +253,7 @@ impl Entrant {
         let cache = pipelines(&round, device)?;
         let floor = BareLookups::new(device, &cache, &pyramid, [pixels, of_row], &rows, way_around)?;
         time_bare_lookups(device, &floor)?;
-        let triangles = |object: &PlacedMesh| prepared.meshes[object.mesh].1.indices.len() as u64 / 3;
+        let triangles = |object: &PlacedMesh| prepared.meshes[object.mesh].mesh.indices.len() as u64 / 3;
         let frame = TimedFrame {
             method: prepared.variant().name(),
             threads,

@@ -13,6 +13,7 @@ use crate::error::{Error, Result};
 use crate::files::file_formats;
 use crate::method::{Method, Pattern};
 
+mod bounding_sphere;
 pub mod camera;
 mod custom_mesh;
 mod drawing_order;
@@ -23,6 +24,7 @@ mod polygon;
 mod tangent_rule;
 mod texture_tangents;
 
+pub use bounding_sphere::BoundingSphere;
 pub use camera::Camera;
 pub use custom_mesh::CustomMesh;
 pub use mesh::Mesh;

@@ -10,6 +10,7 @@ use crate::environment::Environment;
 use crate::evaluate::Display;
 use crate::passes::View;
 use crate::prepare::Prepared;
+use crate::scene::BoundingSphere;
 use crate::scene::mesh::Hit;
 use crate::threads::Threads;
 
@@ -36,18 +37,18 @@ pub struct Surface {
 impl Surface {
     /// What of `prepared`, whose objects are within these `spheres`, is seen in column `x` and row `y` of its picture from `view` (pixel
     /// centres have halves); none for the background.
-    pub fn under(prepared: &Prepared, spheres: &[(DVec3, f64)], view: &View, x: f64, y: f64) -> Option<Self> {
+    pub fn under(prepared: &Prepared, spheres: &[BoundingSphere], view: &View, x: f64, y: f64) -> Option<Self> {
         let direction = view.camera.ray(x - 0.5, y - 0.5, view.width, view.height);
-        let meets = |&(centre, radius): &(DVec3, f64)| {
+        let meets = |sphere: &BoundingSphere| {
             // Rounding is far below a thousandth.
-            (centre - view.camera.eye).reject_from(direction).length() <= 1.001 * radius
+            (sphere.centre - view.camera.eye).reject_from(direction).length() <= 1.001 * sphere.radius
         };
         let near = prepared.objects.iter().zip(spheres).filter(|(_, sphere)| meets(sphere));
         let hits = near.filter_map(|(object, _)| {
             let to_object = object.to_world.inverse();
             let origin = to_object.transform_point3(view.camera.eye);
             let along = to_object.transform_vector3(direction);
-            let Hit { distance, normal, tangent: of_mesh } = prepared.meshes[object.mesh].1.hit(origin, along)?;
+            let Hit { distance, normal, tangent: of_mesh } = prepared.meshes[object.mesh].mesh.hit(origin, along)?;
             let tangent = object.tangent.map(|tangent| {
                 let of_surface = tangent.rule.at((origin + distance * along).as_vec3(), of_mesh.as_vec3()).as_dvec3();
                 (object.to_world.matrix3 * of_surface, tangent.turn())
