@@ -189,7 +189,7 @@ impl Viewer {
                     }
                 }
             }
-            Input::Scroll(scroll) => self.move_camera(|orbit| orbit.zoom((*scroll).into())),
+            Input::Scroll(scroll) => self.move_camera(|orbit| orbit.zoom(*scroll)),
             Input::Key(key) => self.press(key),
             Input::Drop(path) => match change_of_dropped(path)? {
                 Dropped::Change(change) => self.change(&change),

@@ -6,6 +6,7 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use glam::{DQuat, DVec2, DVec3};
 
+use super::input::Scroll;
 use crate::scene::{BoundingSphere, Camera};
 
 /// A drag across the height of the image turns by half a circle.
@@ -24,15 +25,6 @@ const NEAREST: f64 = 1e-3;
 const FARTHEST: f64 = 1e3;
 /// The turntable turns once in so many seconds.
 const TURNTABLE_S: f64 = 20.0;
-
-/// How far a wheel or a touchpad scrolled; positive away from the user.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Scroll {
-    /// Notches of a wheel.
-    Lines(f64),
-    /// Pixels of a touchpad, at a scale of the display of 1.
-    Pixels(f64),
-}
 
 /// A camera that moves on a sphere around what it looks at. Motions that are not finite do nothing.
 #[derive(Clone, Copy, Debug, PartialEq)]
