@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::cases::{Cases, Place, Shard};
 use super::expected::TrueSample;
-use super::metrics::{Comparable, Metrics, check_size, compare};
+use super::metrics::{Comparable, Metrics, check_comparable_size, compare};
 use super::reference::{ReferenceImage, TOLERANCE};
 use super::sheet::over_grey;
 use crate::error::Result;
@@ -151,7 +151,7 @@ pub fn run(
     measured: &mut Measured,
 ) -> Result<()> {
     for (_, scene) in &sweep.cases.scenes {
-        check_size(scene.image.width as usize, scene.image.height as usize)?;
+        check_comparable_size(scene.image.width as usize, scene.image.height as usize)?;
     }
     let rows = Parts::new(sweep.row_count(), observer);
     sweep.cases.for_each_place(memo, observer, &mut |place| {

@@ -6,7 +6,7 @@ use glam::DVec3;
 pub struct BoundingSphere {
     /// Its centre.
     pub centre: DVec3,
-    /// Its radius, in units of length of its space.
+    /// Its radius, in the unit of length of its space.
     pub radius: f64,
 }
 

@@ -289,9 +289,7 @@ impl Scene {
         let material = self.objects.first().map(|object| object.material.clone()).unwrap_or_default();
         self.objects = vec![ObjectSettings::new(mesh, &material)];
     }
-}
 
-impl Scene {
     /// The files that it names: of its environment, its meshes and its materials, with those under their coats.
     pub fn files(&self) -> Vec<PathBuf> {
         let of_meshes = self.objects.iter().filter_map(|object| object.mesh.file());

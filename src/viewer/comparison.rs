@@ -122,8 +122,8 @@ pub fn compare_with(
 /// Linear radiance times coverage of the objects alone, and coverage.
 fn render(prepared: &Prepared, device: &Arc<Device>, round: &Round) -> Result<Vec<[f32; 4]>> {
     let objects = Prepared { show_environment: false, ..prepared.clone() };
-    let renderer = DeviceScene::new(device, &objects, round)?;
-    Ok(renderer.render(Wanted { radiance: true, ..Wanted::default() }, 1)?.radiance)
+    let device_scene = DeviceScene::new(device, &objects, round)?;
+    Ok(device_scene.render(Wanted { radiance: true, ..Wanted::default() }, 1)?.radiance)
 }
 
 fn name_of(prepared: &Prepared) -> String {

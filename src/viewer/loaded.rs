@@ -22,7 +22,7 @@ pub struct Loaded {
     /// The same around all of them.
     pub sphere: BoundingSphere,
     /// On the device.
-    pub renderer: Arc<DeviceScene>,
+    pub device_scene: Arc<DeviceScene>,
     /// What it was made of.
     pub key: Option<Key>,
     /// The change that it was asked for by: [`super::latency::Latency::asked`].
@@ -46,13 +46,13 @@ impl Loaded {
         change: u64,
     ) -> Result<Self> {
         prepared.view = prepared.view.fit(longest_side);
-        let renderer = Arc::new(DeviceScene::new(device, &prepared, round)?);
+        let device_scene = Arc::new(DeviceScene::new(device, &prepared, round)?);
         let files = prepared.scene.files().into_iter();
         let files = files.filter_map(|path| round.memo().file_key(&path).ok().map(|key| (path, key))).collect();
         // Of every vertex, so not found anew for each frame.
         let spheres = prepared.spheres();
         let sphere = BoundingSphere::around(&spheres);
-        Ok(Self { prepared: Arc::new(prepared), spheres: spheres.into(), sphere, renderer, key, change, files })
+        Ok(Self { prepared: Arc::new(prepared), spheres: spheres.into(), sphere, device_scene, key, change, files })
     }
 
     /// Whether some of its threads only stand in for those that are being made.
