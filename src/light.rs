@@ -4,7 +4,7 @@ use crate::environment::sources::clearance;
 use crate::environment::{Environment, Pyramid, VmfPyramid};
 use crate::memo::Keyed;
 use crate::threads::fitted::kernel::FINEST_WIDTH_RAD;
-use crate::threads::{FittedTable, GivingWay, Threads, WithThreads};
+use crate::threads::{FittedTable, GivingWay, ShadedLobe, Threads};
 
 /// What a method looks up of an environment, as far as it has to be filtered.
 #[derive(Clone, Default)]
@@ -134,9 +134,9 @@ impl KernelNeeds {
     }
 
     /// What those of `materials` do, where the environment without its small sources is blurred as `rest`.
-    pub fn of(environment: &Environment, materials: &[WithThreads], rest: &VmfPyramid) -> Self {
+    pub fn of(environment: &Environment, materials: &[ShadedLobe], rest: &VmfPyramid) -> Self {
         let sources = environment.small_sources();
-        let mirrors = |(lobe, threads): &WithThreads| {
+        let mirrors = |&ShadedLobe { lobe, threads }: &ShadedLobe| {
             let giving_way = threads.and_then(|threads| threads.giving_way(lobe));
             giving_way.is_some_and(|GivingWay { lobe_radius_rad, clear: [_, clear] }| {
                 // At grazing views, where it is narrowest.
@@ -147,7 +147,7 @@ impl KernelNeeds {
         };
         let is_sharp = |threads: &Threads| sharp_from(threads, rest).is_some();
         Self {
-            map: materials.iter().any(|(_, threads)| threads.is_some_and(is_sharp)),
+            map: materials.iter().any(|material| material.threads.is_some_and(is_sharp)),
             sources: environment.has_small_sources(),
             mirrored_sources: materials.iter().any(mirrors),
         }

@@ -19,7 +19,7 @@ pub mod graph;
 pub mod light;
 #[path = "memo/mod.rs"]
 pub mod memo;
-#[path = "method.rs"]
+#[path = "method/mod.rs"]
 pub mod method;
 #[path = "packing.rs"]
 pub mod packing;
@@ -33,6 +33,8 @@ pub mod pipeline;
 pub mod prepare;
 #[path = "progress.rs"]
 pub mod progress;
+#[path = "rendering.rs"]
+pub mod rendering;
 #[path = "scene/mod.rs"]
 pub mod scene;
 #[path = "shader_constants.rs"]

@@ -1,22 +1,19 @@
-//! The method on one screen: the frame as a graph of passes, and the renderer that runs it.
+//! The method on one screen: the frame as a graph of passes, and the scene on a device that runs it.
+use crate::Result;
 use crate::graph::{BufferHandle, Executable, FrameGraph, ImageHandle};
 use crate::light::finest_level;
-use crate::memo::{Held, Keyed, Round};
-use crate::method::Method;
+use crate::memo::{Held, Round};
 use crate::passes::*;
-use crate::picture::{self, ExrHeader, Format};
-use crate::prepare::Prepared;
+use crate::prepare::{NamedMesh, Prepared};
 use crate::progress::Observer;
-use crate::scene::{ImageSettings, Mesh, Scene};
+use crate::rendering::Rendering;
 use crate::specialise::{ShadersOfMaterials, classify_constants};
 use crate::statistics::median;
 use crate::steps::{
-    CheckDevice, CompileCompute, CompileGeometryCache, UploadBackground, UploadIrradiance, UploadLight,
+    CheckDevice, CompileCompute, CompileGeometryCache, KeyedMaterial, UploadBackground, UploadIrradiance, UploadLight,
     UploadMaterials, UploadMesh, UploadShaders, light, pipelines,
 };
 use crate::vulkan::{Device, Frames, PassTime, Shader, compiled};
-use crate::{Error, Result};
-use std::path::Path;
 use std::sync::Arc;
 
 /// Which results of a frame are wanted; what none of them needs is not computed.
@@ -40,15 +37,15 @@ impl Wanted {
 /// The frame: pass 1 and pass 2 of the paper and what surrounds them.
 pub(crate) fn declare<'a>(
     graph: &mut FrameGraph<'a>,
-    renderer: &'a DeviceScene,
+    device_scene: &'a DeviceScene,
     region: Region,
     view: &'a View,
 ) -> Frame {
-    let geometry = geometry_cache(graph, &renderer.geometry_cache, region, view); // pass 1 of the paper
-    let tiles = classify(graph, &renderer.classify, geometry, region, view);
-    let Shaded { radiance, lookups } = shade(graph, &renderer.shade, geometry, &tiles, view); // pass 2 of the paper
-    let radiance = background(graph, &renderer.background, radiance, &tiles, view);
-    let display = tone_map(graph, &renderer.tone_map, radiance, view);
+    let geometry = geometry_cache(graph, &device_scene.geometry_cache, region, view); // pass 1 of the paper
+    let tiles = classify(graph, &device_scene.classify, geometry, region, view);
+    let Shaded { radiance, lookups } = shade(graph, &device_scene.shade, geometry, &tiles, view); // pass 2 of the paper
+    let radiance = background(graph, &device_scene.background, radiance, &tiles, view);
+    let display = tone_map(graph, &device_scene.tone_map, radiance, view);
     Frame { geometry, counters: tiles.counters, lookups, radiance, display }
 }
 
@@ -73,33 +70,8 @@ pub struct DeviceScene {
     tone_map: ToneMap,
     way_around: Option<WayAround>,
     device: Arc<Device>,
-    /// All that its round was asked for: what the next renderer has in common with this one is not made again.
+    /// All that its round was asked for: what the next one has in common with this one is not made again.
     _held: Held,
-}
-
-/// Results of a rendering, as far as they were wanted.
-#[derive(Clone, Debug, Default)]
-pub struct Rendering {
-    /// RGBA, linear radiance times coverage, row by row from the top left.
-    pub radiance: Vec<[f32; 4]>,
-    /// RGBA, 8 bits each; colour not multiplied by alpha.
-    pub display: Vec<u8>,
-    /// Texels of the geometry cache, row by row at sub-pixel resolution.
-    pub geometry: Vec<[u32; 2]>,
-    /// What the classification counted.
-    pub counters: Counters,
-    /// Lookups in the environment that shading made.
-    pub lookups: u64,
-    /// Time on the GPU by pass, median over the repetitions; empty where the device cannot tell.
-    pub passes: Vec<PassTime>,
-    /// From the start of recording until the GPU is done, in milliseconds: median over the repetitions.
-    pub frame_ms: f64,
-    /// Device memory in use while rendering.
-    pub device_memory_bytes: u64,
-    /// The plan of the frame as text.
-    pub plan: String,
-    /// How a fault of the device was got around, if it has one.
-    pub way_around: Option<WayAround>,
 }
 
 impl DeviceScene {
@@ -112,12 +84,14 @@ impl DeviceScene {
         let compile = |shader: &'static Shader, constants: &[(&'static str, u32)]| {
             round.ask(&CompileCompute { device, shader, constants })
         };
-        let shader = method.shader()?;
+        let shader = shade_shader(method)?;
         // Held, so that it is opened once for all that is compiled.
         pipelines(round, device)?;
         let way_around = round.ask(&CheckDevice(device))?.way_around(device)?;
         let geometry_cache = ask_geometry_cache(device, prepared, round)?;
-        let materials: Vec<_> = prepared.materials.iter().map(|m| (&m.brdf, m.threads.as_ref())).collect();
+        let materials = prepared.materials.iter();
+        let materials: Vec<_> =
+            materials.map(|m| KeyedMaterial { brdf: &m.brdf, threads: m.threads.as_ref() }).collect();
         let evaluates_brdf = method.evaluates_brdf(environment);
         let shaded = prepared.shaded();
         // Drafts follow each other faster than light could be uploaded and shaders compiled for what each of them needs.
@@ -232,96 +206,15 @@ impl DeviceScene {
     }
 }
 
-impl Rendering {
-    /// What an EXR file of it, rendered from `prepared` on the device of this name, says of how it was made.
-    pub fn exr_header(&self, prepared: &Prepared, device: &str) -> ExrHeader {
-        let materials: Vec<_> = prepared.materials.iter().map(|material| material.name.as_str()).collect();
-        ExrHeader {
-            method: prepared.variant().name(),
-            threads: prepared.sampling.count,
-            material: materials.join(", "),
-            environment: prepared.environment.name.clone(),
-            device: self.way_around.map_or(device.to_owned(), |way| format!("{device}, by {}", way.name())),
-            seconds: self.frame_ms * 1e-3,
-            ..ExrHeader::default()
-        }
-    }
-
-    /// Writes the picture that `image` says, in the format that its name at `path` asks for: display values to a `.png`, linear radiance to an
-    /// `.exr` with this header.
-    ///
-    /// # Errors
-    /// Another extension, or a place that cannot be written to.
-    pub fn write(&self, path: &Path, image: &ImageSettings, header: &ExrHeader) -> Result<()> {
-        let &ImageSettings { width, height, .. } = image;
-        match Format::of(path)? {
-            Format::Png => picture::write_png(path, width, height, &self.display, image.has_alpha()),
-            Format::Exr => picture::write_exr(path, width, height, &self.radiance, image.has_alpha(), header),
-        }
-    }
-
-    /// Time on the GPU of all passes but those that copy results back, in milliseconds.
-    pub fn gpu_ms(&self) -> f64 {
-        self.passes.iter().filter(|pass| !pass.is_readback()).map(|pass| pass.gpu_ms).sum()
-    }
-
-    /// Time on the GPU of pass 2 alone, in milliseconds.
-    pub fn shade_ms(&self) -> f64 {
-        self.pass_ms(SHADE_PASS)
-    }
-
-    /// Time on the GPU of the pass of this name, in milliseconds; 0 if there is none.
-    pub fn pass_ms(&self, name: &str) -> f64 {
-        PassTime::ms_of(&self.passes, name)
-    }
-}
-
-impl PassTime {
-    /// Whether the pass only copies results into memory that the CPU reads.
-    pub fn is_readback(&self) -> bool {
-        is_readback(&self.name)
-    }
-}
-
 /// The pass that draws the objects of `prepared`, where the geometry cache of its view is within what `device` can do.
 fn ask_geometry_cache(device: &Arc<Device>, prepared: &Prepared, round: &Round) -> Result<GeometryCache> {
-    check_size(device, &prepared.view)?;
-    let upload = |(name, mesh): &(String, Keyed<Mesh>)| round.ask(&UploadMesh { device, name, mesh });
+    check_cache_size(device, prepared.view.cache_size())?;
+    let upload = |NamedMesh { name, mesh }: &NamedMesh| round.ask(&UploadMesh { device, name, mesh });
     Ok(GeometryCache {
         pipeline: round.ask(&CompileGeometryCache { device, has_tangents: prepared.has_tangents() })?,
         meshes: prepared.meshes.iter().map(upload).collect::<Result<_>>()?,
         objects: prepared.objects.clone(),
     })
-}
-
-/// An error for a view whose geometry cache is larger than images of `device` can be.
-pub(crate) fn check_size(device: &Device, view: &View) -> Result<()> {
-    check_cache_size(device, view.cache_size())
-}
-
-/// The same for the picture of a `scene` that has not been prepared yet.
-///
-/// # Errors
-/// More sub-pixels along a side than images of `device` can have, or more pixels than its shaders can list at 4 bytes each.
-pub fn check_picture(device: &Device, Scene { image, shading, .. }: &Scene) -> Result<()> {
-    let &ImageSettings { width, height, subpixels, .. } = image;
-    check_cache_size(device, [width, height].map(|side| side.saturating_mul(subpixels)))?;
-    let most = device.limits().max_storage_buffer_range / 4;
-    // The reference draws the geometry cache alone.
-    if u64::from(width) * u64::from(height) <= most.into() || shading.method == Method::Reference {
-        return Ok(());
-    }
-    let problem = format!("is {width} x {height}, and shaders of this device list at most {most} pixels");
-    Err(Error::input("image size", problem, "use a smaller --size"))
-}
-
-fn check_cache_size(device: &Device, [width, height]: [u32; 2]) -> Result<()> {
-    let largest = device.limits().max_image_dimension2_d;
-    if width.max(height) <= largest {
-        return Ok(());
-    }
-    let problem = format!("needs {width} x {height} sub-pixels, this device's images have at most {largest} a side");
-    Err(Error::input("image size", problem, "use a smaller --size or fewer --subpixels"))
 }
 
 /// Only pass 1 of the paper: the texels of the geometry cache, as [`Rendering::geometry`] has them. Needs no threads.
@@ -336,23 +229,6 @@ pub fn render_geometry(device: &Arc<Device>, prepared: &Prepared, round: &Round)
     let target = readbacks.image("geometry", geometry, prepared.view.cache_size(), 8, true)?;
     readbacks.run("geometry")?;
     Ok(texels(target.as_deref()))
-}
-
-/// The floor of shading: milliseconds on the GPU that `bare` takes, and the sums of its lookups, rgb.
-///
-/// # Errors
-/// Whatever Vulkan refuses.
-pub fn time_bare_lookups(device: &Arc<Device>, bare: &BareLookups) -> Result<(f64, Vec<[f32; 4]>)> {
-    let mut graph = FrameGraph::new();
-    let sums = bare_lookups(&mut graph, bare);
-    let mut readbacks = Readbacks::new(device, graph);
-    let target = readbacks.buffer("sums", sums, bare.sums_bytes())?;
-    let Readbacks { graph, imports, .. } = readbacks;
-    let executable = Executable::new(device, graph, &imports)?;
-    let mut frames = Frames::new(device, "bare lookups", 1)?;
-    let passes = executable.execute_timed(device, &mut frames, &())?;
-    let gpu_ms = passes.iter().filter(|pass| !pass.is_readback()).map(|pass| pass.gpu_ms).sum();
-    Ok((gpu_ms, texels(Some(&target))))
 }
 
 #[cfg(test)]

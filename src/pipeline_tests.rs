@@ -1,8 +1,9 @@
 //! Pictures that are not finished, since the device is lost or out of memory on the way.
 use super::*;
 use crate::memo::Memo;
+use crate::method::Method;
 use crate::prepare::prepare;
-use crate::scene::{Method, Scene, Source};
+use crate::scene::{Scene, Source};
 use crate::vulkan::Instance;
 use crate::vulkan::faults::{Fault, with_fault};
 use ash::vk::Result as Call;

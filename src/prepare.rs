@@ -3,14 +3,14 @@ use crate::brdf::{Brdf, LobeShape};
 use crate::environment::Environment;
 use crate::geometry_texel::MAX_MATERIALS;
 use crate::memo::{Key, Keyed, Memo, Round, Step};
-use crate::method::{Method, Variant};
-use crate::passes::{PlacedMesh, PlacedTangent, Sampling, SmoothVariance, View};
-use crate::scene::{Camera, MaterialSource, Mesh, MeshSource, Scene, TangentRule};
+use crate::method::{Method, Sampling, Variant};
+use crate::passes::{PlacedMesh, PlacedTangent, SmoothVariance, View};
+use crate::scene::{BoundingSphere, Camera, MaterialSource, Mesh, MeshSource, Scene, TangentRule};
 use crate::steps::{DraftThreads, FindLobe, FitThreads, LoadBrushedMesh, LoadEnvironment, LoadMaterial, LoadMesh};
 use crate::threads::azimuths::azimuth_count;
-use crate::threads::{ThreadSettings, Threads, WithThreads};
+use crate::threads::{ShadedLobe, ThreadSettings, Threads};
 use crate::{Error, Result};
-use glam::{DAffine3, DVec3};
+use glam::DAffine3;
 use std::cell::Cell;
 
 /// A scene with all its files read and its threads made. Cheap to clone.
@@ -38,8 +38,14 @@ pub struct Prepared {
     pub is_draft: bool,
 }
 
-/// A mesh and its name in the scene.
-pub type NamedMesh = (String, Keyed<Mesh>);
+/// A mesh that some object has.
+#[derive(Clone)]
+pub struct NamedMesh {
+    /// Name in the scene.
+    pub name: String,
+    /// Its triangles.
+    pub mesh: Keyed<Mesh>,
+}
 
 /// A material that some object has.
 #[derive(Clone)]
@@ -84,8 +90,8 @@ impl PreparedMaterial {
     }
 
     /// Its lobe and threads.
-    pub fn shaded(&self) -> WithThreads<'_> {
-        (&self.lobe, self.threads.as_deref())
+    pub fn shaded(&self) -> ShadedLobe<'_> {
+        ShadedLobe { lobe: &self.lobe, threads: self.threads.as_deref() }
     }
 }
 
@@ -215,9 +221,9 @@ fn prepare_by(scene: &Scene, round: &Round, ask_threads: &AskThreads) -> Result<
     let environment = round.ask(&LoadEnvironment(&scene.environment.source))?;
     let spheres = world_spheres(&meshes, &objects);
     for (object, &sphere) in objects.iter().zip(&spheres) {
-        check_size(&meshes[object.mesh].0, sphere)?;
+        check_object_size(&meshes[object.mesh].name, sphere)?;
     }
-    let view = view_of(scene, bounding_sphere(&spheres))?;
+    let view = view_of(scene, BoundingSphere::around(&spheres))?;
     check_materials(scene)?;
     let mut materials = Vec::new();
     for name in scene.used_materials() {
@@ -247,7 +253,7 @@ fn prepare_by(scene: &Scene, round: &Round, ask_threads: &AskThreads) -> Result<
     Ok(prepared)
 }
 
-/// The key of all that a renderer of `scene` is made of: of all but what a frame is given anew each time, such as the camera.
+/// The key of all that `scene` on a device is made of: of all but what a frame is given anew each time, such as the camera.
 ///
 /// # Errors
 /// A file that cannot be read, a model that there is not.
@@ -294,8 +300,8 @@ fn place_meshes(scene: &Scene, round: &Round) -> Result<(Vec<NamedMesh>, Vec<Pla
 
 /// The place of `mesh`, which comes from `source`, among `meshes`: the last if it was not yet there.
 fn index_of_mesh(meshes: &mut Vec<NamedMesh>, mesh: Keyed<Mesh>, source: &MeshSource) -> usize {
-    meshes.iter().position(|(_, known)| known.key == mesh.key).unwrap_or_else(|| {
-        meshes.push((source.to_string(), mesh));
+    meshes.iter().position(|known| known.mesh.key == mesh.key).unwrap_or_else(|| {
+        meshes.push(NamedMesh { name: source.to_string(), mesh });
         meshes.len() - 1
     })
 }
@@ -310,16 +316,16 @@ fn check_materials(scene: &Scene) -> Result<()> {
     Err(Error::input("materials", problem, "use fewer"))
 }
 
-/// The view of `scene`, whose objects are within a sphere of this centre and radius.
+/// The view of `scene`, whose objects are within `sphere`.
 ///
 /// # Errors
 /// Objects that no camera can frame.
-pub fn view_of(scene: &Scene, (centre, radius): (DVec3, f64)) -> Result<View> {
+pub fn view_of(scene: &Scene, sphere: BoundingSphere) -> Result<View> {
     let image = &scene.image;
     let camera = match scene.camera {
         Some(camera) => camera,
         None => {
-            let camera = Camera::framing(centre, radius, image.aspect());
+            let camera = Camera::framing(sphere.centre, sphere.radius, image.aspect());
             camera.validate().map_err(|problem| {
                 let problem = format!("cannot be chosen: {problem}");
                 Error::input("[camera]", problem, "give eye and target in the scene file")
@@ -345,8 +351,8 @@ impl Prepared {
         Self { show_environment: false, ..self.clone() }
     }
 
-    /// Centre and radius of a sphere around each object, in world space.
-    pub fn spheres(&self) -> Vec<(DVec3, f64)> {
+    /// A sphere around each object, in world space.
+    pub fn spheres(&self) -> Vec<BoundingSphere> {
         world_spheres(&self.meshes, &self.objects)
     }
 
@@ -368,7 +374,7 @@ impl Prepared {
             }
             let name = &self.materials[material].name;
             let rule = match settings.tangent {
-                Some(TangentRule::Uv) if self.meshes[object.mesh].1.tangents.is_empty() => None,
+                Some(TangentRule::Uv) if self.meshes[object.mesh].mesh.tangents.is_empty() => None,
                 rule => rule,
             };
             match settings.tangent {
@@ -420,7 +426,7 @@ impl Prepared {
     }
 
     /// Lobe and threads of each material.
-    pub fn shaded(&self) -> Vec<WithThreads<'_>> {
+    pub fn shaded(&self) -> Vec<ShadedLobe<'_>> {
         self.materials.iter().map(PreparedMaterial::shaded).collect()
     }
 }
@@ -439,15 +445,15 @@ pub(crate) fn check_count(method: Method, count: u32, subpixels: u32) -> Result<
     Err(Error::input("threads", problem, remedy))
 }
 
-/// Centre and radius of a sphere in world space for each object, that holds it.
-fn world_spheres(meshes: &[NamedMesh], objects: &[PlacedMesh]) -> Vec<(DVec3, f64)> {
-    let of_meshes: Vec<_> = meshes.iter().map(|(_, mesh)| mesh.bounding_sphere()).collect();
+/// A sphere in world space for each object, that holds it.
+fn world_spheres(meshes: &[NamedMesh], objects: &[PlacedMesh]) -> Vec<BoundingSphere> {
+    let of_meshes: Vec<_> = meshes.iter().map(|named| named.mesh.bounding_sphere()).collect();
     objects.iter().map(|object| object.placed_sphere(of_meshes[object.mesh])).collect()
 }
 
-/// An error for objects so large, small or far off that single precision, in which the GPU computes, would not hold areas
-/// of their triangles.
-fn check_size(mesh: &str, (centre, radius): (DVec3, f64)) -> Result<()> {
+/// An error for an object so large, small or far off that single precision, in which the GPU computes, would not hold areas
+/// of its triangles.
+fn check_object_size(mesh: &str, BoundingSphere { centre, radius }: BoundingSphere) -> Result<()> {
     const SMALLEST: f64 = 1e-9;
     const LARGEST: f64 = 1e9;
     let remedy = format!("scale and place it such that both are from {SMALLEST:e} to {LARGEST:e}");
@@ -457,13 +463,4 @@ fn check_size(mesh: &str, (centre, radius): (DVec3, f64)) -> Result<()> {
         return Ok(());
     }
     Err(Error::input(mesh, format!("is {size:.2e} in size and reaches {reach:.2e} from the origin"), remedy))
-}
-
-/// A sphere around `spheres`: centre of their box, and the radius that reaches the farthest.
-pub fn bounding_sphere(spheres: &[(DVec3, f64)]) -> (DVec3, f64) {
-    let low = spheres.iter().fold(DVec3::INFINITY, |low, (centre, radius)| low.min(*centre - *radius));
-    let high = spheres.iter().fold(DVec3::NEG_INFINITY, |high, (centre, radius)| high.max(*centre + *radius));
-    let middle = (low + high) / 2.0;
-    let reach = spheres.iter().map(|(centre, radius)| centre.distance(middle) + radius).fold(0.0, f64::max);
-    (middle, reach)
 }

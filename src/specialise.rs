@@ -1,8 +1,9 @@
 //! By which constants shaders are specialised for what a scene has: what it does not need is compiled out.
+use crate::brdf::{Brdf, LobeShape};
 use crate::light::{BlurredLight, KernelNeeds, sharp_from};
-use crate::passes::{ShaderOfMaterial, models_used};
+use crate::method::Pattern;
+use crate::passes::ShaderOfMaterial;
 use crate::prepare::{Prepared, PreparedMaterial};
-use crate::scene::Pattern;
 use crate::threads::Threads;
 
 /// Views from this angle on are grazing, in radians: a quarter of a sphere is seen at 60 degrees or more. Kernels that look up the environment as it is
@@ -106,6 +107,12 @@ fn shade_constants(prepared: &Prepared, materials: &[PreparedMaterial], needs: O
         constants.push(("HAS_UNEVEN_RIM", has_uneven_rim.into()));
     }
     constants
+}
+
+/// Bit i: a material has the BRDF of model i, and it is evaluated.
+fn models_used<'a>(materials: impl Iterator<Item = (&'a Brdf, &'a LobeShape)>, evaluates_brdf: bool) -> u32 {
+    let bits = materials.filter(|_| evaluates_brdf).map(|(brdf, lobe)| 1 << brdf.model_index(lobe));
+    bits.fold(0, |all, bit| all | bit)
 }
 
 #[cfg(test)]

@@ -11,8 +11,8 @@ use threadlight::low_level::evaluate::{Comparable, Display};
 use threadlight::low_level::geometry_texel::GeometryTexel;
 use threadlight::low_level::memo::Memo;
 use threadlight::low_level::picture::write_exr;
-use threadlight::low_level::pipeline::Rendering;
 use threadlight::low_level::prepare::{Prepared, prepare};
+use threadlight::low_level::rendering::Rendering;
 use threadlight::low_level::scene::{Background, Scene, Source};
 use threadlight::low_level::vulkan::{Instance, describe_devices};
 

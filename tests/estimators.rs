@@ -11,13 +11,14 @@ use threadlight::low_level::evaluate::Display;
 use threadlight::low_level::evaluate::reference::Integrator;
 use threadlight::low_level::geometry_texel::GeometryTexel;
 use threadlight::low_level::memo::Memo;
-use threadlight::low_level::method::{Method, Variant};
+use threadlight::low_level::method::{Method, Pattern, Variant};
 use threadlight::low_level::picture::write_exr;
-use threadlight::low_level::pipeline::{Rendering, Wanted};
+use threadlight::low_level::pipeline::Wanted;
 use threadlight::low_level::prepare::Prepared;
+use threadlight::low_level::rendering::Rendering;
 use threadlight::low_level::scene::{
-    Background, EnvironmentSource, MAX_SAMPLES, MAX_SUBPIXELS, MaterialSettings, MaterialSource, ObjectSettings,
-    Pattern, Scene, Source,
+    Background, EnvironmentSource, MAX_SAMPLES, MAX_SUBPIXELS, MaterialSettings, MaterialSource, ObjectSettings, Scene,
+    Source,
 };
 use threadlight::low_level::shading::{CpuShader, Surface};
 

@@ -328,7 +328,7 @@ fn a_mesh_file_and_a_builtin_of_its_name_are_two() {
     ];
     let memo = Memo::default();
     let prepared = prepare(&scene, &memo.round(&())).unwrap();
-    let triangles: Vec<_> = prepared.meshes.iter().map(|(_, mesh)| mesh.indices.len() / 3).collect();
+    let triangles: Vec<_> = prepared.meshes.iter().map(|named| named.mesh.indices.len() / 3).collect();
     assert!(triangles.len() == 2 && triangles[0] > 1000 && triangles[1] == 1, "{triangles:?}");
 }
 

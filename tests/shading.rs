@@ -12,8 +12,9 @@ use threadlight::low_level::evaluate::{Comparable, Display, compare};
 use threadlight::low_level::geometry_texel::GeometryTexel;
 use threadlight::low_level::memo::{Key, Keyed, Memo};
 use threadlight::low_level::passes::Counters;
-use threadlight::low_level::pipeline::{Rendering, Wanted};
+use threadlight::low_level::pipeline::Wanted;
 use threadlight::low_level::prepare::Prepared;
+use threadlight::low_level::rendering::Rendering;
 use threadlight::low_level::scene::{
     Background, Camera, EnvironmentSource, MaterialSettings, MaterialSource, ObjectSettings, Scene, Source,
 };

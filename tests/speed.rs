@@ -4,11 +4,11 @@ mod common;
 use common::{Validated, analytic_materials, ready, sphere};
 use threadlight::Error;
 use threadlight::low_level::environment::Pyramid;
+use threadlight::low_level::evaluate::bare_lookups::time_bare_lookups;
 use threadlight::low_level::evaluate::speed::{self, Growth, Speed, Timings};
 use threadlight::low_level::evaluate::{Cases, Shard};
 use threadlight::low_level::method::Method;
 use threadlight::low_level::passes::{BareLookup, BareLookups};
-use threadlight::low_level::pipeline::time_bare_lookups;
 use threadlight::low_level::scene::{Camera, Scene, Source};
 use threadlight::low_level::vulkan::PipelineCache;
 

@@ -7,10 +7,10 @@ use threadlight::Method;
 use threadlight::low_level::evaluate::reference::{ReferenceSettings, reference};
 use threadlight::low_level::evaluate::{Comparable, Display, compare};
 use threadlight::low_level::geometry_texel::GeometryTexel;
-use threadlight::low_level::passes::Sampling;
+use threadlight::low_level::method::Sampling;
 use threadlight::low_level::picture::write_exr;
-use threadlight::low_level::pipeline::Rendering;
 use threadlight::low_level::prepare::{Prepared, prepare};
+use threadlight::low_level::rendering::Rendering;
 use threadlight::low_level::scene::{Background, Camera, MaterialSource, ObjectSettings, Scene, Source, TangentRule};
 use threadlight::low_level::shading::{CpuShader, Surface};
 
@@ -364,7 +364,7 @@ fn tangents_of_texture_coordinates_are_those_of_the_mesh_and_only_where_a_materi
         (Mat3::from_mat4(scene.objects[0].transform()), ready(&scene))
     };
     let (to_world, textured) = globe_of(true, "alpha_x = 0.1; alpha_y = 0.4; rotation_deg = 20");
-    assert!(textured.meshes.len() == 1 && !textured.meshes[0].1.tangents.is_empty());
+    assert!(textured.meshes.len() == 1 && !textured.meshes[0].mesh.tangents.is_empty());
     let rendering = gpu.render(&textured, EVERYTHING);
     let texels = seen(&textured, &rendering);
     let (mut compared, (sin, cos)) = (0, 20f32.to_radians().sin_cos());
@@ -380,9 +380,9 @@ fn tangents_of_texture_coordinates_are_those_of_the_mesh_and_only_where_a_materi
     }
     assert!(compared > 300, "{compared}");
     let (_, isotropic) = globe_of(true, "alpha = 0.2");
-    assert!(isotropic.meshes[0].1.tangents.is_empty() && !isotropic.has_tangents());
+    assert!(isotropic.meshes[0].mesh.tangents.is_empty() && !isotropic.has_tangents());
     let (_, plain) = globe_of(false, "alpha_x = 0.1; alpha_y = 0.4");
-    assert!(plain.meshes.len() == 1 && plain.meshes[0].1.tangents.is_empty());
+    assert!(plain.meshes.len() == 1 && plain.meshes[0].mesh.tangents.is_empty());
     assert_eq!(plain.objects[0].tangent.expect("a tangent").rule, TangentRule::DEFAULT);
     gpu.finish();
 }

@@ -12,14 +12,16 @@ use threadlight::low_level::evaluate::reference::{self, Processor, ReferenceSett
 use threadlight::low_level::files;
 use threadlight::low_level::memo::{Memo, Step};
 use threadlight::low_level::method::Method;
+use threadlight::low_level::passes::check_picture;
 use threadlight::low_level::picture::Format;
-use threadlight::low_level::pipeline::{DeviceScene, Rendering, Wanted, check_picture};
+use threadlight::low_level::pipeline::{DeviceScene, Wanted};
 use threadlight::low_level::prepare::prepare;
 use threadlight::low_level::progress::Observer;
 use threadlight::low_level::scene::Scene;
 use threadlight::low_level::steps::FitThreads;
 use threadlight::low_level::vulkan::Device;
 
+use threadlight::low_level::rendering::Rendering;
 use threadlight::{Error, Result};
 
 const EXAMPLES: &str = "\

@@ -4,8 +4,8 @@ use threadlight::Result;
 use threadlight::low_level::evaluate::reference::ReferenceImage;
 use threadlight::low_level::memo::{Asked, Origin};
 use threadlight::low_level::passes::WayAround;
-use threadlight::low_level::pipeline::Rendering;
 use threadlight::low_level::prepare::Prepared;
+use threadlight::low_level::rendering::Rendering;
 use threadlight::low_level::vulkan::PassTime;
 
 /// All that a rendering leaves.

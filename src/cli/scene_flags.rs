@@ -7,9 +7,9 @@ use std::sync::Arc;
 use threadlight::Error;
 use threadlight::low_level::environment;
 use threadlight::low_level::memo::Memo;
-use threadlight::low_level::method::Method;
+use threadlight::low_level::method::{Method, Pattern};
 use threadlight::low_level::scene::{
-    Background, EXPOSURE, GAMMA, MAX_SAMPLES, MAX_SIZE_PX, MAX_SUBPIXELS, MaterialSource, Pattern, Scene, Source, mesh,
+    Background, EXPOSURE, GAMMA, MAX_SAMPLES, MAX_SIZE_PX, MAX_SUBPIXELS, MaterialSource, Scene, Source, mesh,
 };
 use threadlight::low_level::vulkan::{Device, Instance, Messages};
 
@@ -162,12 +162,9 @@ pub fn parse_size(text: &str) -> Result<(u32, u32), String> {
     sides.ok_or_else(|| format!("use width x height in pixels, each 1 to {MAX_SIZE_PX}, such as 640x480"))
 }
 
-/// The name of a method; an older one is read too.
+/// The name of a method.
 fn methods() -> impl TypedValueParser<Value = Method> {
-    let names = Method::ALL.iter().map(|method| {
-        let value = PossibleValue::new(method.name()).help(method.summary());
-        method.older_name().into_iter().fold(value, PossibleValue::alias)
-    });
+    let names = Method::ALL.iter().map(|method| PossibleValue::new(method.name()).help(method.summary()));
     PossibleValuesParser::new(names).try_map(|name| Method::from_name(&name))
 }
 

@@ -86,7 +86,7 @@ impl ViewArguments {
             present_mode: self.present_mode,
             frames: self.frames,
             screenshot: self.screenshot,
-            replay: replay.into_iter().map(|(_, input)| input).collect(),
+            replay,
             replay_limit: Duration::from_secs(self.replay_limit),
             record,
         };

@@ -59,7 +59,7 @@ impl TrueSample {
     }
 
     /// The RMS of display values to be expected of a picture: that of the pixels that were looked at (F39). 0 where no surface is seen.
-    /// `radiance` is as [`Rendering::radiance`](crate::pipeline::Rendering::radiance) has it, without the environment behind.
+    /// `radiance` is as [`Rendering::radiance`](crate::rendering::Rendering::radiance) has it, without the environment behind.
     pub fn expected_rms(&self, radiance: &[[f32; 4]]) -> f64 {
         let here: Vec<_> = self.pixels.iter().map(|&pixel| radiance[pixel]).collect();
         let here = Comparable::from_radiance(here.len(), 1, &here, true, self.display);

@@ -2,7 +2,7 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use super::metrics::check_size;
+use super::metrics::check_comparable_size;
 use super::reference::{ReferenceSettings, reference};
 use super::tables::{Section, Table};
 use super::{Comparable, Display, compare};
@@ -70,7 +70,7 @@ pub fn run(
     found: &mut Vec<LiveStep>,
 ) -> Result<()> {
     let image = &drag.scene.image;
-    check_size(image.width as usize, image.height as usize)?;
+    check_comparable_size(image.width as usize, image.height as usize)?;
     let method = drag.scene.shading.method;
     if method != Method::Fitted {
         let remedy = format!("use method {}", Method::Fitted.name());

@@ -79,7 +79,7 @@ pub struct Comparable {
 }
 
 impl Comparable {
-    /// Linear radiance times coverage, and coverage (as [`Rendering::radiance`](crate::pipeline::Rendering::radiance) has it), row by
+    /// Linear radiance times coverage, and coverage (as [`Rendering::radiance`](crate::rendering::Rendering::radiance) has it), row by
     /// row; coverage tells surface from background only if `alpha`.
     ///
     /// # Panics
@@ -124,7 +124,7 @@ impl Comparable {
 }
 
 /// An error unless pictures of this size can be compared.
-pub fn check_size(width: usize, height: usize) -> Result<()> {
+pub fn check_comparable_size(width: usize, height: usize) -> Result<()> {
     if width.min(height) >= WINDOW {
         return Ok(());
     }
@@ -147,7 +147,7 @@ pub fn compare(a: &Comparable, b: &Comparable, mask_background: bool) -> Result<
         let sizes = format!("{width} x {height} and {} x {}", b.width, b.height);
         return refuse(format!("the pictures' sizes differ, {sizes}"), "give pictures of one size");
     }
-    check_size(width, height)?;
+    check_comparable_size(width, height)?;
     let remedy = "render with --background none to EXR or PNG, or leave out --mask-background";
     let Ok(compared) = compared_pixels(a, b, mask_background) else {
         return refuse("neither picture has an alpha channel that tells its background".to_owned(), remedy);

@@ -8,7 +8,7 @@
 //! | how much they will differ, and how many threads that takes | [`expected`] |
 //! | what is measured: materials, environments, scenes, methods, counts | [`cases`] |
 //! | error and time of all of these: tables 2 to 4, figures 10 to 12 | [`sweep`] |
-//! | time of a frame beside its floor, and as things double: table 1 | [`speed`] |
+//! | time of a frame beside its floor, and as things double: table 1 | [`speed`], [`bare_lookups`] |
 //! | what many materials in one picture cost, beside each alone | [`together`] |
 //! | what threads cost to make, beside what they are worth | [`fit`] |
 //! | what a driver's compiler makes of the shaders | [`shaders`] |
@@ -21,6 +21,7 @@
 //! | how it looks | [`tables`], [`plots`], [`sheet`] |
 //! | all of it on one page | [`report`](mod@report) |
 
+pub mod bare_lookups;
 pub mod cases;
 pub mod difference;
 pub mod expected;

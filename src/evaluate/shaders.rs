@@ -9,7 +9,7 @@ use super::tables::{Section, Table, in_order};
 use crate::error::Result;
 use crate::memo::{Memo, Round};
 use crate::method::Method;
-use crate::passes::{GEOMETRY_STATE, MAX_SHADERS, geometry_shaders};
+use crate::passes::{GEOMETRY_STATE, MAX_SHADERS, geometry_shaders, shade_shader};
 use crate::prepare::{Prepared, prepare};
 use crate::progress::Observer;
 use crate::scene::{Background, Scene};
@@ -78,7 +78,7 @@ pub fn run(
     for (index, &method) in methods.iter().enumerate() {
         let round = memo.round(observer);
         let prepared = prepare(&by_method(scene, method), &round)?;
-        let shader = method.shader()?;
+        let shader = shade_shader(method)?;
         let shaders = shaders_of(&prepared, &round)?;
         // Those that say how much is in a scene; the rest stay as in GLSL, where nothing is left out.
         let of_any =

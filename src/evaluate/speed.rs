@@ -5,13 +5,15 @@ use std::sync::Arc;
 use glam::DVec2;
 use serde::Serialize;
 
+use super::bare_lookups::time_bare_lookups;
 use super::cases::{Cases, Estimator, Place};
 use crate::environment::width_rad_of;
 use crate::error::{Error, Result};
 use crate::memo::{Key, Keyed, Memo};
 use crate::passes::{BareLookup, BareLookups, PlacedMesh, SHADE_PASS};
-use crate::pipeline::{DeviceScene, Rendering, Wanted, time_bare_lookups};
+use crate::pipeline::{DeviceScene, Wanted};
 use crate::progress::{Observer, Parts};
+use crate::rendering::Rendering;
 use crate::statistics::median;
 use crate::steps::{BoxFilter, CheckDevice, pipelines};
 use crate::threads::fitted::kernel::FINEST_WIDTH_RAD;
@@ -175,8 +177,8 @@ impl Growing {
             Self::Subpixels => place.prepared.view.subpixels = step,
             Self::Threads => {}
             Self::Triangles => {
-                for (_, mesh) in &mut place.prepared.meshes {
-                    *mesh = (0..step).fold(mesh.clone(), |mesh, _| {
+                for named in &mut place.prepared.meshes {
+                    named.mesh = (0..step).fold(named.mesh.clone(), |mesh, _| {
                         Keyed::new(Key::builder("subdivided").key(mesh.key).build(), mesh.subdivided())
                     });
                 }
@@ -243,7 +245,7 @@ impl Entrant {
         let cache = pipelines(&round, device)?;
         let floor = BareLookups::new(device, &cache, &pyramid, [pixels, of_row], &rows, way_around)?;
         time_bare_lookups(device, &floor)?;
-        let triangles = |object: &PlacedMesh| prepared.meshes[object.mesh].1.indices.len() as u64 / 3;
+        let triangles = |object: &PlacedMesh| prepared.meshes[object.mesh].mesh.indices.len() as u64 / 3;
         let frame = TimedFrame {
             method: prepared.variant().name(),
             threads,

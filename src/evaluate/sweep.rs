@@ -7,15 +7,16 @@ use serde::{Deserialize, Serialize};
 
 use super::cases::{Cases, Place, Shard};
 use super::expected::TrueSample;
-use super::metrics::{Comparable, Metrics, check_size, compare};
+use super::metrics::{Comparable, Metrics, check_comparable_size, compare};
 use super::reference::{ReferenceImage, TOLERANCE};
 use super::sheet::over_grey;
 use crate::error::Result;
 use crate::memo::{Memo, Round};
 use crate::passes::View;
-use crate::pipeline::{Rendering, Wanted};
+use crate::pipeline::Wanted;
 use crate::prepare::Prepared;
 use crate::progress::{Observer, Parts};
+use crate::rendering::Rendering;
 use crate::vulkan::Device;
 
 /// What to measure, and how.
@@ -146,7 +147,7 @@ pub fn run(
     measured: &mut Measured,
 ) -> Result<()> {
     for (_, scene) in &sweep.cases.scenes {
-        check_size(scene.image.width as usize, scene.image.height as usize)?;
+        check_comparable_size(scene.image.width as usize, scene.image.height as usize)?;
     }
     let rows = Parts::new(sweep.row_count(), observer);
     sweep.cases.for_each_place(memo, observer, &mut |place| {

@@ -5,7 +5,7 @@
 //! else makes it. So a frame asks for all that it needs each time, and only what has changed is made.
 //!
 //! The memo owns nothing. Outputs live as long as someone holds them: a round holds what was asked of it, and [`Round::held`] hands that
-//! on to whoever needs it for the next round, such as the renderer that was made of it. What the latest round did not ask for is let go with
+//! on to whoever needs it for the next round, such as the scene on a device that was made of it. What the latest round did not ask for is let go with
 //! the round before.
 mod disk;
 mod files;

@@ -4,7 +4,7 @@ use super::{Region, View};
 use crate::Result;
 use crate::graph::{FrameGraph, ImageDesc, ImageHandle};
 use crate::memo::Keyed;
-use crate::scene::{Mesh, TangentRule};
+use crate::scene::{BoundingSphere, Mesh, TangentRule};
 use crate::shader_constants::geometry_cache::{TANGENT_ALONG, TANGENT_AROUND, TANGENT_OF_MESH};
 use crate::vulkan::{
     Device, GraphicsPipeline, GraphicsState, PipelineCache, Shader, Triangles, VertexAttribute, compiled,
@@ -32,8 +32,8 @@ const ROUNDING: f64 = 1e-6;
 pub struct DeviceMesh {
     /// Positions are from the middle of the bounding sphere.
     triangles: Triangles,
-    /// Bounding sphere in object space: centre and radius.
-    sphere: (DVec3, f64),
+    /// Around it in object space.
+    sphere: BoundingSphere,
     /// The smallest and largest coordinates there.
     bounds: (Vec3, Vec3),
 }
@@ -47,7 +47,7 @@ impl DeviceMesh {
         let mesh = mesh.in_drawing_order();
         let sphere = mesh.bounding_sphere();
         let from_middle: Vec<_> =
-            mesh.positions.iter().map(|position| (position.as_dvec3() - sphere.0).as_vec3()).collect();
+            mesh.positions.iter().map(|position| (position.as_dvec3() - sphere.centre).as_vec3()).collect();
         let attribute = |name, bytes| VertexAttribute { name, stride: VERTEX_STRIDE, bytes };
         // What no tangent goes by takes no memory.
         let tangents = if mesh.tangents.is_empty() { &mesh.normals } else { &mesh.tangents };
@@ -74,11 +74,11 @@ pub struct PlacedMesh {
 }
 
 impl PlacedMesh {
-    /// Centre and radius of a sphere in world space that holds what the sphere around `centre` in object space does.
-    pub fn placed_sphere(&self, (centre, radius): (DVec3, f64)) -> (DVec3, f64) {
+    /// A sphere in world space that holds what `sphere` in object space does.
+    pub fn placed_sphere(&self, sphere: BoundingSphere) -> BoundingSphere {
         let m = self.to_world.matrix3;
         let scale = m.x_axis.length().max(m.y_axis.length()).max(m.z_axis.length());
-        (self.to_world.transform_point3(centre), scale * radius)
+        BoundingSphere { centre: self.to_world.transform_point3(sphere.centre), radius: scale * sphere.radius }
     }
 }
 
@@ -156,7 +156,7 @@ impl GeometryCache {
         let pack = |v: DVec3, w: f64| v.extend(w).as_vec4().to_array();
         let unit = self.extent(view);
         let draw = |object: &PlacedMesh| {
-            let middle = self.meshes[object.mesh].sphere.0;
+            let middle = self.meshes[object.mesh].sphere.centre;
             // Subtracted in double precision: far from the origin the difference is what counts.
             let (matrix3, from_eye) = (object.to_world.matrix3, object.to_world.transform_point3(middle) - eye);
             let row = |i: usize| pack(matrix3.row(i) / unit, from_eye[i] / unit);
@@ -185,7 +185,7 @@ impl GeometryCache {
     fn seen(&self, view: &View) -> impl Iterator<Item = &PlacedMesh> {
         let (inwards, eye) = (inward_normals(view), view.camera.eye);
         self.objects.iter().filter(move |object| {
-            let (centre, radius) = self.sphere(object);
+            let BoundingSphere { centre, radius } = self.sphere(object);
             may_be_within(centre - eye, radius, &inwards)
         })
     }
@@ -193,7 +193,8 @@ impl GeometryCache {
     /// Where in the picture objects may be, in tiles of this size.
     pub fn region(&self, view: &View, tile_px: [u32; 2]) -> Region {
         let corners = self.seen(view).flat_map(|object| {
-            let &DeviceMesh { sphere: (middle, _), bounds: (low, high), .. } = &*self.meshes[object.mesh];
+            let &DeviceMesh { sphere, bounds: (low, high), .. } = &*self.meshes[object.mesh];
+            let middle = sphere.centre;
             let from_eye = object.to_world.transform_point3(middle) - view.camera.eye;
             let matrix3 = object.to_world.matrix3;
             (0..8).map(move |index| {
@@ -205,8 +206,8 @@ impl GeometryCache {
         Region::of_boxes(view, tile_px, corners)
     }
 
-    /// Centre and radius of a sphere around an object, in world space.
-    fn sphere(&self, object: &PlacedMesh) -> (DVec3, f64) {
+    /// A sphere around an object, in world space.
+    fn sphere(&self, object: &PlacedMesh) -> BoundingSphere {
         object.placed_sphere(self.meshes[object.mesh].sphere)
     }
 
@@ -214,7 +215,7 @@ impl GeometryCache {
     /// huge scenes leave the range of single precision.
     fn extent(&self, view: &View) -> f64 {
         let far_side = |object: &PlacedMesh| {
-            let (centre, radius) = self.sphere(object);
+            let BoundingSphere { centre, radius } = self.sphere(object);
             centre.distance(view.camera.eye) + radius
         };
         let farthest = self.seen(view).map(far_side).fold(0.0, f64::max);

@@ -10,6 +10,8 @@ mod cube_borders;
 mod device_check;
 mod geometry_cache;
 mod light;
+mod materials;
+mod picture_size;
 #[cfg(feature = "viewer")]
 mod present;
 mod readback;
@@ -32,11 +34,14 @@ pub use device_check::{Answers, Questions, Volume, ask};
 pub use geometry_cache::{DeviceMesh, GeometryCache, PlacedMesh, PlacedTangent, geometry_cache, geometry_pipeline};
 pub(crate) use geometry_cache::{GEOMETRY_STATE, geometry_shaders};
 pub use light::{DeviceIrradiance, DeviceLight, check_aliases};
+pub use materials::{DeviceMaterials, ShadedMaterial};
+pub(crate) use picture_size::check_cache_size;
+pub use picture_size::check_picture;
 #[cfg(feature = "viewer")]
 pub use present::{Area, present};
-pub use readback::{Readbacks, is_readback, texels};
+pub use readback::{Readbacks, texels};
 pub use region::Region;
-pub use shade::{DeviceMaterials, SHADE_PASS, Sampling, Shade, Shaded, ShadedMaterial, models_used, shade};
+pub use shade::{SHADE_PASS, Shade, Shaded, shade, shade_shader};
 pub use tone_map::{ToneMap, tone_map};
 #[cfg(feature = "viewer")]
 pub use ui::ui;

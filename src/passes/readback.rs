@@ -1,16 +1,18 @@
 //! Copies what the CPU wants to see into memory that it can read.
 use crate::Result;
 use crate::graph::{Access, BufferDesc, BufferHandle, DeviceResource, Executable, FrameGraph, Handle, ImageHandle};
-use crate::vulkan::{self, BufferUse, Device, Frames};
+use crate::vulkan::{self, BufferUse, Device, Frames, PassTime};
 use ash::vk;
 use std::sync::Arc;
 
 /// What names of passes begin with that only copy results into memory that the CPU reads.
 const PREFIX: &str = "read_";
 
-/// Whether the pass of this name is one of [`Readbacks`].
-pub fn is_readback(pass: &str) -> bool {
-    pass.starts_with(PREFIX)
+impl PassTime {
+    /// Whether the pass is one of [`Readbacks`]: it only copies results into memory that the CPU reads.
+    pub fn is_readback(&self) -> bool {
+        self.name.starts_with(PREFIX)
+    }
 }
 
 /// Adds copies into host memory to a graph.

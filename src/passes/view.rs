@@ -110,14 +110,16 @@ impl View {
 #[cfg(test)]
 mod tests {
     use crate::prepare::view_of;
-    use crate::scene::Scene;
+    use crate::scene::{BoundingSphere, Scene};
+    use glam::DVec3;
 
     #[test]
     fn a_view_that_is_too_large_keeps_its_shape() {
         let mut scene = Scene::default();
+        let unit = BoundingSphere { centre: DVec3::ZERO, radius: 1.0 };
         let mut fit = |width: u32, height: u32, subpixels: u32, longest: u32| {
             (scene.image.width, scene.image.height, scene.image.subpixels) = (width, height, subpixels);
-            let view = view_of(&scene, (glam::DVec3::ZERO, 1.0)).unwrap().fit(longest);
+            let view = view_of(&scene, unit).unwrap().fit(longest);
             [view.width, view.height]
         };
         assert_eq!(fit(4096, 240, 4, 16384), [4096, 240]);

@@ -28,14 +28,7 @@ pub fn write_png(path: &Path, width: u32, height: u32, rgba8: &[u8], alpha: bool
 ///
 /// # Panics
 /// If `rgba8` does not hold 4 bytes for each pixel.
-pub fn write_png_of_gamma(
-    path: &Path,
-    width: u32,
-    height: u32,
-    rgba8: &[u8],
-    alpha: bool,
-    gamma: f64,
-) -> Result<()> {
+pub fn write_png_of_gamma(path: &Path, width: u32, height: u32, rgba8: &[u8], alpha: bool, gamma: f64) -> Result<()> {
     assert_eq!(rgba8.len(), width as usize * height as usize * 4, "4 bytes a pixel");
     let mut bytes = Vec::new();
     let mut encoder = Encoder::new(&mut bytes, width, height);

@@ -1,4 +1,4 @@
-//! The pinhole camera: rays for the CPU, matrices for Vulkan, and the view that frames a scene by default.
+//! The pinhole camera: its axes, its rays, and the view that frames a scene by default.
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 

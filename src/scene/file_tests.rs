@@ -1,8 +1,9 @@
 //! Scene files: all keys are read, written and checked.
 use glam::{DVec3, Vec3};
 
-use super::super::{Background, Method, Pattern};
+use super::super::Background;
 use super::*;
+use crate::method::{Method, Pattern};
 
 const FULL: &str = r#"
     [image]

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use glam::{DVec3, Vec3};
 
-use super::FORMATS;
+use super::{BoundingSphere, FORMATS};
 use crate::error::{Error, Result};
 use crate::files::FileKind;
 
@@ -124,11 +124,12 @@ impl Mesh {
         })
     }
 
-    /// Centre and radius of a sphere that holds the mesh: around the middle of its bounds, so not always the smallest.
-    pub fn bounding_sphere(&self) -> (DVec3, f64) {
+    /// A sphere that holds the mesh: around the middle of its bounds, so not always the smallest.
+    pub fn bounding_sphere(&self) -> BoundingSphere {
         let (low, high) = self.bounds();
         let centre = low.as_dvec3().midpoint(high.as_dvec3());
-        (centre, self.positions.iter().map(|position| position.as_dvec3().distance(centre)).fold(0.0, f64::max))
+        let distances = self.positions.iter().map(|position| position.as_dvec3().distance(centre));
+        BoundingSphere { centre, radius: distances.fold(0.0, f64::max) }
     }
 }
 
@@ -214,7 +215,7 @@ mod tests {
         assert_eq!((cube.indices.len(), cube.positions.len()), (36, 8));
         assert!((area(&cube) - 24.0).abs() < 1e-5);
         assert_eq!(cube.bounds(), (Vec3::NEG_ONE, Vec3::ONE));
-        assert_eq!(cube.bounding_sphere(), (DVec3::ZERO, 3f64.sqrt()));
+        assert_eq!(cube.bounding_sphere(), BoundingSphere { centre: DVec3::ZERO, radius: 3f64.sqrt() });
         let octagon: String = (0..8)
             .map(|i| (f32::from(i as u8) * std::f32::consts::FRAC_PI_4).sin_cos())
             .map(|(y, x)| format!("v {x} {y} 0\n"))

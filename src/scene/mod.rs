@@ -11,25 +11,24 @@ use crate::brdf::{Brdf, Custom, base_files, base_files_of};
 use crate::environment::CustomEnvironment;
 use crate::error::{Error, Result};
 use crate::files::file_formats;
+use crate::method::{Method, Pattern};
 
+mod bounding_sphere;
 pub mod camera;
 mod custom_mesh;
 mod drawing_order;
 mod file;
 pub mod mesh;
-mod method;
 mod parameter;
-mod pattern;
 mod polygon;
 mod tangent_rule;
 mod texture_tangents;
 
+pub use bounding_sphere::BoundingSphere;
 pub use camera::Camera;
 pub use custom_mesh::CustomMesh;
 pub use mesh::Mesh;
-pub use method::Method;
 pub use obj_file::TexturedMesh;
-pub use pattern::Pattern;
 pub use tangent_rule::TangentRule;
 
 file_formats!(Mesh: obj_file);
@@ -290,9 +289,7 @@ impl Scene {
         let material = self.objects.first().map(|object| object.material.clone()).unwrap_or_default();
         self.objects = vec![ObjectSettings::new(mesh, &material)];
     }
-}
 
-impl Scene {
     /// The files that it names: of its environment, its meshes and its materials, with those under their coats.
     pub fn files(&self) -> Vec<PathBuf> {
         let of_meshes = self.objects.iter().filter_map(|object| object.mesh.file());
@@ -400,6 +397,13 @@ impl Default for EnvironmentSettings {
 impl Default for ShadingSettings {
     fn default() -> Self {
         Self { method: DEFAULT_METHOD, threads: None, pattern: Pattern::default(), seed: 0 }
+    }
+}
+
+impl ShadingSettings {
+    /// How many threads or samples: as many as are asked for, or as suit the method.
+    pub fn count(&self) -> u32 {
+        self.threads.unwrap_or(self.method.default_count())
     }
 }
 

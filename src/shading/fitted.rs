@@ -10,7 +10,8 @@ use crate::environment::{LightMap, SourceRecord};
 use crate::light::{BlurredLight, finest_level};
 use crate::packing::stereographic_decode;
 use crate::shader_constants::fitted::{
-    self, FAR, LOW_COSINE, LOW_DEVIATIONS, MOST_VIEW, OPENED_WITHIN, STEEP, VERY_FAR, WIDEST_WHOLE_RAD, WIDTHS_ON_THE_WAY,
+    self, FAR, LOW_COSINE, LOW_DEVIATIONS, MOST_VIEW, OPENED_WITHIN, STEEP, VERY_FAR, WIDEST_WHOLE_RAD,
+    WIDTHS_ON_THE_WAY,
 };
 use crate::threads::azimuths::Azimuths;
 use crate::threads::fitted::kernel::{FINEST_WIDTH_RAD, level_of_variance, sharp_part, variance_of_level};

@@ -8,10 +8,9 @@ use crate::environment::{Alias, FractionBits, LightMap, SourceRecord};
 use crate::geometry_texel::GeometryTexel;
 use crate::light::{Light, bases};
 use crate::memo::{Keyed, Round};
-use crate::method::{Lookups, Method};
+use crate::method::{Lookups, Method, Pattern};
 use crate::passes::{SMOOTH_DEG, SmoothVariance, View};
 use crate::prepare::{Prepared, PreparedMaterial};
-use crate::scene::Pattern;
 use crate::steps::{FitSplitSum, Tabulate, TabulateSlices, light};
 use crate::tangent::any_tangent;
 use crate::threads::fitted::{place_of_sum, sums_of_pixel};
@@ -20,26 +19,39 @@ use glam::{Mat3, UVec2, Vec2, Vec3, Vec4};
 use low_discrepancy::Stream;
 use random::random_bits;
 
+mod cosine;
+mod environment;
+mod filtered;
+mod fitted;
+mod gaussian;
+mod importance;
 mod importance_sampling;
 mod light_sampling;
 mod low_discrepancy;
+mod mis;
+mod paper;
 pub(crate) mod random;
+mod ris;
+mod split_sum;
+mod uniform;
 
-/// Makes the modules and the dispatch from the table in methods.rs.
-macro_rules! methods {
-    ($($name:ident $(| $older:ident)? => $Method:ident: $properties:expr,)+) => {
-        $(mod $name;)+
-
-        /// The estimate of `method` for `point`.
-        fn estimate(method: Method, point: &Point) -> Vec3 {
-            match method {
-                $(Method::$Method => $name::estimate(point),)+
-                Method::Reference => unreachable!("a twin is made for methods that have a shader"),
-            }
-        }
-    };
+/// The estimate of `method` for `point`.
+fn estimate(method: Method, point: &Point) -> Vec3 {
+    match method {
+        Method::Fitted => fitted::estimate(point),
+        Method::Paper => paper::estimate(point),
+        Method::Gaussian => gaussian::estimate(point),
+        Method::SplitSum => split_sum::estimate(point),
+        Method::Uniform => uniform::estimate(point),
+        Method::Cosine => cosine::estimate(point),
+        Method::Importance => importance::estimate(point),
+        Method::Filtered => filtered::estimate(point),
+        Method::Environment => environment::estimate(point),
+        Method::Ris => ris::estimate(point),
+        Method::Mis => mis::estimate(point),
+        Method::Reference => unreachable!("a twin is made for methods that have a shader"),
+    }
 }
-include!("methods.rs");
 
 /// A point to shade: its shading frame and view angle. Twin of `Surface` in glsl/surface.glsl.
 #[derive(Clone, Copy, Debug)]

@@ -7,7 +7,7 @@ use crate::memo::{Key, Keyed, Memo, Round, Step, Stored};
 use crate::method::Method;
 use crate::passes::vmf_pyramid;
 use crate::steps::pipelines;
-use crate::threads::WithThreads;
+use crate::threads::ShadedLobe;
 use crate::vulkan::{Device, DeviceKind};
 use std::sync::Arc;
 
@@ -168,7 +168,7 @@ pub fn light(
     device: Option<&Arc<Device>>,
     method: Method,
     environment: &Keyed<Environment>,
-    materials: &[WithThreads],
+    materials: &[ShadedLobe],
     for_any: bool,
 ) -> Result<Light> {
     let lookups = method.lookups();
@@ -199,7 +199,7 @@ pub fn blurred_light(
     round: &Round,
     device: Option<&Arc<Device>>,
     environment: &Keyed<Environment>,
-    materials: &[WithThreads],
+    materials: &[ShadedLobe],
     for_any: bool,
 ) -> Result<BlurredLight> {
     let has_sources = environment.has_small_sources();
@@ -208,7 +208,7 @@ pub fn blurred_light(
         false => Ok(environment.clone()),
     };
     let rest = part(false)?;
-    let (bases, _) = bases(materials.iter().map(|(_, threads)| *threads));
+    let (bases, _) = bases(materials.iter().map(|material| material.threads));
     let by_cosines = round.ask(&GatherLight(&rest))?;
     let irradiance = bases.into_iter().map(|base| round.ask(&Irradiance(&by_cosines, base))).collect::<Result<_>>()?;
     let rest = round.ask(&Blur { environment: &rest, device })?;

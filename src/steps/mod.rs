@@ -11,4 +11,6 @@ pub use compile::{CompileCompute, CompileGeometryCache, pipelines};
 pub use filter::{Blur, BoxFilter, blurred_light, light};
 pub use fit::{DraftThreads, FitSplitSum, FitThreads};
 pub use load::{FindLobe, LoadBrushedMesh, LoadEnvironment, LoadMaterial, LoadMesh, Tabulate, TabulateSlices};
-pub use upload::{UploadBackground, UploadIrradiance, UploadLight, UploadMaterials, UploadMesh, UploadShaders};
+pub use upload::{
+    KeyedMaterial, UploadBackground, UploadIrradiance, UploadLight, UploadMaterials, UploadMesh, UploadShaders,
+};

@@ -40,8 +40,14 @@ impl Step for UploadMesh<'_> {
     }
 }
 
-/// BRDF and threads of a material, by which what is uploaded of it is known.
-pub type KeyedMaterial<'a> = (&'a Keyed<Brdf>, Option<&'a Keyed<Threads>>);
+/// What a material is uploaded of, and by which the upload is known.
+#[derive(Clone, Copy)]
+pub struct KeyedMaterial<'a> {
+    /// What it is.
+    pub brdf: &'a Keyed<Brdf>,
+    /// Its threads, for methods that have any.
+    pub threads: Option<&'a Keyed<Threads>>,
+}
 
 /// Uploads what a method looks up of materials.
 pub struct UploadMaterials<'a> {
@@ -64,7 +70,7 @@ impl UploadMaterials<'_> {
         needs_it: impl Fn(&Brdf) -> bool,
         ask: impl Fn(&Keyed<Brdf>) -> Result<Keyed<T>>,
     ) -> Result<Vec<Option<Keyed<T>>>> {
-        self.materials.iter().map(|(brdf, _)| needs_it(brdf).then(|| ask(brdf)).transpose()).collect()
+        self.materials.iter().map(|material| needs_it(material.brdf).then(|| ask(material.brdf)).transpose()).collect()
     }
 }
 
@@ -74,14 +80,13 @@ impl Step for UploadMaterials<'_> {
 
     fn key(&self, _: &Memo) -> Result<Key> {
         let key = on(self.device, self.method.name()).number(u64::from(self.evaluates_brdf));
-        let keys = self
-            .materials
-            .iter()
-            .flat_map(|(brdf, threads)| std::iter::once(brdf.key).chain(threads.map(|threads| threads.key)));
+        let keys = self.materials.iter().flat_map(|KeyedMaterial { brdf, threads }| {
+            std::iter::once(brdf.key).chain(threads.map(|threads| threads.key))
+        });
         let key = key.keys(keys);
         // Of the light, only how many threads are sharper than it.
         let sharp = self.finest_level.map(|level| {
-            let threads = self.materials.iter().filter_map(|(_, threads)| *threads);
+            let threads = self.materials.iter().filter_map(|material| material.threads);
             threads
                 .filter_map(|threads| threads.fitted())
                 .flat_map(FittedTable::tables)
@@ -96,9 +101,10 @@ impl Step for UploadMaterials<'_> {
         let tables = self.of_each(|brdf| self.evaluates_brdf && brdf.has_table(), |brdf| round.ask(&Tabulate(brdf)))?;
         let slices = self.of_each(|_| lookups.slices, |brdf| round.ask(&TabulateSlices(brdf)))?;
         let split_sums = self.of_each(|_| lookups.split_sum, |brdf| round.ask(&FitSplitSum(brdf)))?;
-        let lobes = self.materials.iter().map(|(brdf, _)| round.ask(&FindLobe(brdf))).collect::<Result<Vec<_>>>()?;
-        let (_, base_maps) = bases(self.materials.iter().map(|(_, threads)| threads.map(|threads| &**threads)));
-        let materials = self.materials.iter().enumerate().map(|(i, (brdf, threads))| ShadedMaterial {
+        let lobes =
+            self.materials.iter().map(|material| round.ask(&FindLobe(material.brdf))).collect::<Result<Vec<_>>>()?;
+        let (_, base_maps) = bases(self.materials.iter().map(|material| material.threads.map(|threads| &**threads)));
+        let materials = self.materials.iter().enumerate().map(|(i, KeyedMaterial { brdf, threads })| ShadedMaterial {
             brdf,
             lobe: &lobes[i],
             threads: threads.map(|threads| &**threads),

@@ -45,8 +45,14 @@ pub use slice_table::SliceTable;
 pub use split_sum::SplitSum;
 pub use table::{Sample, ThreadTable};
 
-/// The lobe of a BRDF, and the threads by which it is shaded, for methods that have any.
-pub type WithThreads<'a> = (&'a LobeShape, Option<&'a Threads>);
+/// The lobe of a BRDF as it is shaded.
+#[derive(Clone, Copy)]
+pub struct ShadedLobe<'a> {
+    /// The lobe.
+    pub lobe: &'a LobeShape,
+    /// By which threads, for methods that have any.
+    pub threads: Option<&'a Threads>,
+}
 
 /// Lowest n . s of a sample: 0.006 degrees above the horizon, a thousand times what rounding theta to single precision moves
 /// it by, and far below what any view angle of a table needs.

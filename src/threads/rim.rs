@@ -1,4 +1,4 @@
-//! The way of the albedo between the two last rows : towards the horizon some BRDFs grow without bound. Twin of glsl/threads/rim.glsl.
+//! The way of the albedo between the two last rows: towards the horizon some BRDFs grow without bound. Twin of glsl/threads/rim.glsl.
 use std::f64::consts::FRAC_PI_2;
 
 use glam::DVec3;

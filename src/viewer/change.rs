@@ -1,12 +1,11 @@
-//! Changes of the scene, as the panel, a key or a dropped file makes them.
+//! What the viewer can change of a scene, as data. Each change is checked as it is made.
 use serde::{Deserialize, Serialize};
 
 use crate::error::Result;
-use crate::method::Method;
+use crate::method::{Method, Pattern};
 use crate::prepare::check_count;
 use crate::scene::{
-    Background, Camera, EnvironmentSource, MAX_SAMPLES, MAX_SIZE_PX, MaterialSource, MeshSource, Pattern, Scene,
-    Source, within,
+    Background, Camera, EnvironmentSource, MAX_SAMPLES, MAX_SIZE_PX, MaterialSource, MeshSource, Scene, Source, within,
 };
 use std::path::PathBuf;
 
@@ -125,7 +124,7 @@ impl Change {
             Self::Pattern(pattern) => shading.pattern = *pattern,
             Self::Seed(seed) => shading.seed = *seed,
             Self::Size(width, height) => {
-                check_size([*width, *height])?;
+                check_picture_size([*width, *height])?;
                 (image.width, image.height) = (*width, *height);
             }
             Self::Subpixels(side) => image.subpixels = *side,
@@ -147,7 +146,7 @@ pub fn most_count(method: Method, scene: &Scene) -> u32 {
 }
 
 /// An error for columns and rows that no picture has.
-pub(super) fn check_size(size: [u32; 2]) -> Result<()> {
+pub(super) fn check_picture_size(size: [u32; 2]) -> Result<()> {
     size.into_iter().try_for_each(|side| within("size", side, &(1..=MAX_SIZE_PX)).map(drop))
 }
 

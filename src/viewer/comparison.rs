@@ -121,8 +121,8 @@ pub fn compare_with(
 
 /// Linear radiance times coverage of the objects alone, and coverage.
 fn render(prepared: &Prepared, device: &Arc<Device>, round: &Round) -> Result<Vec<[f32; 4]>> {
-    let renderer = DeviceScene::new(device, &prepared.objects_alone(), round)?;
-    Ok(renderer.render(Wanted::RADIANCE, 1)?.radiance)
+    let device_scene = DeviceScene::new(device, &prepared.objects_alone(), round)?;
+    Ok(device_scene.render(Wanted::RADIANCE, 1)?.radiance)
 }
 
 fn name_of(prepared: &Prepared) -> String {

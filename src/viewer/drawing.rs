@@ -7,9 +7,9 @@ use super::latency::{Answer, Latency, Record, Stats};
 use super::loaded::Loaded;
 use super::presenter::{Drawn, Extras, Presenter, ShownPicture};
 use crate::files;
-use crate::passes::{Area, SHADE_PASS, View};
+use crate::passes::{Area, SHADE_PASS, View, check_cache_size};
 use crate::picture::Format;
-use crate::pipeline::{Wanted, check_size};
+use crate::pipeline::Wanted;
 use crate::prepare::view_of;
 use crate::scene::Scene;
 use crate::vulkan::UiFrame;
@@ -109,7 +109,7 @@ impl Viewer {
     /// Whatever Vulkan refuses.
     pub fn draw(
         &mut self,
-        stage: &mut Presenter,
+        presenter: &mut Presenter,
         size: [u32; 2],
         panel: &UiFrame,
         textures: &TexturesDelta,
@@ -136,7 +136,7 @@ impl Viewer {
             self.comparer.update(self.session.shown(), loaded, &self.device, &self.memo, is_moving || is_draft)?;
         }
         let picture = loaded.as_ref().zip(view.as_ref()).map(|(loaded, view)| ShownPicture {
-            renderer: &loaded.renderer,
+            device_scene: &loaded.device_scene,
             view,
             area: self.area,
             is_compiled: self.is_compiled,
@@ -144,7 +144,7 @@ impl Viewer {
         let change = loaded.as_ref().map_or(0, |loaded| loaded.change);
         let is_awaited = loaded.is_some() && self.latency.is_awaited(change, is_draft);
         let extras = Extras { counts: !is_moving, screenshot, completion: is_awaited };
-        let mut drawn = stage.draw(size, picture, panel, textures, extras)?;
+        let mut drawn = presenter.draw(size, picture, panel, textures, extras)?;
         self.frame_was_drawn();
         if let (Some(view), Some(error)) = (&view, drawn.as_mut().and_then(|drawn| drawn.lack.take())) {
             self.shrink(view, error)?;
@@ -193,7 +193,7 @@ impl Viewer {
     pub(super) fn view(&self, loaded: &Loaded) -> Result<View> {
         let mut view = view_of(self.session.shown(), loaded.sphere)?;
         // Others have yet to be compiled.
-        view.subpixels = loaded.renderer.view.subpixels;
+        view.subpixels = loaded.device_scene.view.subpixels;
         Ok(view)
     }
 
@@ -237,11 +237,11 @@ impl Viewer {
     /// Saves what was `loaded`, looked at as `scene` says.
     fn save_as(&mut self, path: &Path, scene: &Scene, loaded: &Loaded) -> Result<()> {
         let format = Format::of(path)?;
-        let mut renderer = (*loaded.renderer).clone();
-        renderer.view = view_of(scene, loaded.sphere)?;
-        check_size(&self.device, &renderer.view)?;
+        let mut device_scene = (*loaded.device_scene).clone();
+        device_scene.view = view_of(scene, loaded.sphere)?;
+        check_cache_size(&self.device, device_scene.view.cache_size())?;
         let wanted = Wanted { radiance: format == Format::Exr, display: format == Format::Png, geometry: false };
-        let rendering = renderer.render(wanted, 1)?;
+        let rendering = device_scene.render(wanted, 1)?;
         let header = rendering.exr_header(&loaded.prepared, &self.device.description().name);
         rendering.write(path, &scene.image, &header)?;
         self.tell_saved(path);

@@ -1,4 +1,4 @@
-//! Pace: how fine pictures are while they move, so that they keep up with the hand.
+//! How fine pictures are while they move, so that they keep up with the hand.
 use std::time::Duration;
 
 /// A moving picture takes this long at most, where that can be had: ten frames a second, with what putting it into the window

@@ -34,7 +34,6 @@ use serde::{Deserialize, Serialize};
 
 use super::change::Change;
 use super::comparison::Other;
-use super::orbit;
 use crate::brdf::Brdf;
 use crate::environment::Environment;
 use crate::error::{Error, Result};
@@ -111,7 +110,7 @@ pub enum Button {
     Right,
 }
 
-/// How far was scrolled; positive away from the user.
+/// How far a wheel or a touchpad scrolled; positive away from the user.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Scroll {
@@ -119,15 +118,6 @@ pub enum Scroll {
     Lines(f64),
     /// Pixels of a touchpad, at a scale of the display of 1.
     Pixels(f64),
-}
-
-impl From<Scroll> for orbit::Scroll {
-    fn from(scroll: Scroll) -> Self {
-        match scroll {
-            Scroll::Lines(lines) => Self::Lines(lines),
-            Scroll::Pixels(pixels) => Self::Pixels(pixels),
-        }
-    }
 }
 
 /// What a drag does.
@@ -152,20 +142,20 @@ impl Drag {
     }
 }
 
-/// The events of the replay file at `path`, each with the number of its line, its paths made relative to where the program runs.
+/// The events of the replay file at `path`, their paths made relative to where the program runs.
 ///
 /// # Errors
 /// The file cannot be read; the first line that is no event, by its number.
-pub fn read_replay(path: &Path) -> Result<Vec<(usize, Input)>> {
+pub fn read_replay(path: &Path) -> Result<Vec<Input>> {
     let bytes = files::read(path)?;
     parse_replay(files::text(path, &bytes)?, path)
 }
 
-/// The events in the text of the replay file at `path`, with their lines.
+/// The events in the text of the replay file at `path`.
 ///
 /// # Errors
 /// A line that is no event.
-pub fn parse_replay(text: &str, path: &Path) -> Result<Vec<(usize, Input)>> {
+pub fn parse_replay(text: &str, path: &Path) -> Result<Vec<Input>> {
     let folder = path.parent().unwrap_or(Path::new(""));
     let lines = text.lines().enumerate().map(|(index, line)| (index + 1, line.trim()));
     let events = lines.filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
@@ -177,7 +167,7 @@ pub fn parse_replay(text: &str, path: &Path) -> Result<Vec<(usize, Input)>> {
             let problem = format!("line {number} (`{line}`): {cause}");
             Error::in_file(path, problem, "the guide has all that a line can be, in src/viewer/input.rs")
         })?;
-        Ok((number, input.relative_to(folder)))
+        Ok(input.relative_to(folder))
     };
     events.map(parse).collect()
 }
@@ -261,7 +251,7 @@ pub enum Dropped {
 mod tests {
     use super::*;
 
-    fn parse(text: &str) -> Result<Vec<(usize, Input)>> {
+    fn parse(text: &str) -> Result<Vec<Input>> {
         parse_replay(text, Path::new("/replays/a.jsonl"))
     }
 
@@ -277,21 +267,21 @@ mod tests {
         assert!(quoted.len() > 20, "{quoted:?}");
         for text in quoted {
             let events = parse(text).unwrap();
-            let [(1, event)] = &events[..] else { panic!("{text}: {events:?}") };
+            let [event] = &events[..] else { panic!("{text}: {events:?}") };
             let written = serde_json::to_string(event).unwrap();
             assert_eq!(serde_json::from_str::<Input>(&written).unwrap(), *event, "{written}");
         }
     }
 
     #[test]
-    fn lines_are_numbered_comments_skipped_and_paths_begin_at_the_file() {
+    fn comments_are_skipped_and_paths_begin_at_the_file() {
         let events = parse("# a comment\n\n{\"drop\": \"x.obj\"}\n  \"wait\"\n{\"save_scene\": \"/tmp/y.toml\"}\n{\"set\": {\"material\": {\"file\": \"m.binary\"}}}").unwrap();
         let material = Change::Material(MaterialSource::File("/replays/m.binary".into()));
         let expected = [
-            (3, Input::Drop("/replays/x.obj".into())),
-            (4, Input::Wait),
-            (5, Input::SaveScene("/tmp/y.toml".into())),
-            (6, Input::Set(material)),
+            Input::Drop("/replays/x.obj".into()),
+            Input::Wait,
+            Input::SaveScene("/tmp/y.toml".into()),
+            Input::Set(material),
         ];
         assert_eq!(events, expected);
         assert_eq!(parse("").unwrap(), []);

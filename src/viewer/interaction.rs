@@ -10,7 +10,7 @@ use super::latency::{Latency, Record};
 use super::latest_job::LatestJob;
 use super::loaded::{Loaded, Made};
 use super::measured::Measured;
-use super::orbit::{Bounds, Orbit, environment_turn_deg};
+use super::orbit::{Orbit, environment_turn_deg};
 use super::plots::Plotter;
 use super::session::{Edit, Session};
 use crate::files;
@@ -189,7 +189,7 @@ impl Viewer {
                     }
                 }
             }
-            Input::Scroll(scroll) => self.move_camera(|orbit| orbit.zoom((*scroll).into())),
+            Input::Scroll(scroll) => self.move_camera(|orbit| orbit.zoom(*scroll)),
             Input::Key(key) => self.press(key),
             Input::Drop(path) => match change_of_dropped(path)? {
                 Dropped::Change(change) => self.change(&change),
@@ -310,9 +310,8 @@ impl Viewer {
     pub(super) fn move_camera(&mut self, act: impl FnOnce(&mut Orbit)) -> Result<()> {
         // What is still being loaded is to be seen by its own camera, or framed.
         let Some(loaded) = self.loaded.as_ref().filter(|_| self.session.shows_wanted_objects()) else { return Ok(()) };
-        let (centre, radius) = loaded.sphere;
-        let view = view_of(self.session.shown(), (centre, radius))?;
-        let mut orbit = Orbit::new(&view.camera, Bounds { centre, radius });
+        let view = view_of(self.session.shown(), loaded.sphere)?;
+        let mut orbit = Orbit::new(&view.camera, loaded.sphere);
         act(&mut orbit);
         self.last_motion = Some(Instant::now());
         self.change(&Change::Camera(Some(orbit.camera())))

@@ -3,10 +3,9 @@ use super::session::Edit;
 use crate::error::{Error, Result};
 use crate::memo::{Key, Round};
 use crate::pipeline::DeviceScene;
-use crate::prepare::{Prepared, bounding_sphere, view_of};
-use crate::scene::Scene;
+use crate::prepare::{Prepared, view_of};
+use crate::scene::{BoundingSphere, Scene};
 use crate::vulkan::Device;
-use glam::DVec3;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -18,12 +17,12 @@ pub type Made = Result<Loaded, (Error, Vec<Edit>)>;
 pub struct Loaded {
     /// In memory.
     pub prepared: Arc<Prepared>,
-    /// Centre and radius of a sphere around each of its objects, in world space.
-    pub spheres: Arc<[(DVec3, f64)]>,
+    /// A sphere around each of its objects, in world space.
+    pub spheres: Arc<[BoundingSphere]>,
     /// The same around all of them.
-    pub sphere: (DVec3, f64),
+    pub sphere: BoundingSphere,
     /// On the device.
-    pub renderer: Arc<DeviceScene>,
+    pub device_scene: Arc<DeviceScene>,
     /// What it was made of.
     pub key: Option<Key>,
     /// The change that it was asked for by: [`super::latency::Latency::asked`].
@@ -47,13 +46,13 @@ impl Loaded {
         change: u64,
     ) -> Result<Self> {
         prepared.view = prepared.view.fit(longest_side);
-        let renderer = Arc::new(DeviceScene::new(device, &prepared, round)?);
+        let device_scene = Arc::new(DeviceScene::new(device, &prepared, round)?);
         let files = prepared.scene.files().into_iter();
         let files = files.filter_map(|path| round.memo().file_key(&path).ok().map(|key| (path, key))).collect();
         // Of every vertex, so not found anew for each frame.
         let spheres = prepared.spheres();
-        let sphere = bounding_sphere(&spheres);
-        Ok(Self { prepared: Arc::new(prepared), spheres: spheres.into(), sphere, renderer, key, change, files })
+        let sphere = BoundingSphere::around(&spheres);
+        Ok(Self { prepared: Arc::new(prepared), spheres: spheres.into(), sphere, device_scene, key, change, files })
     }
 
     /// Whether some of its threads only stand in for those that are being made.

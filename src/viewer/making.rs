@@ -153,10 +153,10 @@ impl Viewer {
         let draft = Prepared { is_draft: true, view, ..(*loaded.prepared).clone() };
         let (device, memo) = (self.device.clone(), self.memo.clone());
         self.getting_ready.request(move |task| {
-            let renderer = DeviceScene::new(&device, &draft, &memo.round(task))?;
+            let device_scene = DeviceScene::new(&device, &draft, &memo.round(task))?;
             // Drivers may compile a shader where it first runs, and for the sizes that it meets.
-            renderer.render(Wanted::default(), 1)?;
-            Ok(renderer)
+            device_scene.render(Wanted::default(), 1)?;
+            Ok(device_scene)
         });
     }
 
@@ -189,7 +189,8 @@ impl Viewer {
                     }
                     self.forget_errors(loaded.change);
                     let before = self.loaded.replace(loaded.clone());
-                    self.is_compiled &= before.is_some_and(|before| before.renderer.shades_as(&loaded.renderer));
+                    self.is_compiled &=
+                        before.is_some_and(|before| before.device_scene.shades_as(&loaded.device_scene));
                     self.request_after_frame |= was_drafting;
                     self.drafted = loaded.is_draft().then(Instant::now);
                     if !loaded.is_draft() {

@@ -6,7 +6,8 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use glam::{DQuat, DVec2, DVec3};
 
-use crate::scene::Camera;
+use super::input::Scroll;
+use crate::scene::{BoundingSphere, Camera};
 
 /// A drag across the height of the image turns by half a circle.
 const TURN_RAD: f64 = PI;
@@ -25,28 +26,10 @@ const FARTHEST: f64 = 1e3;
 /// The turntable turns once in so many seconds.
 const TURNTABLE_S: f64 = 20.0;
 
-/// A sphere that holds all objects of a scene.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Bounds {
-    /// Its centre.
-    pub centre: DVec3,
-    /// Its radius, positive.
-    pub radius: f64,
-}
-
-/// How far a wheel or a touchpad scrolled; positive away from the user.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Scroll {
-    /// Notches of a wheel.
-    Lines(f64),
-    /// Pixels of a touchpad, at a scale of the display of 1.
-    Pixels(f64),
-}
-
 /// A camera that moves on a sphere around what it looks at. Motions that are not finite do nothing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Orbit {
-    bounds: Bounds,
+    bounds: BoundingSphere,
     target: DVec3,
     /// Whatever the camera calls up, unit: the axis of the orbit.
     vertical: DVec3,
@@ -59,9 +42,9 @@ pub struct Orbit {
 }
 
 impl Orbit {
-    /// The orbit that `camera` (a sound one: [`Camera::validate`]) is on, around objects within `bounds`. Where the camera is
+    /// The orbit that `camera` (a sound one: [`Camera::validate`]) is on, around objects within `bounds`, of positive radius. Where the camera is
     /// nearer to a pole, nearer or farther than orbits go, it is put at the bound.
-    pub fn new(camera: &Camera, bounds: Bounds) -> Self {
+    pub fn new(camera: &Camera, bounds: BoundingSphere) -> Self {
         let vertical = camera.unit_up();
         let out = camera.eye - camera.target;
         let height = out.dot(vertical);
@@ -140,7 +123,7 @@ impl Orbit {
 
     /// Puts what is beyond its bounds back to them.
     fn hold(&mut self) {
-        let Bounds { centre, radius } = self.bounds;
+        let BoundingSphere { centre, radius } = self.bounds;
         let farthest = FARTHEST * radius;
         self.target = centre + (self.target - centre).clamp_length_max(farthest);
         // Far from the origin roundings set the bound: the line of sight is to be known to a millionth.
@@ -170,7 +153,7 @@ fn finite(motion: DVec2) -> DVec2 {
 mod tests {
     use super::*;
 
-    const UNIT: Bounds = Bounds { centre: DVec3::ZERO, radius: 1.0 };
+    const UNIT: BoundingSphere = BoundingSphere { centre: DVec3::ZERO, radius: 1.0 };
 
     fn start() -> Camera {
         Camera::framing(DVec3::ZERO, 1.0, 4.0 / 3.0)
@@ -270,7 +253,7 @@ mod tests {
 
     #[test]
     fn framing_looks_from_the_same_side_as_large_as_the_default_view() {
-        let bounds = Bounds { centre: DVec3::new(1.0, 2.0, 3.0), radius: 2.0 };
+        let bounds = BoundingSphere { centre: DVec3::new(1.0, 2.0, 3.0), radius: 2.0 };
         let mut orbit = Orbit::new(&start(), bounds);
         orbit.turn(DVec2::new(100.0, 40.0), 480.0);
         let side = (orbit.camera().eye - orbit.camera().target).normalize();
@@ -305,7 +288,9 @@ mod tests {
     fn no_motion_however_mad_gives_a_camera_that_cannot_see() {
         const NUMBERS: [f64; 9] =
             [0.0, 1.0, -3.0, 1e300, -1e300, f64::NAN, f64::INFINITY, f64::NEG_INFINITY, f64::MIN_POSITIVE];
-        for bounds in [UNIT, Bounds { centre: DVec3::splat(1e8), radius: 1e-8 }, Bounds { radius: 1e9, ..UNIT }] {
+        for bounds in
+            [UNIT, BoundingSphere { centre: DVec3::splat(1e8), radius: 1e-8 }, BoundingSphere { radius: 1e9, ..UNIT }]
+        {
             // Knuth's MMIX generator; its high bits are the good ones.
             let mut state = 1_u64;
             let mut next = || {

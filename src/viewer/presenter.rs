@@ -1,4 +1,4 @@
-//! The stage: draws frames into the window.
+//! The presenter draws frames into the window.
 use crate::graph::{Access, DeviceResource, Executable, FrameGraph, ImageDesc, ImageHandle, Store};
 use crate::passes::{Area, Counters, Readbacks, SHADE_PASS, View, present, texels, ui};
 use crate::pipeline::{DeviceScene, Frame, declare};
@@ -21,7 +21,7 @@ const NO_SIZES: [Option<[u32; 2]>; FRAMES] = [None; FRAMES];
 #[derive(Clone, Copy)]
 pub struct ShownPicture<'a> {
     /// Of what.
-    pub renderer: &'a DeviceScene,
+    pub device_scene: &'a DeviceScene,
     /// From where, and in which resolution: scaled to `area` where that is not its size.
     pub view: &'a View,
     /// Where it is in the window.
@@ -98,8 +98,8 @@ fn declare_window<'a>(
     let desc = ImageDesc { format: painter.format(), width, height };
     let window = graph.import_image("window", desc, None, Some(Access::Present));
     let nowhere = Area { left: 0, top: 0, width, height };
-    let frame =
-        picture.map(|ShownPicture { renderer, view, .. }| declare(graph, renderer, renderer.region(view), view));
+    let frame = picture
+        .map(|ShownPicture { device_scene, view, .. }| declare(graph, device_scene, device_scene.region(view), view));
     let area = picture.map_or(nowhere, |picture| picture.area);
     let shown = present(graph, frame.as_ref().map(|frame| frame.display), window, area);
     let shown = ui(graph, painter, panel, shown);
@@ -166,7 +166,7 @@ pub struct Presenter {
 }
 
 impl Presenter {
-    /// The stage of the window of `surface`.
+    /// That of the window of `surface`.
     ///
     /// # Errors
     /// No memory left, or a window that cannot be presented to.

@@ -138,7 +138,8 @@ impl Edit {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{Background, MaterialSource, Method, Source};
+    use crate::method::Method;
+    use crate::scene::{Background, MaterialSource, Source};
 
     fn material(name: &str) -> Change {
         Change::Material(MaterialSource::Builtin(name.into()))

@@ -10,6 +10,7 @@ use crate::environment::Environment;
 use crate::evaluate::Display;
 use crate::passes::View;
 use crate::prepare::Prepared;
+use crate::scene::BoundingSphere;
 use crate::scene::mesh::Hit;
 use crate::threads::Threads;
 
@@ -20,9 +21,9 @@ const MOST_ROWS: usize = 45;
 /// Columns of the thumbnail of an environment, which has half as many rows.
 pub const THUMBNAIL_COLUMNS: usize = 256;
 
-/// The surface under the cursor.
+/// The point of a surface that is under the cursor.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Surface {
+pub struct SurfacePoint {
     /// Its material's place in [`Prepared::materials`].
     pub material: usize,
     /// Angle between the normal and the direction to the eye, in radians.
@@ -33,21 +34,21 @@ pub struct Surface {
     to_environment: DMat3,
 }
 
-impl Surface {
+impl SurfacePoint {
     /// What of `prepared`, whose objects are within these `spheres`, is seen in column `x` and row `y` of its picture from `view` (pixel
     /// centres have halves); none for the background.
-    pub fn under(prepared: &Prepared, spheres: &[(DVec3, f64)], view: &View, x: f64, y: f64) -> Option<Self> {
+    pub fn under(prepared: &Prepared, spheres: &[BoundingSphere], view: &View, x: f64, y: f64) -> Option<Self> {
         let direction = view.camera.ray(x - 0.5, y - 0.5, view.width, view.height);
-        let meets = |&(centre, radius): &(DVec3, f64)| {
+        let meets = |sphere: &BoundingSphere| {
             // Rounding is far below a thousandth.
-            (centre - view.camera.eye).reject_from(direction).length() <= 1.001 * radius
+            (sphere.centre - view.camera.eye).reject_from(direction).length() <= 1.001 * sphere.radius
         };
         let near = prepared.objects.iter().zip(spheres).filter(|(_, sphere)| meets(sphere));
         let hits = near.filter_map(|(object, _)| {
             let to_object = object.to_world.inverse();
             let origin = to_object.transform_point3(view.camera.eye);
             let along = to_object.transform_vector3(direction);
-            let Hit { distance, normal, tangent: of_mesh } = prepared.meshes[object.mesh].1.hit(origin, along)?;
+            let Hit { distance, normal, tangent: of_mesh } = prepared.meshes[object.mesh].mesh.hit(origin, along)?;
             let tangent = object.tangent.map(|tangent| {
                 let of_surface = tangent.rule.at((origin + distance * along).as_vec3(), of_mesh.as_vec3()).as_dvec3();
                 (object.to_world.matrix3 * of_surface, tangent.turn())
@@ -111,7 +112,7 @@ fn radius(share: f64, count: usize) -> f32 {
 
 /// Draws the hemisphere seen along the normal, the eye to the right: curves of `threads` over the view angle from 0 to 90 degrees, the
 /// eye's own way in white, and for the `surface` under the cursor where the eye and the samples are.
-pub fn draw_hemisphere(ui: &mut Ui, threads: &Threads, surface: Option<&Surface>) {
+pub fn draw_hemisphere(ui: &mut Ui, threads: &Threads, surface: Option<&SurfacePoint>) {
     let side = ui.available_width();
     let (response, painter) = ui.allocate_painter(Vec2::splat(side), Sense::hover());
     let rect = response.rect;
@@ -148,7 +149,7 @@ pub fn draw_hemisphere(ui: &mut Ui, threads: &Threads, surface: Option<&Surface>
 }
 
 /// Draws the environment's `picture` with a dot where each sample looks from the `surface` under the cursor.
-pub fn draw_environment(ui: &mut Ui, picture: TextureId, threads: Option<&Threads>, surface: Option<&Surface>) {
+pub fn draw_environment(ui: &mut Ui, picture: TextureId, threads: Option<&Threads>, surface: Option<&SurfacePoint>) {
     let width = ui.available_width();
     let (response, painter) = ui.allocate_painter(vec2(width, 0.5 * width), Sense::hover());
     let rect = response.rect;
@@ -186,8 +187,9 @@ mod tests {
     use std::f64::consts::FRAC_PI_2;
 
     use super::*;
+    use crate::method::Method;
     use crate::prepare::prepare;
-    use crate::scene::{Method, Scene, Source};
+    use crate::scene::{Scene, Source};
 
     /// The built-in sphere, with few threads.
     fn sphere(method: Method) -> Prepared {
@@ -202,7 +204,7 @@ mod tests {
     #[test]
     fn the_surface_under_the_cursor_is_that_of_the_sphere() {
         let prepared = sphere(Method::Uniform);
-        let under = |x: f64| Surface::under(&prepared, &prepared.spheres(), &prepared.view, x, 240.0);
+        let under = |x: f64| SurfacePoint::under(&prepared, &prepared.spheres(), &prepared.view, x, 240.0);
         assert_eq!(under(1.0), None);
         // In the middle the normal points at the eye.
         let middle = under(320.0).unwrap();
@@ -254,8 +256,8 @@ mod tests {
     fn insets_draw_without_a_window() {
         let prepared = sphere(Method::Fitted);
         let threads = &prepared.materials[0].threads.as_ref().unwrap();
-        let surface = Surface::under(&prepared, &prepared.spheres(), &prepared.view, 400.0, 240.0);
-        let shapes = |surface: Option<&Surface>| {
+        let surface = SurfacePoint::under(&prepared, &prepared.spheres(), &prepared.view, 400.0, 240.0);
+        let shapes = |surface: Option<&SurfacePoint>| {
             let context = egui::Context::default();
             let output = context.run(Default::default(), |context| {
                 egui::CentralPanel::default().show(context, |ui| {

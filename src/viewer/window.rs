@@ -1,5 +1,5 @@
 //! The window: what winit tells becomes inputs, and frames are drawn when there is something new.
-use super::change::{Change, check_size};
+use super::change::{Change, check_picture_size};
 use super::input::{Input, Scroll};
 use super::interaction::Viewer;
 use super::keyboard::input_of;
@@ -67,7 +67,7 @@ pub struct App {
 struct Open {
     // In the order in which they are dropped: the window goes last.
     viewer: Viewer,
-    stage: Presenter,
+    presenter: Presenter,
     panel: Panel,
     egui: egui_winit::State,
     context: egui::Context,
@@ -141,7 +141,7 @@ impl App {
         self.messages = Some(instance.messages());
         let surface = Surface::new(&instance, window.clone())?;
         let device = Device::for_surface(&instance, device.as_deref(), &surface)?;
-        let stage = Presenter::new(&device, surface, *present_mode)?;
+        let presenter = Presenter::new(&device, surface, *present_mode)?;
         let context = egui::Context::default();
         // The panel has one width, and + and - are the exposure's.
         context.options_mut(|options| options.zoom_with_keyboard = false);
@@ -170,7 +170,7 @@ impl App {
         };
         let mut open = Open {
             viewer,
-            stage,
+            presenter,
             panel: Panel::default(),
             egui,
             context,
@@ -232,7 +232,7 @@ impl Open {
     /// # Errors
     /// A size that no picture has, or that is too large beside the panel.
     fn request_size(&mut self, size: [u32; 2]) -> Result<()> {
-        check_size(size)?;
+        check_picture_size(size)?;
         let window = window_size(size, self.window.scale_factor());
         let longest = self.longest_side();
         if window.width.max(window.height) > longest {
@@ -245,7 +245,7 @@ impl Open {
         }
         if let Some(size) = self.window.request_inner_size(window) {
             tracing::debug!("the window is {} x {} at once", size.width, size.height);
-            self.stage.window_changed();
+            self.presenter.window_changed();
             self.fit_picture();
         }
         self.script.resizing = Some((size, Instant::now() + RESIZE_PATIENCE));
@@ -283,7 +283,7 @@ impl Open {
         let counts = self.viewer.loaded().is_some() && !self.viewer.is_busy() && self.script.replay.is_empty();
         let last = counts && self.script.frames_left.is_some_and(|left| left <= 1);
         let screenshot = last && self.script.screenshot.is_some();
-        let drawn = self.viewer.draw(&mut self.stage, size, &frame, &self.textures, is_held, screenshot)?;
+        let drawn = self.viewer.draw(&mut self.presenter, size, &frame, &self.textures, is_held, screenshot)?;
         self.textures.clear();
         // What changed in the panel shows in the next frame.
         if !inputs.is_empty() {
@@ -407,7 +407,7 @@ impl Open {
         match event {
             WindowEvent::CloseRequested => return true,
             WindowEvent::Resized(_) | WindowEvent::ScaleFactorChanged { .. } => {
-                self.stage.window_changed();
+                self.presenter.window_changed();
                 self.fit_picture();
                 self.redraw();
             }

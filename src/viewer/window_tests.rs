@@ -51,7 +51,7 @@ fn play() -> Result<Ended> {
         device: std::env::var("THREADLIGHT_TEST_DEVICE").ok(),
         validate: true,
         cache: Some("cache".into()),
-        replay: input::parse_replay(&replay, Path::new(""))?.into_iter().map(|(_, input)| input).collect(),
+        replay: input::parse_replay(&replay, Path::new(""))?,
         replay_limit: Duration::from_secs(100),
         ..ViewerSettings::default()
     };

@@ -9,8 +9,9 @@ use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
+use threadlight::low_level::method::{Method, Pattern};
 use threadlight::low_level::picture::{PictureFile, read_image};
-use threadlight::low_level::scene::{ImageSettings, MaterialSource, Method, Pattern, Scene, ShadingSettings, Source};
+use threadlight::low_level::scene::{ImageSettings, MaterialSource, Scene, ShadingSettings, Source};
 
 /// What makes a render quick: few pixels, few threads, and an environment that takes no time.
 const SMALL: &str = "--size 96x72 --threads 8 --environment map.hdr";

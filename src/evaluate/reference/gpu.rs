@@ -7,11 +7,9 @@ use glam::{DVec3, Vec4};
 use super::{Display, ReferenceImage, rms};
 use crate::Result;
 use crate::memo::Round;
-use crate::method::Method;
-use crate::passes::Sampling;
+use crate::method::{Method, Pattern, Sampling};
 use crate::pipeline::{DeviceScene, Wanted};
 use crate::prepare::Prepared;
-use crate::scene::Pattern;
 use crate::vulkan::Device;
 
 /// Samples of a frame: with 4 x 4 sub-pixels half of the 65535 iterations after which lavapipe leaves loops. Points of one frame

@@ -20,9 +20,10 @@ use crate::evaluate::metrics::Display;
 use crate::geometry_texel::GeometryTexel;
 use crate::memo::{Origin, Round, Step};
 use crate::passes::View;
-use crate::pipeline::{Rendering, render_geometry};
+use crate::pipeline::render_geometry;
 use crate::prepare::Prepared;
 use crate::progress::{Observer, Parts};
+use crate::rendering::Rendering;
 use crate::shading::display_value;
 use crate::vulkan::Device;
 use crate::{Error, Result};
@@ -189,7 +190,7 @@ pub(super) struct Texel {
 }
 
 impl Integrator<'_> {
-    /// The picture of `geometry`, texels as [`crate::pipeline::Rendering::geometry`] has them.
+    /// The picture of `geometry`, texels as [`crate::rendering::Rendering::geometry`] has them.
     ///
     /// # Errors
     /// Only [`Error::Cancelled`].

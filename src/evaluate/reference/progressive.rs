@@ -37,7 +37,7 @@ pub struct Estimate {
     pub error_estimate: f64,
 }
 
-/// Estimates the picture of `geometry` (texels as [`Rendering::geometry`](crate::pipeline::Rendering::geometry) has them) stage by
+/// Estimates the picture of `geometry` (texels as [`Rendering::geometry`](crate::rendering::Rendering::geometry) has them) stage by
 /// stage, and hands each to `publish`. `observer` hears of rows of pixels.
 ///
 /// # Errors

@@ -1,7 +1,7 @@
 //! Which method, how many threads, how many sub-pixels.
 use super::{group, on_change};
-use crate::method::Method;
-use crate::scene::{MAX_SUBPIXELS, Pattern};
+use crate::method::{Method, Pattern};
+use crate::scene::MAX_SUBPIXELS;
 use crate::viewer::change::{Change, most_count};
 use crate::viewer::input::Input;
 use crate::viewer::interaction::Viewer;

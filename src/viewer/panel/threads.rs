@@ -4,7 +4,7 @@ use super::group;
 use crate::evaluate::Display;
 use crate::memo::Key;
 use crate::viewer::interaction::Viewer;
-use crate::viewer::threads_seen::{self, Surface, in_picture};
+use crate::viewer::threads_seen::{self, SurfacePoint, in_picture};
 use egui::{TextureHandle, TextureOptions, Ui};
 use std::path::Path;
 
@@ -12,7 +12,7 @@ use std::path::Path;
 #[derive(Default)]
 pub struct State {
     /// What is under the cursor.
-    surface: Option<Surface>,
+    surface: Option<SurfacePoint>,
     /// The environment's thumbnail as it was last uploaded, with its environment, intensity and display.
     thumbnail: Option<(Key, f64, Display, TextureHandle)>,
 }
@@ -29,7 +29,7 @@ impl State {
                     let [x, y] = viewer.cursor?.map(|pixels| pixels as f32 / scale);
                     let size = [view.width, view.height];
                     let place = in_picture(egui::pos2(x, y), on_screen(ui.ctx(), viewer.area), size)?;
-                    Surface::under(prepared, &loaded.spheres, &view, place.x, place.y)
+                    SurfacePoint::under(prepared, &loaded.spheres, &view, place.x, place.y)
                 });
             }
             let surface = self.surface.filter(|surface| surface.material < prepared.materials.len());
