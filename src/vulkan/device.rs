@@ -7,6 +7,7 @@ use super::physical_device::{Candidate, DeviceDescription, candidates, named};
 use super::surface::Surface;
 use ash::{ext, khr, vk};
 use gpu_allocator::vulkan::{Allocation, Allocator, AllocatorCreateDesc};
+use std::ffi::CStr;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -82,6 +83,32 @@ pub(super) fn choose(mut candidates: Vec<Candidate>, asked: Option<&str>) -> Res
     candidates.into_iter().next().ok_or(VulkanError::NoDriver)
 }
 
+/// Makes a device of `chosen` with one queue, these extensions, what pipelines of the renderer need, and the features that are chained to `info`.
+pub(super) fn create_device(
+    instance: &Instance,
+    chosen: &Candidate,
+    extensions: &[&CStr],
+    info: vk::DeviceCreateInfo,
+) -> Result<ash::Device> {
+    let priorities = [1.0];
+    let queues =
+        [vk::DeviceQueueCreateInfo::default().queue_family_index(chosen.queue_family).queue_priorities(&priorities)];
+    let extensions: Vec<_> = extensions.iter().map(|extension| extension.as_ptr()).collect();
+    // Graphics pipelines have no render pass.
+    let mut dynamic_rendering = vk::PhysicalDeviceDynamicRenderingFeatures::default().dynamic_rendering(true);
+    // The irradiance maps of all bases are one array of cube maps.
+    let features = vk::PhysicalDeviceFeatures::default().image_cube_array(true);
+    let info = info
+        .enabled_features(&features)
+        .queue_create_infos(&queues)
+        .enabled_extension_names(&extensions)
+        .push_next(&mut dynamic_rendering);
+    // SAFETY: the physical device is this instance's; `info` and all it points to outlive the call.
+    call("vkCreateDevice", &chosen.description.name, || unsafe {
+        instance.raw.create_device(chosen.physical, &info, None)
+    })
+}
+
 /// What every device has of its own from the start.
 fn allocator_and_timeline(
     instance: &Instance,
@@ -144,24 +171,10 @@ impl Device {
     fn open(instance: &Arc<Instance>, chosen: Candidate) -> Result<Arc<Self>> {
         let memory_limit = memory_limit()?;
         let name = &chosen.description.name;
-        let priorities = [1.0];
-        let queues = [vk::DeviceQueueCreateInfo::default()
-            .queue_family_index(chosen.queue_family)
-            .queue_priorities(&priorities)];
-        let extensions: Vec<_> = chosen.extensions.iter().map(|extension| extension.as_ptr()).collect();
         let mut timeline_semaphore = vk::PhysicalDeviceTimelineSemaphoreFeatures::default().timeline_semaphore(true);
         let mut synchronization2 = vk::PhysicalDeviceSynchronization2Features::default().synchronization2(true);
-        let mut dynamic_rendering = vk::PhysicalDeviceDynamicRenderingFeatures::default().dynamic_rendering(true);
-        let features = vk::PhysicalDeviceFeatures::default().image_cube_array(true);
-        let info = vk::DeviceCreateInfo::default()
-            .enabled_features(&features)
-            .queue_create_infos(&queues)
-            .enabled_extension_names(&extensions)
-            .push_next(&mut timeline_semaphore)
-            .push_next(&mut synchronization2)
-            .push_next(&mut dynamic_rendering);
-        // SAFETY: the physical device is this instance's; `info` and all it points to outlive the call.
-        let raw = call("vkCreateDevice", name, || unsafe { instance.raw.create_device(chosen.physical, &info, None) })?;
+        let info = vk::DeviceCreateInfo::default().push_next(&mut timeline_semaphore).push_next(&mut synchronization2);
+        let raw = create_device(instance, &chosen, &chosen.extensions, info)?;
         let (allocator, timeline) = match allocator_and_timeline(instance, &chosen, &raw) {
             Ok(made) => made,
             Err(error) => {

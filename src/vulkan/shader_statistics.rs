@@ -1,12 +1,11 @@
 //! What a driver's compiler says of shaders: registers, spills, cycles. Nothing runs, so drivers without their GPU do.
-use super::device::choose;
+use super::device::{choose, create_device};
 use super::error::{Result, VulkanError, call};
 use super::instance::Instance;
 use super::physical_device::{DeviceDescription, candidates, has_extension};
 use super::pipeline::{Constants, Declared, GraphicsState, check_stage, layout_of, make_graphics, set_layout, stage};
 use super::shader::{Interface, Shader, ShaderStage};
 use ash::{khr, vk};
-use std::ffi::CStr;
 use std::sync::Arc;
 
 /// A device that only compiles. It needs neither memory nor semaphores, which Mesa's RADV does not have without a GPU.
@@ -38,26 +37,10 @@ impl CompilingDevice {
         if !has_extension(instance, chosen.physical, &name, khr::pipeline_executable_properties::NAME)? {
             return Err(VulkanError::NoStatistics { device: name });
         }
-        let priorities = [1.0];
-        let queues = [vk::DeviceQueueCreateInfo::default()
-            .queue_family_index(chosen.queue_family)
-            .queue_priorities(&priorities)];
-        let extensions = [khr::pipeline_executable_properties::NAME, khr::dynamic_rendering::NAME].map(CStr::as_ptr);
+        let extensions = [khr::pipeline_executable_properties::NAME, khr::dynamic_rendering::NAME];
         let mut tells =
             vk::PhysicalDevicePipelineExecutablePropertiesFeaturesKHR::default().pipeline_executable_info(true);
-        // Graphics pipelines of the renderer have no render pass.
-        let mut dynamic_rendering = vk::PhysicalDeviceDynamicRenderingFeatures::default().dynamic_rendering(true);
-        // No device without it is chosen.
-        let features = vk::PhysicalDeviceFeatures::default().image_cube_array(true);
-        let info = vk::DeviceCreateInfo::default()
-            .enabled_features(&features)
-            .queue_create_infos(&queues)
-            .enabled_extension_names(&extensions)
-            .push_next(&mut tells)
-            .push_next(&mut dynamic_rendering);
-        // SAFETY: the physical device is this instance's; `info` and all it points to outlive the call.
-        let raw =
-            call("vkCreateDevice", &name, || unsafe { instance.raw.create_device(chosen.physical, &info, None) })?;
+        let raw = create_device(instance, &chosen, &extensions, vk::DeviceCreateInfo::default().push_next(&mut tells))?;
         let executables = khr::pipeline_executable_properties::Device::new(&instance.raw, &raw);
         Ok(Self { raw, executables, description: chosen.description, _instance: instance.clone() })
     }
