@@ -12,7 +12,7 @@ use std::path::Path;
 use glam::{DVec2, DVec3, Vec4, dvec3};
 
 use crate::error::{Error, Result};
-use crate::files::{FileKind, read};
+use crate::files::{FileKind, read, toml_problem};
 
 mod base;
 mod builtin;
@@ -225,7 +225,7 @@ impl Brdf {
 /// The model that the text of a material's TOML file names, and the other keys.
 fn model_of(text: &str) -> Result<(String, toml::Table)> {
     let mut table: toml::Table = text.parse().map_err(|error: toml::de::Error| {
-        Error::input("TOML", error.message().replace('\n', " "), "correct the file's syntax")
+        Error::input("TOML", toml_problem(text, &error), "correct the file's syntax")
     })?;
     Ok((parameters::take_model(&mut table)?, table))
 }

@@ -15,8 +15,7 @@ use super::{
 use crate::brdf::{Brdf, change_base_files, has_model, resolve_base_files};
 use crate::environment;
 use crate::error::{Error, Result};
-use crate::files::write_whole;
-use crate::files::{self, FileFormat, FileKind, text};
+use crate::files::{self, FileFormat, FileKind, quote_line, text, toml_problem, write_whole};
 
 /// A whole scene file.
 #[derive(Deserialize)]
@@ -140,13 +139,7 @@ fn parse_file(path: &Path, bytes: &[u8]) -> Result<Scene> {
 
 /// Parses and checks a scene; an error is one line that names line and key.
 fn parse(text: &str, base_dir: &Path) -> Result<Scene, String> {
-    let file: SceneFile = toml::from_str(text).map_err(|error| {
-        let problem = error.message().split_whitespace().collect::<Vec<_>>().join(" ");
-        match error.span() {
-            Some(span) => format!("{}: {problem}", quote_line(text, span.start)),
-            None => problem,
-        }
-    })?;
+    let file: SceneFile = toml::from_str(text).map_err(|error| toml_problem(text, &error))?;
     let mut scene = Scene {
         image: file.image,
         camera: file.camera,
@@ -217,14 +210,6 @@ fn resolve_paths(scene: &mut Scene, folder: &Path) -> Result<(), String> {
 /// thousands of tables.
 fn in_line(text: &str, position: usize) -> impl Fn(String) -> String {
     move |problem| format!("{}: {problem}", quote_line(text, position))
-}
-
-/// "line 7 (`width = 0`)" for the line of `text` that holds the byte at `position`.
-fn quote_line(text: &str, position: usize) -> String {
-    let before = text.get(..position).unwrap_or(text);
-    let number = before.matches('\n').count() + 1;
-    let line = text.lines().nth(number - 1).unwrap_or_default().trim();
-    format!("line {number} (`{line}`)")
 }
 
 /// A `[[material]]`: its name, and one of `file`, `builtin` and `model`, of which `builtin` may be the name itself; with `model` come

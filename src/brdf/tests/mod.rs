@@ -379,7 +379,8 @@ fn bad_parameters_are_refused_by_their_key() {
         (&format!("{conductor}alpha = inf"), "alpha"),
         (&conductor.replace("ggx", "phong"), "distribution"),
         (&conductor.replace("[2, 2, 2]", "[2, -2, 2]\nalpha = 0.1"), "k"),
-        ("model = 'lambert'\nreflectance = [0.1,", "TOML"),
+        ("model = 'lambert'\nreflectance = [0.1,", "TOML: line 2 (`reflectance = [0.1,`)"),
+        ("model = 'lambert'\nreflectance = 0,5", "TOML: line 2 (`reflectance = 0,5`)"),
     ] {
         let message = from_toml(text).unwrap_err().within("scene.toml").to_string();
         assert!(message.starts_with(&format!("scene.toml: {key}: ")), "{text:?} gave {message:?}");
