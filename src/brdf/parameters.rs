@@ -14,6 +14,15 @@ pub struct Parameters {
     read: Vec<Parameter>,
     /// Whether what is missing counts as the middle of its range.
     fills: bool,
+    /// Keys that the model has, but not beside those that are given.
+    idle: Vec<Idle>,
+}
+
+/// A key that the model has, but not beside those that are given.
+struct Idle {
+    key: String,
+    problem: String,
+    remedy: String,
 }
 
 /// What a model reads, and what it takes: what a slider needs to know.
@@ -100,7 +109,7 @@ pub enum Spacing {
 impl Parameters {
     /// All entries of `table` are parameters.
     pub fn new(table: Table) -> Self {
-        Self { table, read: Vec::new(), fills: false }
+        Self { table, read: Vec::new(), fills: false, idle: Vec::new() }
     }
 
     /// The same, but what is missing counts as the middle of its range, or as the first of its words.
@@ -116,6 +125,21 @@ impl Parameters {
     /// Whether `key` is given and not yet read: what a parameter that may be left out is read by.
     pub fn has(&self, key: &str) -> bool {
         self.table.contains_key(key)
+    }
+
+    /// Notes that `keys` are in the place of `other`, which was read: it is an error if they are given too.
+    pub(super) fn instead_of(&mut self, keys: &[&str], other: &str) {
+        self.note(keys, format!("is not a parameter beside `{other}`"), format!("remove it, or `{other}`"));
+    }
+
+    /// Notes that `keys` are parameters only beside `other`, which is left out: it is an error if they are given.
+    pub(super) fn only_beside(&mut self, keys: &[&str], other: &str) {
+        self.note(keys, format!("is a parameter only beside `{other}`"), format!("give `{other}`, or remove it"));
+    }
+
+    fn note(&mut self, keys: &[&str], problem: String, remedy: String) {
+        let idle = |key: &&str| Idle { key: (*key).into(), problem: problem.clone(), remedy: remedy.clone() };
+        self.idle.extend(keys.iter().map(idle));
     }
 
     /// The number `key`, within `range` (NaN and infinities never are).
@@ -220,12 +244,15 @@ impl Parameters {
         Ok(value)
     }
 
-    /// Reports a key that `model` does not have.
+    /// Reports a key that `model` does not have, or not beside those that are given. What is unknown goes first: another key may lack
+    /// what is misspelt there.
     pub fn finish(self, model: &str) -> Result<()> {
-        match self.table.keys().next() {
-            Some(key) => {
-                Err(Error::input(key, format!("is not a parameter of `{model}`"), "remove or correct the key"))
-            }
+        let idle = |key: &String| self.idle.iter().find(|idle| idle.key == *key);
+        if let Some(key) = self.table.keys().find(|key| idle(key).is_none()) {
+            return Err(Error::input(key, format!("is not a parameter of `{model}`"), "remove or correct the key"));
+        }
+        match self.table.keys().find_map(idle) {
+            Some(Idle { key, problem, remedy }) => Err(Error::input(key, problem, remedy)),
             None => Ok(()),
         }
     }
