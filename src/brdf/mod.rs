@@ -86,6 +86,17 @@ impl Brdf {
         Ok(brdf)
     }
 
+    /// Checks `model` and its parameters as [`Self::from_parameters`] does, but reads no files: those of bases under coats are taken to be
+    /// sound.
+    ///
+    /// # Errors
+    /// The model is not known, or a parameter is missing, unknown or out of range.
+    pub fn check_parameters(model: &str, table: toml::Table) -> Result<()> {
+        let mut parameters = Parameters::checked(table);
+        Brdf::read_model(model, &mut parameters)?;
+        parameters.finish(model)
+    }
+
     /// What `model` reads from a table of its parameters, and what each of them may be.
     ///
     /// # Errors
@@ -239,10 +250,11 @@ pub fn luminance(rgb: DVec3) -> f64 {
     rgb.dot(LUMINANCE)
 }
 
-/// Warns where `most`, that `what` is, exceeds 1 in some channel: such a surface reflects more light than it receives.
-fn warn_of_excess(what: &str, most: DVec3) {
+/// Warns where `most`, that `what` of a model with these `parameters` is, exceeds 1 in some channel: such a surface reflects more light than
+/// it receives.
+fn warn_of_excess(parameters: &Parameters, what: &str, most: DVec3) {
     let most = most.max_element();
-    if most > 1.0 + 1e-9 {
+    if most > 1.0 + 1e-9 && !parameters.only_checks() {
         tracing::warn!("{what} is {most:.3}: the surface reflects more light than it receives");
     }
 }

@@ -14,6 +14,8 @@ pub struct Parameters {
     read: Vec<Parameter>,
     /// Whether what is missing counts as the middle of its range.
     fills: bool,
+    /// Whether the model is only checked: files that are named are not read, and nothing is warned of, as both come when it is loaded.
+    only_checks: bool,
     /// Keys that the model has, but not beside those that are given.
     idle: Vec<Idle>,
 }
@@ -109,12 +111,22 @@ pub enum Spacing {
 impl Parameters {
     /// All entries of `table` are parameters.
     pub fn new(table: Table) -> Self {
-        Self { table, read: Vec::new(), fills: false, idle: Vec::new() }
+        Self { table, read: Vec::new(), fills: false, only_checks: false, idle: Vec::new() }
     }
 
     /// The same, but what is missing counts as the middle of its range, or as the first of its words.
     pub(super) fn filled(table: Table) -> Self {
         Self { fills: true, ..Self::new(table) }
+    }
+
+    /// The same, of a model that is only checked.
+    pub(super) fn checked(table: Table) -> Self {
+        Self { only_checks: true, ..Self::new(table) }
+    }
+
+    /// Whether the model is only checked: files are not to be read, nor anything warned of.
+    pub(super) fn only_checks(&self) -> bool {
+        self.only_checks
     }
 
     /// Those that have been read, in the order in which they were.
@@ -236,7 +248,7 @@ impl Parameters {
             None if self.fills => Table::new(),
             None => return Err(Error::input(key, "is missing", format!("give {what}"))),
         };
-        let mut inner = Parameters { fills: self.fills, ..Parameters::new(inner) };
+        let mut inner = Parameters { fills: self.fills, only_checks: self.only_checks, ..Parameters::new(inner) };
         let value = read(&mut inner).map_err(|error| inside(error, key))?;
         let of_inner = |parameter: Parameter| Parameter { key: format!("{key}.{}", parameter.key), ..parameter };
         self.read.extend(inner.read.drain(..).map(of_inner));

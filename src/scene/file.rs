@@ -152,6 +152,11 @@ fn parse(text: &str, base_dir: &Path) -> Result<Scene, String> {
     for table in file.material {
         let in_line = in_line(text, table.span().start);
         let material = material(table.into_inner()).map_err(&in_line)?;
+        // Here, too, as one that no object has is not loaded.
+        if let MaterialSource::Model { model, parameters } = &material.source {
+            Brdf::check_parameters(model, parameters.clone())
+                .map_err(|error| in_line(error.within(format!("material \"{}\"", material.name)).to_string()))?;
+        }
         if !names.insert(material.name.clone()) {
             return Err(in_line(format!("there are two materials with `name` \"{}\"", material.name)));
         }

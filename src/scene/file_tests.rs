@@ -139,8 +139,8 @@ fn files_beside_a_saved_scene_are_named_relative_to_it() {
     scene.environment.source = Source::File(folder.path().join("maps/x.hdr"));
     scene.objects[0].mesh = Source::File("/elsewhere/y.obj".into());
     let base = folder.path().join("bases/z.binary");
-    let text =
-        format!("base = {{ model = 'layered', base = {base:?}, coat = {{}} }}\ncoat = {{ alpha = 0.1, ior = 1.5 }}");
+    let coat = "coat = { alpha = 0.1, ior = 1.5 }";
+    let text = format!("base = {{ model = 'layered', base = {base:?}, {coat} }}\n{coat}");
     scene.materials[0].source = MaterialSource::Model { model: "layered".into(), parameters: text.parse().unwrap() };
     scene.save(&path).unwrap();
     let text = std::fs::read_to_string(&path).unwrap();
@@ -237,6 +237,26 @@ fn bad_values_are_errors_that_name_the_key_and_its_line() {
     }
     let error = error("[[material]]\nname = 'red'\nfile = 'x'\n[[object]]\nbuiltin = 'sphere'\nmaterial = 'blue'");
     assert!(error.contains("\"blue\"") && error.contains("red") && error.contains("line 4"), "{error}");
+}
+
+#[test]
+fn models_are_checked_though_no_object_has_them_but_files_are_not_read() {
+    let with = |parameters: &str| format!("[[material]]\nname = 'gold'\n[[material]]\nname = 'm'\n{parameters}");
+    for (parameters, said) in [
+        ("model = 'lambert'\nreflectence = 0.5", "reflectance: is missing; rename `reflectence`"),
+        ("model = 'lambert'\nreflectance = 0.5\nshine = 1", "shine: is not a parameter"),
+        ("model = 'lambert'\nreflectance = 2", "reflectance: is 2"),
+        ("model = 'wood'", "model `wood`"),
+        ("model = 'merl'", "model `merl`"),
+        ("model = 'layered'\nbase = 'x.binary'\ncoat = { alpha = 0.1, iro = 1.5 }", "coat.ior: is missing"),
+        ("model = 'layered'\nbase = 'velvet'\ncoat = { alpha = 0.1, ior = 1.5 }", "velvet"),
+    ] {
+        let error = error(&with(parameters));
+        assert!(error.contains("line 3") && error.contains("material \"m\": "), "{error}");
+        assert!(error.contains(said), "{error}");
+    }
+    let text = with("model = 'layered'\nbase = 'absent.binary'\ncoat = { alpha = 0.1, ior = 1.5 }");
+    assert_eq!(Scene::parse(&text, Path::new("")).unwrap().materials.len(), 2);
 }
 
 #[test]

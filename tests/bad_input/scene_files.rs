@@ -58,7 +58,11 @@ fn hostile_scene_files_are_refused() {
         ("[shading]\nmethod = 'fited'", &["bad.toml", "fitted"]),
         (
             "[[material]]\nname = 'm'\nmodel = 'lambert'\nreflectence = 1",
-            &["bad.toml: material \"m\": ", "rename `reflectence`"],
+            &["bad.toml: line 1 (`[[material]]`): material \"m\": ", "rename `reflectence`"],
+        ),
+        (
+            "[[material]]\nname = 'gold'\n[[material]]\nname = 'm'\nmodel = 'lambert'\nreflectence = 1",
+            &["bad.toml: line 3", "rename `reflectence`"],
         ),
         ("[shading]\nthreads = 1025", &["bad.toml: threads: are 1025"]),
     ] {
