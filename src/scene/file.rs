@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use serde::de::{Deserializer, Error as _};
 use serde::{Deserialize, Serialize};
 use toml::Spanned;
+use toml::de::{DeTable, DeValue};
 
 use super::{
     Camera, DEFAULT_MATERIAL, EXPOSURE, EnvironmentSettings, GAMMA, INTENSITY, ImageSettings, MAX_SAMPLES, MAX_SIZE_PX,
@@ -139,7 +140,9 @@ fn parse_file(path: &Path, bytes: &[u8]) -> Result<Scene> {
 
 /// Parses and checks a scene; an error is one line that names line and key.
 fn parse(text: &str, base_dir: &Path) -> Result<Scene, String> {
-    let file: SceneFile = toml::from_str(text).map_err(|error| toml_problem(text, &error))?;
+    let root = DeTable::parse(text).map_err(|error| toml_problem(text, &error))?;
+    check_tables(root.get_ref()).map_err(|(position, problem)| in_line(text, position)(problem))?;
+    let file = SceneFile::deserialize(toml::Deserializer::from(root)).map_err(|error| toml_problem(text, &error))?;
     let mut scene = Scene {
         image: file.image,
         camera: file.camera,
@@ -185,6 +188,33 @@ fn parse(text: &str, base_dir: &Path) -> Result<Scene, String> {
     }
     resolve_paths(&mut scene, base_dir)?;
     Ok(scene)
+}
+
+/// Checks that there are tables where they belong, one or a list of them. Serde would say it in its own words, and take a list of values for
+/// a table. The error has the position of what is wrong in the text.
+fn check_tables(root: &DeTable) -> Result<(), (usize, String)> {
+    for (key, value) in root {
+        let name = key.get_ref();
+        let problem = match (&**name, value.get_ref()) {
+            ("material" | "object", DeValue::Array(list)) => {
+                if list.iter().all(|element| element.get_ref().is_table()) {
+                    continue;
+                }
+                format!("`{name}` is a list of tables: write [[{name}]] before each")
+            }
+            ("material" | "object", _) => {
+                format!("there may be several of `{name}`: write [[{name}]], with two brackets")
+            }
+            ("image" | "camera" | "environment" | "shading", DeValue::Table(_)) => continue,
+            ("image" | "camera" | "environment" | "shading", _) => {
+                format!("there is one `{name}`, a table: write [{name}], with one bracket")
+            }
+            // Serde tells of a key that is not known, with those that are.
+            _ => continue,
+        };
+        return Err((key.span().start, problem));
+    }
+    Ok(())
 }
 
 /// Puts `folder` in front of the relative paths of `scene`.

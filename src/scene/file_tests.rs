@@ -260,6 +260,29 @@ fn models_are_checked_though_no_object_has_them_but_files_are_not_read() {
 }
 
 #[test]
+fn wrong_brackets_and_lists_in_the_place_of_tables_are_told_with_the_right_ones() {
+    for (text, line, said) in [
+        ("[material]\nname = 'gold'", "line 1 (`[material]`)", "write [[material]]"),
+        ("[image]\nwidth = 8\n[object]\nbuiltin = 'sphere'", "line 3 (`[object]`)", "write [[object]]"),
+        ("\n[[camera]]\neye = [0, 0, 4]", "line 2 (`[[camera]]`)", "write [camera]"),
+        ("[[image]]\nwidth = 8", "line 1", "write [image]"),
+        ("[[environment]]\nintensity = 1", "line 1", "write [environment]"),
+        ("[[shading]]\nseed = 1", "line 1", "write [shading]"),
+        // In the order of the fields.
+        ("image = [8, 8, 1, 1.0, 2.2, 'none']", "line 1", "write [image]"),
+        ("camera = [[0, 0, 4], [0, 0, 0], [0, 1, 0], 30]", "line 1", "write [camera]"),
+        ("object = [['x.obj']]", "line 1", "a list of tables: write [[object]]"),
+        ("material = 'gold'", "line 1", "write [[material]]"),
+        ("image = 3", "line 1", "write [image]"),
+    ] {
+        let error = error(text);
+        assert!(error.contains(line) && error.contains(said), "{text:?}: {error}");
+    }
+    let inline = "image = { width = 8 }\nobject = [{ builtin = 'sphere' }]";
+    assert_eq!(Scene::parse(inline, Path::new("")).unwrap().image.width, 8);
+}
+
+#[test]
 fn errors_of_files_name_the_file() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("bad.toml");

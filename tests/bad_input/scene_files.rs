@@ -23,6 +23,8 @@ fn hostile_scene_files_are_refused() {
         ("[shading]\npattern = 'dots'", "per-pixel"),
         ("[scene]", "scene"),
         ("[environment]\nbuiltin = 'mars'", "mars"),
+        ("[material]\nname = 'gold'", "write [[material]]"),
+        ("image = [8, 8, 1, 1.0, 2.2, 'none']", "write [image]"),
         ("[environment]\nintensity = -1", "intensity"),
         ("[environment]\nintensity = 1e39", "intensity"),
         ("[environment]\nfile = 'missing.hdr'", "missing.hdr"),
