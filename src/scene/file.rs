@@ -10,11 +10,11 @@ use toml::de::{DeTable, DeValue};
 
 use super::{
     Camera, DEFAULT_MATERIAL, EXPOSURE, EnvironmentSettings, GAMMA, INTENSITY, ImageSettings, MAX_SAMPLES, MAX_SIZE_PX,
-    MAX_SUBPIXELS, MaterialSettings, MaterialSource, ObjectSettings, Scene, ShadingSettings, Source, TangentRule, mesh,
-    three_numbers,
+    MAX_SUBPIXELS, MaterialSettings, MaterialSource, Mesh, ObjectSettings, Scene, ShadingSettings, Source, TangentRule,
+    mesh, three_numbers,
 };
 use crate::brdf::{Brdf, change_base_files, has_model, resolve_base_files};
-use crate::environment;
+use crate::environment::{self, Environment};
 use crate::error::{Error, Result};
 use crate::files::{self, FileFormat, FileKind, quote_line, text, toml_problem, write_whole};
 
@@ -86,7 +86,10 @@ impl Scene {
     /// Reads a scene file. Paths in it are relative to its folder. Without objects the scene is the built-in sphere; an object
     /// that names no material is of the first one, or of the default one in a scene without any.
     pub fn load(path: &Path) -> Result<Self> {
-        parse_file(path, &files::read(path)?)
+        match other_kind(path) {
+            Some(error) => Err(error),
+            None => parse_file(path, &files::read(path)?),
+        }
     }
 
     /// The formats of scene files.
@@ -111,12 +114,20 @@ impl Scene {
     /// The scene as the text of a file: paths in `folder` and below are relative to it, others are absolute.
     ///
     /// # Errors
-    /// A path that is not UTF-8, a material that a program defines.
+    /// A path that is not UTF-8, a material that a program defines, and what [`Self::parse`] would refuse: what [`Self::check`] says, a
+    /// built-in that there is not, parameters that their model does not have.
     pub fn to_toml(&self, folder: Option<&Path>) -> Result<String> {
-        let text = SceneText::new(self, folder)?;
-        toml::to_string_pretty(&text).map_err(|cause| {
+        self.check()?;
+        let text = toml::to_string_pretty(&SceneText::new(self, folder)?).map_err(|cause| {
             Error::input("scene", format!("cannot be written as TOML ({cause})"), "use numbers that are finite")
-        })
+        })?;
+        // Names and parameters are checked by who reads them.
+        match parse(&text, folder.unwrap_or(Path::new(""))) {
+            Ok(_) => Ok(text),
+            Err(problem) => {
+                Err(Error::input("scene", format!("could not be read again: {problem}"), "change it before saving"))
+            }
+        }
     }
 }
 
@@ -130,9 +141,25 @@ const FORMAT: FileFormat<Scene> = FileFormat {
     parse: |path, bytes, _| parse_file(path, bytes),
 };
 
+/// An error if `path` is called as files of another kind are, and not as scenes are.
+fn other_kind(path: &Path) -> Option<Error> {
+    let kinds = [
+        ("a material", "material", Brdf::FILES.format_of(path).is_ok()),
+        ("a mesh", "mesh", Mesh::FILES.format_of(path).is_ok()),
+        ("an environment", "environment", Environment::FILES.format_of(path).is_ok()),
+    ];
+    let (what, key, _) = kinds.into_iter().find(|(.., is_of_kind)| *is_of_kind)?;
+    Scene::FILES.format_of(path).is_err().then(|| not_a_scene(path, what, key))
+}
+
+/// The error that the file at `path` is `what`, which a scene has by this `key`.
+fn not_a_scene(path: &Path, what: &str, key: &str) -> Error {
+    Error::in_file(path, format!("is {what}, not a scene"), format!("give it with --{key}, or as the {key} in a scene"))
+}
+
 fn parse_file(path: &Path, bytes: &[u8]) -> Result<Scene> {
     if has_model(bytes) {
-        return Err(Error::in_file(path, "is a material, not a scene", "give it as the material of a scene's object"));
+        return Err(not_a_scene(path, "a material", "material"));
     }
     parse(text(path, bytes)?, path.parent().unwrap_or(Path::new("")))
         .map_err(|problem| Error::in_file(path, problem, REMEDY))

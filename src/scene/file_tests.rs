@@ -170,6 +170,62 @@ fn what_toml_cannot_say_is_an_error_and_leaves_the_old_file() {
 }
 
 #[test]
+fn what_would_not_be_read_again_is_not_saved_and_leaves_the_old_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("saved.toml");
+    std::fs::write(&path, "old").unwrap();
+    type Set = fn(&mut Scene);
+    let model = |model: &str, parameters: &str| MaterialSource::Model {
+        model: model.into(),
+        parameters: parameters.parse().unwrap(),
+    };
+    let mut misspelt = Scene::default();
+    misspelt.materials[0].source = model("lambert", "reflectence = 0.5");
+    let changed = [
+        ("exposure", (|scene| scene.image.exposure = f64::NAN) as Set),
+        ("width", |scene| (scene.image.width, scene.image.height) = (0, 0)),
+        ("scale", |scene| scene.objects[0].scale = 0.0),
+        ("scale", |scene| scene.objects[0].scale = f32::NAN),
+        ("translate", |scene| scene.objects[0].translate.x = f32::NAN),
+        ("rotate_deg", |scene| scene.objects[0].rotate_deg.x = f32::NAN),
+        ("gold", |scene| scene.materials.clear()),
+        // Left out, it would be read as a sphere.
+        ("no objects", |scene| scene.objects.clear()),
+        ("mars", |scene| scene.environment.source = Source::Builtin("mars".into())),
+        ("cube", |scene| scene.objects[0].mesh = Source::Builtin("cube".into())),
+        ("velvet", |scene| scene.materials[0].source = MaterialSource::Builtin("velvet".into())),
+    ];
+    let changed = changed.map(|(said, set)| {
+        let mut scene = Scene::default();
+        set(&mut scene);
+        (said, scene)
+    });
+    for (said, scene) in changed.into_iter().chain([("reflectence", misspelt)]) {
+        let error = scene.save(&path).unwrap_err().to_string();
+        assert!(error.contains(said), "{said}: {error}");
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), "old");
+    }
+}
+
+#[test]
+fn files_of_another_kind_are_told_with_where_they_belong() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, text, said) in [
+        ("brass.binary", "", "is a material, not a scene; give it with --material"),
+        ("cloth.BSDF", "", "is a material, not a scene; give it with --material"),
+        ("red.toml", "model = 'lambert'\nreflectance = 0.5", "is a material, not a scene; give it with --material"),
+        ("teapot.obj", "o mesh", "is a mesh, not a scene; give it with --mesh"),
+        ("sky.hdr", "", "is an environment, not a scene; give it with --environment"),
+        ("sky.exr", "", "is an environment, not a scene; give it with --environment"),
+    ] {
+        let path = folder.path().join(name);
+        std::fs::write(&path, text).unwrap();
+        let error = Scene::load(&path).unwrap_err().to_string();
+        assert!(error.contains(name) && error.contains(said), "{error}");
+    }
+}
+
+#[test]
 fn unknown_keys_are_errors_that_name_the_key_and_its_line() {
     for (text, key, line) in [
         ("[image]\nwidth = 3\nwidht = 4", "widht", "line 3"),

@@ -71,6 +71,14 @@ fn hostile_scene_files_are_refused() {
         fs::write(folder.path().join("bad.toml"), text).unwrap();
         refuses(&folder, "render bad.toml -o out/image.png", words);
     }
+    fs::write(folder.path().join("brass.binary"), noise(256)).unwrap();
+    refuses(
+        &folder,
+        "render brass.binary -o out/image.png",
+        &["brass.binary: is a material, not a scene", "--material"],
+    );
+    fs::write(folder.path().join("teapot.obj"), "o mesh").unwrap();
+    refuses(&folder, "render teapot.obj -o out/image.png", &["teapot.obj: is a mesh, not a scene", "--mesh"]);
     fs::write(folder.path().join("noise.toml"), noise(256)).unwrap();
     fs::create_dir(folder.path().join("folder.toml")).unwrap();
     for name in ["noise.toml", "folder.toml", "missing.toml"] {
