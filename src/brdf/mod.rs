@@ -12,7 +12,7 @@ use std::path::Path;
 use glam::{DVec2, DVec3, Vec4, dvec3};
 
 use crate::error::{Error, Result};
-use crate::files::{FileKind, read};
+use crate::files::{FileKind, read, toml_problem};
 
 mod base;
 mod builtin;
@@ -84,6 +84,17 @@ impl Brdf {
         let brdf = Brdf::read_model(model, &mut parameters)?;
         parameters.finish(model)?;
         Ok(brdf)
+    }
+
+    /// Checks `model` and its parameters as [`Self::from_parameters`] does, but reads no files: those of bases under coats are taken to be
+    /// sound.
+    ///
+    /// # Errors
+    /// The model is not known, or a parameter is missing, unknown or out of range.
+    pub fn check_parameters(model: &str, table: toml::Table) -> Result<()> {
+        let mut parameters = Parameters::checked(table);
+        Brdf::read_model(model, &mut parameters)?;
+        parameters.finish(model)
     }
 
     /// What `model` reads from a table of its parameters, and what each of them may be.
@@ -225,7 +236,7 @@ impl Brdf {
 /// The model that the text of a material's TOML file names, and the other keys.
 fn model_of(text: &str) -> Result<(String, toml::Table)> {
     let mut table: toml::Table = text.parse().map_err(|error: toml::de::Error| {
-        Error::input("TOML", error.message().replace('\n', " "), "correct the file's syntax")
+        Error::input("TOML", toml_problem(text, &error), "correct the file's syntax")
     })?;
     Ok((parameters::take_model(&mut table)?, table))
 }
@@ -239,10 +250,11 @@ pub fn luminance(rgb: DVec3) -> f64 {
     rgb.dot(LUMINANCE)
 }
 
-/// Warns where `most`, that `what` is, exceeds 1 in some channel: such a surface reflects more light than it receives.
-fn warn_of_excess(what: &str, most: DVec3) {
+/// Warns where `most`, that `what` of a model with these `parameters` is, exceeds 1 in some channel: such a surface reflects more light than
+/// it receives.
+fn warn_of_excess(parameters: &Parameters, what: &str, most: DVec3) {
     let most = most.max_element();
-    if most > 1.0 + 1e-9 {
+    if most > 1.0 + 1e-9 && !parameters.only_checks() {
         tracing::warn!("{what} is {most:.3}: the surface reflects more light than it receives");
     }
 }

@@ -14,6 +14,17 @@ pub struct Parameters {
     read: Vec<Parameter>,
     /// Whether what is missing counts as the middle of its range.
     fills: bool,
+    /// Whether the model is only checked: files that are named are not read, and nothing is warned of, as both come when it is loaded.
+    only_checks: bool,
+    /// Keys that the model has, but not beside those that are given.
+    idle: Vec<Idle>,
+}
+
+/// A key that the model has, but not beside those that are given.
+struct Idle {
+    key: String,
+    problem: String,
+    remedy: String,
 }
 
 /// What a model reads, and what it takes: what a slider needs to know.
@@ -100,12 +111,22 @@ pub enum Spacing {
 impl Parameters {
     /// All entries of `table` are parameters.
     pub fn new(table: Table) -> Self {
-        Self { table, read: Vec::new(), fills: false }
+        Self { table, read: Vec::new(), fills: false, only_checks: false, idle: Vec::new() }
     }
 
     /// The same, but what is missing counts as the middle of its range, or as the first of its words.
     pub(super) fn filled(table: Table) -> Self {
         Self { fills: true, ..Self::new(table) }
+    }
+
+    /// The same, of a model that is only checked.
+    pub(super) fn checked(table: Table) -> Self {
+        Self { only_checks: true, ..Self::new(table) }
+    }
+
+    /// Whether the model is only checked: files are not to be read, nor anything warned of.
+    pub(super) fn only_checks(&self) -> bool {
+        self.only_checks
     }
 
     /// Those that have been read, in the order in which they were.
@@ -116,6 +137,21 @@ impl Parameters {
     /// Whether `key` is given and not yet read: what a parameter that may be left out is read by.
     pub fn has(&self, key: &str) -> bool {
         self.table.contains_key(key)
+    }
+
+    /// Notes that `keys` are in the place of `other`, which was read: it is an error if they are given too.
+    pub(super) fn instead_of(&mut self, keys: &[&str], other: &str) {
+        self.note(keys, format!("is not a parameter beside `{other}`"), format!("remove it, or `{other}`"));
+    }
+
+    /// Notes that `keys` are parameters only beside `other`, which is left out: it is an error if they are given.
+    pub(super) fn only_beside(&mut self, keys: &[&str], other: &str) {
+        self.note(keys, format!("is a parameter only beside `{other}`"), format!("give `{other}`, or remove it"));
+    }
+
+    fn note(&mut self, keys: &[&str], problem: String, remedy: String) {
+        let idle = |key: &&str| Idle { key: (*key).into(), problem: problem.clone(), remedy: remedy.clone() };
+        self.idle.extend(keys.iter().map(idle));
     }
 
     /// The number `key`, within `range` (NaN and infinities never are).
@@ -212,7 +248,7 @@ impl Parameters {
             None if self.fills => Table::new(),
             None => return Err(Error::input(key, "is missing", format!("give {what}"))),
         };
-        let mut inner = Parameters { fills: self.fills, ..Parameters::new(inner) };
+        let mut inner = Parameters { fills: self.fills, only_checks: self.only_checks, ..Parameters::new(inner) };
         let value = read(&mut inner).map_err(|error| inside(error, key))?;
         let of_inner = |parameter: Parameter| Parameter { key: format!("{key}.{}", parameter.key), ..parameter };
         self.read.extend(inner.read.drain(..).map(of_inner));
@@ -220,12 +256,15 @@ impl Parameters {
         Ok(value)
     }
 
-    /// Reports a key that `model` does not have.
+    /// Reports a key that `model` does not have, or not beside those that are given. What is unknown goes first: another key may lack
+    /// what is misspelt there.
     pub fn finish(self, model: &str) -> Result<()> {
-        match self.table.keys().next() {
-            Some(key) => {
-                Err(Error::input(key, format!("is not a parameter of `{model}`"), "remove or correct the key"))
-            }
+        let idle = |key: &String| self.idle.iter().find(|idle| idle.key == *key);
+        if let Some(key) = self.table.keys().find(|key| idle(key).is_none()) {
+            return Err(Error::input(key, format!("is not a parameter of `{model}`"), "remove or correct the key"));
+        }
+        match self.table.keys().find_map(idle) {
+            Some(Idle { key, problem, remedy }) => Err(Error::input(key, problem, remedy)),
             None => Ok(()),
         }
     }

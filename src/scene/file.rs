@@ -6,17 +6,17 @@ use std::path::{Path, PathBuf};
 use serde::de::{Deserializer, Error as _};
 use serde::{Deserialize, Serialize};
 use toml::Spanned;
+use toml::de::{DeTable, DeValue};
 
 use super::{
     Camera, DEFAULT_MATERIAL, EXPOSURE, EnvironmentSettings, GAMMA, INTENSITY, ImageSettings, MAX_SAMPLES, MAX_SIZE_PX,
-    MAX_SUBPIXELS, MaterialSettings, MaterialSource, ObjectSettings, Scene, ShadingSettings, Source, TangentRule, mesh,
-    three_numbers,
+    MAX_SUBPIXELS, MaterialSettings, MaterialSource, Mesh, ObjectSettings, Scene, ShadingSettings, Source, TangentRule,
+    mesh, three_numbers,
 };
 use crate::brdf::{Brdf, change_base_files, has_model, resolve_base_files};
-use crate::environment;
+use crate::environment::{self, Environment};
 use crate::error::{Error, Result};
-use crate::files::write_whole;
-use crate::files::{self, FileFormat, FileKind, text};
+use crate::files::{self, FileFormat, FileKind, quote_line, text, toml_problem, write_whole};
 
 /// A whole scene file.
 #[derive(Deserialize)]
@@ -86,7 +86,10 @@ impl Scene {
     /// Reads a scene file. Paths in it are relative to its folder. Without objects the scene is the built-in sphere; an object
     /// that names no material is of the first one, or of the default one in a scene without any.
     pub fn load(path: &Path) -> Result<Self> {
-        parse_file(path, &files::read(path)?)
+        match other_kind(path) {
+            Some(error) => Err(error),
+            None => parse_file(path, &files::read(path)?),
+        }
     }
 
     /// The formats of scene files.
@@ -111,12 +114,20 @@ impl Scene {
     /// The scene as the text of a file: paths in `folder` and below are relative to it, others are absolute.
     ///
     /// # Errors
-    /// A path that is not UTF-8, a material that a program defines.
+    /// A path that is not UTF-8, a material that a program defines, and what [`Self::parse`] would refuse: what [`Self::check`] says, a
+    /// built-in that there is not, parameters that their model does not have.
     pub fn to_toml(&self, folder: Option<&Path>) -> Result<String> {
-        let text = SceneText::new(self, folder)?;
-        toml::to_string_pretty(&text).map_err(|cause| {
+        self.check()?;
+        let text = toml::to_string_pretty(&SceneText::new(self, folder)?).map_err(|cause| {
             Error::input("scene", format!("cannot be written as TOML ({cause})"), "use numbers that are finite")
-        })
+        })?;
+        // Names and parameters are checked by who reads them.
+        match parse(&text, folder.unwrap_or(Path::new(""))) {
+            Ok(_) => Ok(text),
+            Err(problem) => {
+                Err(Error::input("scene", format!("could not be read again: {problem}"), "change it before saving"))
+            }
+        }
     }
 }
 
@@ -130,9 +141,25 @@ const FORMAT: FileFormat<Scene> = FileFormat {
     parse: |path, bytes, _| parse_file(path, bytes),
 };
 
+/// An error if `path` is called as files of another kind are, and not as scenes are.
+fn other_kind(path: &Path) -> Option<Error> {
+    let kinds = [
+        ("a material", "material", Brdf::FILES.format_of(path).is_ok()),
+        ("a mesh", "mesh", Mesh::FILES.format_of(path).is_ok()),
+        ("an environment", "environment", Environment::FILES.format_of(path).is_ok()),
+    ];
+    let (what, key, _) = kinds.into_iter().find(|(.., is_of_kind)| *is_of_kind)?;
+    Scene::FILES.format_of(path).is_err().then(|| not_a_scene(path, what, key))
+}
+
+/// The error that the file at `path` is `what`, which a scene has by this `key`.
+fn not_a_scene(path: &Path, what: &str, key: &str) -> Error {
+    Error::in_file(path, format!("is {what}, not a scene"), format!("give it with --{key}, or as the {key} in a scene"))
+}
+
 fn parse_file(path: &Path, bytes: &[u8]) -> Result<Scene> {
     if has_model(bytes) {
-        return Err(Error::in_file(path, "is a material, not a scene", "give it as the material of a scene's object"));
+        return Err(not_a_scene(path, "a material", "material"));
     }
     parse(text(path, bytes)?, path.parent().unwrap_or(Path::new("")))
         .map_err(|problem| Error::in_file(path, problem, REMEDY))
@@ -140,13 +167,9 @@ fn parse_file(path: &Path, bytes: &[u8]) -> Result<Scene> {
 
 /// Parses and checks a scene; an error is one line that names line and key.
 fn parse(text: &str, base_dir: &Path) -> Result<Scene, String> {
-    let file: SceneFile = toml::from_str(text).map_err(|error| {
-        let problem = error.message().split_whitespace().collect::<Vec<_>>().join(" ");
-        match error.span() {
-            Some(span) => format!("{}: {problem}", quote_line(text, span.start)),
-            None => problem,
-        }
-    })?;
+    let root = DeTable::parse(text).map_err(|error| toml_problem(text, &error))?;
+    check_tables(root.get_ref()).map_err(|(position, problem)| in_line(text, position)(problem))?;
+    let file = SceneFile::deserialize(toml::Deserializer::from(root)).map_err(|error| toml_problem(text, &error))?;
     let mut scene = Scene {
         image: file.image,
         camera: file.camera,
@@ -159,6 +182,11 @@ fn parse(text: &str, base_dir: &Path) -> Result<Scene, String> {
     for table in file.material {
         let in_line = in_line(text, table.span().start);
         let material = material(table.into_inner()).map_err(&in_line)?;
+        // Here, too, as one that no object has is not loaded.
+        if let MaterialSource::Model { model, parameters } = &material.source {
+            Brdf::check_parameters(model, parameters.clone())
+                .map_err(|error| in_line(error.within(format!("material \"{}\"", material.name)).to_string()))?;
+        }
         if !names.insert(material.name.clone()) {
             return Err(in_line(format!("there are two materials with `name` \"{}\"", material.name)));
         }
@@ -189,6 +217,33 @@ fn parse(text: &str, base_dir: &Path) -> Result<Scene, String> {
     Ok(scene)
 }
 
+/// Checks that there are tables where they belong, one or a list of them. Serde would say it in its own words, and take a list of values for
+/// a table. The error has the position of what is wrong in the text.
+fn check_tables(root: &DeTable) -> Result<(), (usize, String)> {
+    for (key, value) in root {
+        let name = key.get_ref();
+        let problem = match (&**name, value.get_ref()) {
+            ("material" | "object", DeValue::Array(list)) => {
+                if list.iter().all(|element| element.get_ref().is_table()) {
+                    continue;
+                }
+                format!("`{name}` is a list of tables: write [[{name}]] before each")
+            }
+            ("material" | "object", _) => {
+                format!("there may be several of `{name}`: write [[{name}]], with two brackets")
+            }
+            ("image" | "camera" | "environment" | "shading", DeValue::Table(_)) => continue,
+            ("image" | "camera" | "environment" | "shading", _) => {
+                format!("there is one `{name}`, a table: write [{name}], with one bracket")
+            }
+            // Serde tells of a key that is not known, with those that are.
+            _ => continue,
+        };
+        return Err((key.span().start, problem));
+    }
+    Ok(())
+}
+
 /// Puts `folder` in front of the relative paths of `scene`.
 fn resolve_paths(scene: &mut Scene, folder: &Path) -> Result<(), String> {
     let resolve = |path: &mut PathBuf| *path = folder.join(&*path);
@@ -217,14 +272,6 @@ fn resolve_paths(scene: &mut Scene, folder: &Path) -> Result<(), String> {
 /// thousands of tables.
 fn in_line(text: &str, position: usize) -> impl Fn(String) -> String {
     move |problem| format!("{}: {problem}", quote_line(text, position))
-}
-
-/// "line 7 (`width = 0`)" for the line of `text` that holds the byte at `position`.
-fn quote_line(text: &str, position: usize) -> String {
-    let before = text.get(..position).unwrap_or(text);
-    let number = before.matches('\n').count() + 1;
-    let line = text.lines().nth(number - 1).unwrap_or_default().trim();
-    format!("line {number} (`{line}`)")
 }
 
 /// A `[[material]]`: its name, and one of `file`, `builtin` and `model`, of which `builtin` may be the name itself; with `model` come

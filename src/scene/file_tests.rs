@@ -140,8 +140,8 @@ fn files_beside_a_saved_scene_are_named_relative_to_it() {
     scene.environment.source = Source::File(folder.path().join("maps/x.hdr"));
     scene.objects[0].mesh = Source::File("/elsewhere/y.obj".into());
     let base = folder.path().join("bases/z.binary");
-    let text =
-        format!("base = {{ model = 'layered', base = {base:?}, coat = {{}} }}\ncoat = {{ alpha = 0.1, ior = 1.5 }}");
+    let coat = "coat = { alpha = 0.1, ior = 1.5 }";
+    let text = format!("base = {{ model = 'layered', base = {base:?}, {coat} }}\n{coat}");
     scene.materials[0].source = MaterialSource::Model { model: "layered".into(), parameters: text.parse().unwrap() };
     scene.save(&path).unwrap();
     let text = std::fs::read_to_string(&path).unwrap();
@@ -168,6 +168,62 @@ fn what_toml_cannot_say_is_an_error_and_leaves_the_old_file() {
     assert_eq!(std::fs::read_to_string(&path).unwrap(), "old");
     let nowhere = folder.path().join("absent/saved.toml");
     assert!(Scene::default().save(&nowhere).unwrap_err().to_string().contains("absent"));
+}
+
+#[test]
+fn what_would_not_be_read_again_is_not_saved_and_leaves_the_old_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("saved.toml");
+    std::fs::write(&path, "old").unwrap();
+    type Set = fn(&mut Scene);
+    let model = |model: &str, parameters: &str| MaterialSource::Model {
+        model: model.into(),
+        parameters: parameters.parse().unwrap(),
+    };
+    let mut misspelt = Scene::default();
+    misspelt.materials[0].source = model("lambert", "reflectence = 0.5");
+    let changed = [
+        ("exposure", (|scene| scene.image.exposure = f64::NAN) as Set),
+        ("width", |scene| (scene.image.width, scene.image.height) = (0, 0)),
+        ("scale", |scene| scene.objects[0].scale = 0.0),
+        ("scale", |scene| scene.objects[0].scale = f32::NAN),
+        ("translate", |scene| scene.objects[0].translate.x = f32::NAN),
+        ("rotate_deg", |scene| scene.objects[0].rotate_deg.x = f32::NAN),
+        ("gold", |scene| scene.materials.clear()),
+        // Left out, it would be read as a sphere.
+        ("no objects", |scene| scene.objects.clear()),
+        ("mars", |scene| scene.environment.source = Source::Builtin("mars".into())),
+        ("cube", |scene| scene.objects[0].mesh = Source::Builtin("cube".into())),
+        ("velvet", |scene| scene.materials[0].source = MaterialSource::Builtin("velvet".into())),
+    ];
+    let changed = changed.map(|(said, set)| {
+        let mut scene = Scene::default();
+        set(&mut scene);
+        (said, scene)
+    });
+    for (said, scene) in changed.into_iter().chain([("reflectence", misspelt)]) {
+        let error = scene.save(&path).unwrap_err().to_string();
+        assert!(error.contains(said), "{said}: {error}");
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), "old");
+    }
+}
+
+#[test]
+fn files_of_another_kind_are_told_with_where_they_belong() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, text, said) in [
+        ("brass.binary", "", "is a material, not a scene; give it with --material"),
+        ("cloth.BSDF", "", "is a material, not a scene; give it with --material"),
+        ("red.toml", "model = 'lambert'\nreflectance = 0.5", "is a material, not a scene; give it with --material"),
+        ("teapot.obj", "o mesh", "is a mesh, not a scene; give it with --mesh"),
+        ("sky.hdr", "", "is an environment, not a scene; give it with --environment"),
+        ("sky.exr", "", "is an environment, not a scene; give it with --environment"),
+    ] {
+        let path = folder.path().join(name);
+        std::fs::write(&path, text).unwrap();
+        let error = Scene::load(&path).unwrap_err().to_string();
+        assert!(error.contains(name) && error.contains(said), "{error}");
+    }
 }
 
 #[test]
@@ -238,6 +294,49 @@ fn bad_values_are_errors_that_name_the_key_and_its_line() {
     }
     let error = error("[[material]]\nname = 'red'\nfile = 'x'\n[[object]]\nbuiltin = 'sphere'\nmaterial = 'blue'");
     assert!(error.contains("\"blue\"") && error.contains("red") && error.contains("line 4"), "{error}");
+}
+
+#[test]
+fn models_are_checked_though_no_object_has_them_but_files_are_not_read() {
+    let with = |parameters: &str| format!("[[material]]\nname = 'gold'\n[[material]]\nname = 'm'\n{parameters}");
+    for (parameters, said) in [
+        ("model = 'lambert'\nreflectence = 0.5", "reflectance: is missing; rename `reflectence`"),
+        ("model = 'lambert'\nreflectance = 0.5\nshine = 1", "shine: is not a parameter"),
+        ("model = 'lambert'\nreflectance = 2", "reflectance: is 2"),
+        ("model = 'wood'", "model `wood`"),
+        ("model = 'merl'", "model `merl`"),
+        ("model = 'layered'\nbase = 'x.binary'\ncoat = { alpha = 0.1, iro = 1.5 }", "coat.ior: is missing"),
+        ("model = 'layered'\nbase = 'velvet'\ncoat = { alpha = 0.1, ior = 1.5 }", "velvet"),
+    ] {
+        let error = error(&with(parameters));
+        assert!(error.contains("line 3") && error.contains("material \"m\": "), "{error}");
+        assert!(error.contains(said), "{error}");
+    }
+    let text = with("model = 'layered'\nbase = 'absent.binary'\ncoat = { alpha = 0.1, ior = 1.5 }");
+    assert_eq!(Scene::parse(&text, Path::new("")).unwrap().materials.len(), 2);
+}
+
+#[test]
+fn wrong_brackets_and_lists_in_the_place_of_tables_are_told_with_the_right_ones() {
+    for (text, line, said) in [
+        ("[material]\nname = 'gold'", "line 1 (`[material]`)", "write [[material]]"),
+        ("[image]\nwidth = 8\n[object]\nbuiltin = 'sphere'", "line 3 (`[object]`)", "write [[object]]"),
+        ("\n[[camera]]\neye = [0, 0, 4]", "line 2 (`[[camera]]`)", "write [camera]"),
+        ("[[image]]\nwidth = 8", "line 1", "write [image]"),
+        ("[[environment]]\nintensity = 1", "line 1", "write [environment]"),
+        ("[[shading]]\nseed = 1", "line 1", "write [shading]"),
+        // In the order of the fields.
+        ("image = [8, 8, 1, 1.0, 2.2, 'none']", "line 1", "write [image]"),
+        ("camera = [[0, 0, 4], [0, 0, 0], [0, 1, 0], 30]", "line 1", "write [camera]"),
+        ("object = [['x.obj']]", "line 1", "a list of tables: write [[object]]"),
+        ("material = 'gold'", "line 1", "write [[material]]"),
+        ("image = 3", "line 1", "write [image]"),
+    ] {
+        let error = error(text);
+        assert!(error.contains(line) && error.contains(said), "{text:?}: {error}");
+    }
+    let inline = "image = { width = 8 }\nobject = [{ builtin = 'sphere' }]";
+    assert_eq!(Scene::parse(inline, Path::new("")).unwrap().image.width, 8);
 }
 
 #[test]

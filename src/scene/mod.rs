@@ -339,6 +339,17 @@ impl Scene {
             return Err(Error::input(format!("\"{}\"", twice.name), problem, "give each a name of its own"));
         }
         for object in &self.objects {
+            let wrong = |name: &str, value: &dyn std::fmt::Display, remedy: &str| {
+                Err(Error::input(format!("{name} of {}", object.mesh), format!("is {value}"), remedy))
+            };
+            for (name, vector) in [("translate", object.translate), ("rotate_deg", object.rotate_deg)] {
+                if !vector.is_finite() {
+                    return wrong(name, &vector, "use three finite numbers");
+                }
+            }
+            if !object.scale.is_finite() || object.scale == 0.0 {
+                return wrong("scale", &object.scale, "use a finite number that is not 0");
+            }
             if let Some(TangentRule::Around(axis) | TangentRule::Along(axis)) = object.tangent
                 && !(axis.length() > 0.0 && axis.is_finite())
             {
@@ -453,7 +464,7 @@ mod tests {
     fn what_no_scene_file_can_say_no_program_can_set() {
         assert!(Scene::default().check().is_ok());
         type Set = fn(&mut Scene);
-        let wrong: [(&str, Set); 15] = [
+        let wrong: [(&str, Set); 20] = [
             ("width", |scene| scene.image.width = 0),
             ("height", |scene| scene.image.height = MAX_SIZE_PX + 1),
             ("subpixels", |scene| scene.image.subpixels = 0),
@@ -469,6 +480,11 @@ mod tests {
             ("\"gold\"", |scene| scene.materials.push(scene.materials[0].clone())),
             ("tangent", |scene| scene.objects[0].tangent = Some(TangentRule::Around(Vec3::ZERO))),
             ("tangent", |scene| scene.objects[0].tangent = Some(TangentRule::Along(Vec3::NAN))),
+            ("translate of sphere", |scene| scene.objects[0].translate.y = f32::NAN),
+            ("rotate_deg of sphere", |scene| scene.objects[0].rotate_deg.z = f32::INFINITY),
+            ("scale of sphere", |scene| scene.objects[0].scale = 0.0),
+            ("scale of sphere", |scene| scene.objects[0].scale = f32::NAN),
+            ("scale of sphere", |scene| scene.objects[0].scale = f32::INFINITY),
         ];
         for (name, set) in wrong {
             let mut scene = Scene::default();

@@ -103,6 +103,7 @@ fn hostile_material_descriptions_are_refused() {
     for (name, text, key) in [
         ("empty.toml", "", "model"),
         ("syntax.toml", "model = ", "TOML"),
+        ("comma.toml", "model = 'lambert'\nreflectance = 0,5", "line 2 (`reflectance = 0,5`)"),
         ("model.toml", "model = 'wood'", "wood"),
         ("number.toml", "model = 3", "model"),
         ("unknown.toml", "model = 'lambert'\nreflectance = 0.5\nshine = 1", "shine"),

@@ -23,6 +23,8 @@ fn hostile_scene_files_are_refused() {
         ("[shading]\npattern = 'dots'", "per-pixel"),
         ("[scene]", "scene"),
         ("[environment]\nbuiltin = 'mars'", "mars"),
+        ("[material]\nname = 'gold'", "write [[material]]"),
+        ("image = [8, 8, 1, 1.0, 2.2, 'none']", "write [image]"),
         ("[environment]\nintensity = -1", "intensity"),
         ("[environment]\nintensity = 1e39", "intensity"),
         ("[environment]\nfile = 'missing.hdr'", "missing.hdr"),
@@ -58,13 +60,25 @@ fn hostile_scene_files_are_refused() {
         ("[shading]\nmethod = 'fited'", &["bad.toml", "fitted"]),
         (
             "[[material]]\nname = 'm'\nmodel = 'lambert'\nreflectence = 1",
-            &["bad.toml: material \"m\": ", "rename `reflectence`"],
+            &["bad.toml: line 1 (`[[material]]`): material \"m\": ", "rename `reflectence`"],
+        ),
+        (
+            "[[material]]\nname = 'gold'\n[[material]]\nname = 'm'\nmodel = 'lambert'\nreflectence = 1",
+            &["bad.toml: line 3", "rename `reflectence`"],
         ),
         ("[shading]\nthreads = 1025", &["bad.toml: threads: are 1025"]),
     ] {
         fs::write(folder.path().join("bad.toml"), text).unwrap();
         refuses(&folder, "render bad.toml -o out/image.png", words);
     }
+    fs::write(folder.path().join("brass.binary"), noise(256)).unwrap();
+    refuses(
+        &folder,
+        "render brass.binary -o out/image.png",
+        &["brass.binary: is a material, not a scene", "--material"],
+    );
+    fs::write(folder.path().join("teapot.obj"), "o mesh").unwrap();
+    refuses(&folder, "render teapot.obj -o out/image.png", &["teapot.obj: is a mesh, not a scene", "--mesh"]);
     fs::write(folder.path().join("noise.toml"), noise(256)).unwrap();
     fs::create_dir(folder.path().join("folder.toml")).unwrap();
     for name in ["noise.toml", "folder.toml", "missing.toml"] {

@@ -7,7 +7,7 @@
 use glam::{DVec3, dvec3};
 
 use crate::brdf::Parameters;
-use crate::error::Result;
+use crate::error::{Error, Result};
 
 #[derive(Clone, Copy, Debug)]
 struct Metal {
@@ -41,11 +41,22 @@ const METALS: &[(&str, Metal)] = &[
     ("W", Metal { eta: dvec3(3.6925, 3.5, 3.309), k: dvec3(2.937, 2.7291, 2.5258) }),
 ];
 
+/// Says of a metal that is not listed that its index of refraction may be given.
+fn or_its_index(error: Error) -> Error {
+    match error {
+        Error::Input { subject, problem, remedy } => {
+            Error::Input { subject, problem, remedy: format!("{remedy}, or give `eta` and `k` in its place") }
+        }
+        other => other,
+    }
+}
+
 /// Reads the index of refraction: either the key `metal`, a chemical symbol, or `eta` and `k`.
 pub(crate) fn index_of_refraction(parameters: &mut Parameters) -> Result<(DVec3, DVec3)> {
     if parameters.has("metal") {
         let help = "Chemical symbol of the metal, whose index of refraction is taken at 650, 550 and 450 nm.";
-        let Metal { eta, k } = parameters.choice("metal", METALS, help)?;
+        let Metal { eta, k } = parameters.choice("metal", METALS, help).map_err(or_its_index)?;
+        parameters.instead_of(&["eta", "k"], "metal");
         return Ok((eta, k));
     }
     // No material is outside: the bounds only keep the Fresnel terms far from overflow in single precision.

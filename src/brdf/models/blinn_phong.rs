@@ -45,7 +45,7 @@ impl Model for BlinnPhong {
             )?,
             exponent: parameters.number("exponent", 0.0..=1e5, Spacing::Logarithmic, help)?,
         };
-        warn_of_excess("blinn_phong: diffuse + specular", model.diffuse + model.specular);
+        warn_of_excess(parameters, "blinn_phong: diffuse + specular", model.diffuse + model.specular);
         Ok(model)
     }
 

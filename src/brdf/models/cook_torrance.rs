@@ -60,7 +60,7 @@ impl Model for CookTorrance {
                 "Slope of the facets: 0.01 is nearly a mirror.",
             )?,
         };
-        warn_of_excess("cook_torrance: diffuse + specular", model.diffuse + model.specular);
+        warn_of_excess(parameters, "cook_torrance: diffuse + specular", model.diffuse + model.specular);
         Ok(model)
     }
 

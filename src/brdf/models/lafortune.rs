@@ -56,6 +56,12 @@ impl Model for Lafortune {
         for number in 1..=MAX_LOBES {
             let key = |name: &str| format!("{name}_{number}");
             if number > 1 && !parameters.has(&key("c_xy")) {
+                parameters.only_beside(&[&key("c_z"), &key("exponent")], &key("c_xy"));
+                // Lobes are numbered without a gap.
+                for later in number + 1..=MAX_LOBES {
+                    let keys = ["c_xy", "c_z", "exponent"].map(|name| format!("{name}_{later}"));
+                    parameters.only_beside(&keys.each_ref().map(String::as_str), &key("c_xy"));
+                }
                 break;
             }
             let help = "C_x = C_y of the lobe: negative about the mirror direction, positive about the light.";

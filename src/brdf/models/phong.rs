@@ -55,7 +55,7 @@ impl Model for Phong {
                 "Exponent of the lobe: the larger, the narrower.",
             )?,
         };
-        warn_of_excess("phong: diffuse + specular", model.diffuse + model.specular);
+        warn_of_excess(parameters, "phong: diffuse + specular", model.diffuse + model.specular);
         Ok(model)
     }
 

@@ -141,6 +141,7 @@ fn index_of_refraction(parameters: &mut Parameters, key: &str) -> Result<f64> {
 impl Coat {
     fn from_parameters(parameters: &mut Parameters) -> Result<Option<Self>> {
         if !parameters.has("coat") {
+            parameters.only_beside(&["coat_roughness", "coat_ior"], "coat");
             return Ok(None);
         }
         let weight = parameters.number("coat", 0.0..=1.0, Spacing::Linear, "How much clear coat there is.")?;
@@ -153,6 +154,7 @@ impl Coat {
 impl Sheen {
     fn from_parameters(parameters: &mut Parameters) -> Result<Option<Self>> {
         if !parameters.has("sheen") {
+            parameters.only_beside(&["sheen_roughness"], "sheen");
             return Ok(None);
         }
         let colour = parameters.colour("sheen", 0.0..=1.0, "Colour of a layer of fibres, linear Rec. 709.")?;

@@ -379,11 +379,44 @@ fn bad_parameters_are_refused_by_their_key() {
         (&format!("{conductor}alpha = inf"), "alpha"),
         (&conductor.replace("ggx", "phong"), "distribution"),
         (&conductor.replace("[2, 2, 2]", "[2, -2, 2]\nalpha = 0.1"), "k"),
-        ("model = 'lambert'\nreflectance = [0.1,", "TOML"),
+        ("model = 'lambert'\nreflectance = [0.1,", "TOML: line 2 (`reflectance = [0.1,`)"),
+        ("model = 'lambert'\nreflectance = 0,5", "TOML: line 2 (`reflectance = 0,5`)"),
     ] {
         let message = from_toml(text).unwrap_err().within("scene.toml").to_string();
         assert!(message.starts_with(&format!("scene.toml: {key}: ")), "{text:?} gave {message:?}");
         assert!(!message.contains('\n'), "{message:?}");
+    }
+}
+
+#[test]
+fn a_parameter_that_others_rule_out_is_not_called_unknown() {
+    let metal = "model = 'torrance_sparrow'\ndiffuse = 0\nspread_deg = 20\n";
+    let principled = "model = 'principled'\nbase_colour = 0.5\nmetallic = 0\nroughness = 0.3\n";
+    let lafortune = "model = 'lafortune'\ndiffuse = 0.1\nc_xy_1 = -1\nc_z_1 = 0.9\nexponent_1 = 10\n";
+    for (text, said) in [
+        (
+            format!("{metal}metal = 'Au'\neta = 1\nk = 1"),
+            "eta: is not a parameter beside `metal`; remove it, or `metal`",
+        ),
+        (format!("{metal}metal = 'Fe'"), "\"W\", or give `eta` and `k` in its place"),
+        (
+            format!("{principled}coat_roughness = 0.3"),
+            "coat_roughness: is a parameter only beside `coat`; give `coat`, or remove it",
+        ),
+        (format!("{principled}coat_ior = 1.4"), "coat_ior: is a parameter only beside `coat`"),
+        (format!("{principled}sheen_roughness = 0.3"), "sheen_roughness: is a parameter only beside `sheen`"),
+        // What is misspelt goes first.
+        (format!("{principled}cowt = 1\ncoat_ior = 1.4"), "cowt: is not a parameter of `principled`"),
+        (format!("{lafortune}c_z_2 = 0.9"), "c_z_2: is a parameter only beside `c_xy_2`"),
+        (format!("{lafortune}c_xy_3 = -1"), "c_xy_3: is a parameter only beside `c_xy_2`"),
+        (format!("{lafortune}c_xy_9 = -1"), "c_xy_9: is not a parameter of `lafortune`"),
+        (
+            format!("model = 'layered'\ncoat = {{ alpha = 0.1, ior = 1.5 }}\n[base]\n{principled}coat_ior = 1.4"),
+            "base.coat_ior: is a parameter only beside `coat`",
+        ),
+    ] {
+        let message = from_toml(&text).unwrap_err().to_string();
+        assert!(message.contains(said), "{text}: {message}");
     }
 }
 

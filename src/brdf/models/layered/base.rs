@@ -1,9 +1,10 @@
 //! What lies under a coat: a built-in material, a file, or a model with its parameters in a table of its own.
 use std::path::{Path, PathBuf};
 
+use glam::DVec3;
 use toml::{Table, Value};
 
-use crate::brdf::{Brdf, Domain, Parameters};
+use crate::brdf::{Brdf, Domain, Lambert, Parameters};
 use crate::error::{Error, Result};
 
 const KEY: &str = "base";
@@ -20,6 +21,10 @@ pub(super) fn read(parameters: &mut Parameters) -> Result<Brdf> {
     let names = Domain::Choice(Brdf::builtin_names().map(str::to_owned).collect());
     let value = parameters.take(KEY, what, names, "What is under the coat.")?;
     match value.as_str() {
+        // Any base will do for what is thrown away.
+        Some(text) if is_file(text) && parameters.only_checks() => {
+            Ok(Brdf::Lambert(Lambert { reflectance: DVec3::ZERO }))
+        }
         Some(text) if is_file(text) => load_file(Path::new(text)).map_err(|error| error.within(KEY)),
         Some(name) => Brdf::builtin(name).ok_or_else(|| {
             let remedy = Brdf::FILES.remedy_for(name);
