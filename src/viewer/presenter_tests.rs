@@ -3,7 +3,7 @@ use super::*;
 use crate::graph::{Kept, MemoryRequirement, Plan, ResourceInfo, ResourceKind, Work};
 use crate::prepare::prepare;
 use crate::scene::{Method, Scene};
-use crate::vulkan::Instance;
+use crate::vulkan::test_device;
 
 /// Memory as a plain device would ask for it, so that plans are the same on all: 16 bytes a texel, multiples of 64 KiB.
 fn memory(info: &ResourceInfo) -> MemoryRequirement {
@@ -23,9 +23,7 @@ struct Stage {
 
 impl Stage {
     fn new() -> Self {
-        let instance = Instance::new(false).expect("an instance");
-        let asked = std::env::var("THREADLIGHT_TEST_DEVICE").ok();
-        let device = Device::new(&instance, asked.as_deref()).expect("a device");
+        let device = test_device::open();
         let mut scene = Scene::default();
         (scene.image.width, scene.image.height) = (640, 480);
         scene.shading.method = Method::Cosine;
