@@ -3,6 +3,8 @@ mod cache_file;
 mod format;
 mod read;
 mod seal;
+#[cfg(test)]
+mod test_data;
 mod whole_file;
 
 pub(crate) use cache_file::keep_file;
@@ -10,4 +12,6 @@ pub use format::{FileFormat, FileKind};
 pub(crate) use format::{file_formats, is_misspelt};
 pub use read::{read, text};
 pub(crate) use seal::{sealed, unsealed};
+#[cfg(test)]
+pub(crate) use test_data::measured;
 pub use whole_file::{check_all_writable, check_not_read, check_writable, file_in, file_name, write_whole};
