@@ -44,6 +44,10 @@ pub fn model(text: &str) -> MaterialSource {
     MaterialSource::Model { model, parameters }
 }
 
+/// A surface so rough that it is matt along its normal, and a mirror at grazing views.
+pub const MATT_ALONG_ITS_NORMAL: &str =
+    "model = 'he_torrance'\ndiffuse = 0\nsigma_um = 0.3\ntau_um = 2.5\nspecular_alpha = 0.018\nmetal = 'Al'";
+
 /// Lambert, conductors of two widths, plastic.
 pub fn analytic_materials() -> Vec<(&'static str, MaterialSource)> {
     vec![
