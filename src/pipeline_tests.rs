@@ -4,18 +4,14 @@ use crate::memo::Memo;
 use crate::method::Method;
 use crate::prepare::prepare;
 use crate::scene::{Scene, Source};
-use crate::vulkan::Instance;
 use crate::vulkan::faults::{Fault, with_fault};
+use crate::vulkan::test_device;
 use ash::vk::Result as Call;
 use std::time::{Duration, Instant};
 
 /// Opens a device and renders a small picture, with what fails and the calls that were made; all is closed again.
 fn render(prepared: &Prepared, fault: Option<Fault>) -> (Result<usize>, Vec<&'static str>) {
-    let instance = Instance::new(true).expect("an instance");
-    let messages = instance.messages();
-    let asked = std::env::var("THREADLIGHT_TEST_DEVICE").ok();
-    let device = Device::new(&instance, asked.as_deref()).expect("a device");
-    drop(instance);
+    let (device, messages) = test_device::open_validated();
     let memo = Memo::default();
     let rendered = with_fault(fault, || {
         let wanted = Wanted { radiance: true, display: true, geometry: true };

@@ -3,9 +3,10 @@
 //! Runs on the device that THREADLIGHT_TEST_DEVICE names, or else on the one that the program prefers.
 mod common;
 
-use assert_cmd::Command;
+use common::{device_flags, own_cache, program, program_with_cache};
 use serde_json::Value;
 use std::fs;
+use std::process::Command;
 use tempfile::TempDir;
 
 /// What makes measurements quick.
@@ -14,20 +15,14 @@ const QUICK_TRUTH: &str = "--reference-tolerance 1e-2";
 
 /// `threadlight bench` in `folder`, without a device.
 fn command(folder: &TempDir, arguments: &str) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_threadlight"));
-    let cache = common::folder_of_run().unwrap_or(folder.path().join("cache"));
-    command.current_dir(folder).env("THREADLIGHT_CACHE", cache).env_remove("RUST_LOG");
+    let mut command = program(folder);
     command.arg("bench").args(arguments.split(' '));
     command
 }
 
 /// What that prints, on the device to test on; it must succeed and have nothing to complain about.
 fn bench(folder: &TempDir, arguments: &str) -> String {
-    let mut command = command(folder, arguments);
-    if let Some(device) = std::env::var_os("THREADLIGHT_TEST_DEVICE") {
-        command.arg("--device").arg(device);
-    }
-    let output = command.output().unwrap();
+    let output = command(folder, arguments).args(device_flags()).output().unwrap();
     let complaints = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success() && complaints.is_empty(), "{complaints}");
     String::from_utf8(output.stdout).unwrap()
@@ -99,8 +94,7 @@ fn shaders_are_compiled_for_a_gpu_that_is_not_there_and_spill_nothing() {
         return;
     }
     let folder = tempfile::tempdir().unwrap();
-    let mut command = Command::new(env!("CARGO_BIN_EXE_threadlight"));
-    command.current_dir(&folder).env("THREADLIGHT_CACHE", folder.path().join("cache")).env_remove("RUST_LOG");
+    let mut command = program_with_cache(&folder, own_cache(&folder));
     command.envs([("RADV_FORCE_FAMILY", "navi21"), ("VK_DRIVER_FILES", RADV), ("VK_ICD_FILENAMES", RADV)]);
     let arguments = "bench shaders --method fitted --threads 4 --material clay --environment white --json shaders.json";
     let output = command.args(arguments.split(' ')).output().unwrap();

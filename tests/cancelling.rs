@@ -1,8 +1,8 @@
 //! Long computations stop soon after they are told to: a window waits for them when it closes.
 mod common;
-use common::{Validated, data, model, ready, sphere};
+use common::{Validated, data, device_flags, model, program, ready, sphere};
 use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
@@ -85,8 +85,7 @@ fn hard_scene() -> Prepared {
     let material: MaterialSource =
         model("model = 'plastic'\ndistribution = 'ggx'\nalpha = 0.003\nior = 1.5\ndiffuse = [0.3, 0.08, 0.04]");
     let mut scene: Scene = sphere(material, "studio", 1, (640, 480));
-    let map: Option<PathBuf> = data().map(|data| data.join("env/studio_small_03_1k.hdr")).filter(|map| map.exists());
-    if let Some(map) = map {
+    if let Some(map) = data("env/studio_small_03_1k.hdr") {
         scene.environment.source = Source::File(map);
     }
     scene.shading.method = Method::Reference;
@@ -134,8 +133,7 @@ fn the_reference_stops_at_once_and_comes_in_stages() {
 fn an_environment_stops_being_blurred_at_once() {
     let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
     let gpu = Validated::with_own_memo();
-    let map = data().map(|data| data.join("env/studio_small_03_1k.hdr")).filter(|map| map.exists());
-    let source = map.map_or(Source::Builtin("studio".into()), Source::File);
+    let source = data("env/studio_small_03_1k.hdr").map_or(Source::Builtin("studio".into()), Source::File);
     let start = Instant::now();
     let environment = gpu.round().ask(&LoadEnvironment(&source)).unwrap();
     println!("loaded in {:?}", start.elapsed());
@@ -199,8 +197,9 @@ fn a_program_that_waits_for_its_input_has_answered_what_it_read_and_ends_when_it
     use std::io::{BufRead, Write};
     use std::process::Stdio;
     let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
+    let folder = tempfile::tempdir().unwrap();
     for signal in ["INT", "TERM"] {
-        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_threadlight"));
+        let mut command = program(&folder);
         command.args(["materials", "evaluate", "clay"]).stdin(Stdio::piped()).stdout(Stdio::piped());
         let mut child = command.spawn().unwrap();
         let mut input = child.stdin.take().unwrap();
@@ -227,12 +226,9 @@ fn an_interrupted_rendering_ends_soon_and_leaves_no_file() {
     let mut interrupted = BTreeSet::new();
     let moments = [300, 1500, 3000].map(Duration::from_millis);
     for (after, signal) in moments.into_iter().flat_map(|after| ["INT", "TERM"].map(|signal| (after, signal))) {
-        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_threadlight"));
+        let mut command = program(&folder);
         command.args(["render", "--no-cache", "--environment", "map.exr", "--size", "64x48", "-o", "picture.png"]);
-        if let Ok(device) = std::env::var("THREADLIGHT_TEST_DEVICE") {
-            command.args(["--device", &device]);
-        }
-        let mut child = command.current_dir(folder.path()).stderr(std::process::Stdio::piped()).spawn().unwrap();
+        let mut child = command.args(device_flags()).stderr(std::process::Stdio::piped()).spawn().unwrap();
         std::thread::sleep(after);
         let start = Instant::now();
         let sent = std::process::Command::new("kill").args(["-s", signal, &child.id().to_string()]).status().unwrap();

@@ -176,11 +176,10 @@ fn a_lobe_that_mirrors_lamps_brings_what_they_are_blurred_to() {
 fn a_rotation_of_the_material_fits_nothing() {
     let gpu = Validated::with_own_memo();
     let turned = |rotation_deg: f64| {
-        let text =
-            format!("distribution = 'ggx'\nmetal = 'Al'\nalpha_x = 0.1\nalpha_y = 0.3\nrotation_deg = {rotation_deg}");
+        let roughness = format!("alpha_x = 0.1\nalpha_y = 0.3\nrotation_deg = {rotation_deg}");
         let mut scene = small();
         scene.materials[0].source =
-            MaterialSource::Model { model: "conductor".into(), parameters: text.parse().unwrap() };
+            common::model(&format!("model = 'conductor'\ndistribution = 'ggx'\nmetal = 'Al'\n{roughness}"));
         scene.shading.threads = Some(1);
         scene
     };

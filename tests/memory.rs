@@ -1,6 +1,6 @@
 //! Changes of a scene do not grow memory: in a process of its own, whose memory is measured.
 mod common;
-use common::{Validated, sphere};
+use common::{Validated, model, sphere};
 use std::process::Command;
 use threadlight::Method;
 use threadlight::low_level::pipeline::{DeviceScene, Wanted};
@@ -39,8 +39,7 @@ fn memory_that_is_given_back_at_once_does_not_grow() {
     let mut renderer = None;
     for change in 0..200 {
         let alpha = 0.2 + 0.003 * f64::from(change);
-        let parameters = format!("reflectance = [{alpha}, 0.5, 0.5]").parse().unwrap();
-        scene.materials[0].source = MaterialSource::Model { model: "lambert".into(), parameters };
+        scene.materials[0].source = model(&format!("model = 'lambert'\nreflectance = [{alpha}, 0.5, 0.5]"));
         scene.environment.source = Source::Builtin(environments[change as usize / 20 % 2].into());
         scene.shading.method = if change % 15 == 0 { Method::Cosine } else { Method::Paper };
         scene.objects[0].scale = 1.0 + change as f32 / 100.0;

@@ -1,8 +1,10 @@
 //! The viewer in a window of a virtual X server, on the test device, with validation.
 #![cfg(all(feature = "viewer", target_os = "linux"))]
+mod common;
 #[path = "common/display.rs"]
 mod display;
 
+use common::{device_flags, folder_of_run, program_with_cache};
 use display::Display;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
@@ -47,15 +49,10 @@ impl Viewer {
 
     /// `threadlight`, on the test device, with the caches of all tests.
     fn threadlight(&self, arguments: &[&str]) -> Command {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_threadlight"));
-        command.args(arguments).current_dir(self.folder.path());
-        let of_run = std::env::var_os("THREADLIGHT_TEST_CACHE").map(PathBuf::from);
-        let cache = of_run.unwrap_or_else(|| Path::new(env!("CARGO_TARGET_TMPDIR")).join("viewer"));
-        command.env("THREADLIGHT_CACHE", cache);
-        command.env("DISPLAY", &self.display.name).env_remove("WAYLAND_DISPLAY").env_remove("RUST_LOG");
-        if let Ok(device) = std::env::var("THREADLIGHT_TEST_DEVICE") {
-            command.args(["--device", &device]);
-        }
+        let cache = folder_of_run().unwrap_or_else(|| Path::new(env!("CARGO_TARGET_TMPDIR")).join("viewer"));
+        let mut command = program_with_cache(&self.folder, cache);
+        command.env("DISPLAY", &self.display.name).env_remove("WAYLAND_DISPLAY");
+        command.args(arguments).args(device_flags());
         command
     }
 

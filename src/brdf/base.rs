@@ -73,10 +73,7 @@ impl BaseProfile {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn brdf(model: &str, parameters: &str) -> Brdf {
-        Brdf::from_parameters(model, parameters.parse().unwrap()).unwrap()
-    }
+    use crate::brdf::tests::samples::of_model;
 
     #[test]
     fn the_base_of_a_product_is_its_part_that_depends_on_light_whatever_lobe_is_over_it() {
@@ -84,19 +81,19 @@ mod tests {
         let ashikhmin = |c: f64| 1.0 - (1.0 - 0.5 * c).powi(5);
         let mean =
             (0..1000).map(|i| (f64::from(i) + 0.5) / 1000.0).map(|c| 2.0 * c * ashikhmin(c)).sum::<f64>() / 1000.0;
-        let found = BaseProfile::of(&brdf("ashikhmin_shirley", "diffuse = 0.5\nspecular = 0.1\nexponent = 3000"));
+        let found = BaseProfile::of(&of_model("ashikhmin_shirley", "diffuse = 0.5\nspecular = 0.1\nexponent = 3000"));
         for c in [0.0, 0.1, 0.3, 0.7, 1.0] {
             let error = f64::from(found.at(c as f32)) - ashikhmin(c) / mean;
             assert!(error.abs() < 2e-3, "{c}: off by {error}");
         }
-        let lambert = BaseProfile::of(&brdf("lambert", "reflectance = [0.8, 0.5, 0.2]"));
+        let lambert = BaseProfile::of(&of_model("lambert", "reflectance = [0.8, 0.5, 0.2]"));
         assert!([0.0, 0.2, 1.0].into_iter().all(|c| (lambert.at(c) - 1.0).abs() < 1e-4), "{lambert:?}");
     }
 
     #[test]
     fn what_has_no_base_has_lamberts_and_every_base_has_the_mean_1() {
-        let black = brdf("lambert", "reflectance = 0");
-        let mirror = brdf("conductor", "distribution = 'beckmann'\nalpha = 0.02\nmetal = 'Al'");
+        let black = of_model("lambert", "reflectance = 0");
+        let mirror = of_model("conductor", "distribution = 'beckmann'\nalpha = 0.02\nmetal = 'Al'");
         assert_eq!([&black, &mirror].map(BaseProfile::of), [BaseProfile::EVEN; 2]);
         for material in Brdf::builtin_names() {
             let base = BaseProfile::of(&Brdf::builtin(material).unwrap());

@@ -30,7 +30,7 @@ mod tabulate;
 
 pub use base::BaseProfile;
 pub(crate) use files::has_model;
-pub use files::merl_bytes;
+pub use files::{merl_bytes, merl_bytes_of_stored, merl_bytes_of_values};
 pub use lobe::{Ellipse, LobeShape, MIN_COS_THETA_D, NARROWING_COSINES, half_vector_width, lobe_radius};
 pub use made_table::{MADE_TABLE_SIZE, MadeTable};
 pub use microfacet::{Axes, Distribution, Roughness, Tap, fresnel_conductor, fresnel_dielectric, ggx_lobe};
@@ -267,4 +267,4 @@ fn hash_numbers(hasher: &mut blake3::Hasher, numbers: impl IntoIterator<Item = f
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

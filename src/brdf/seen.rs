@@ -88,11 +88,12 @@ mod tests {
     use glam::dvec3;
 
     use super::*;
+    use crate::brdf::tests::samples::of_model;
 
     #[test]
     fn the_mean_of_a_long_lobe_is_that_over_a_great_many_azimuths() {
         let text = "distribution = 'ggx'\nmetal = 'Al'\nalpha_x = 0.005\nalpha_y = 0.3\nrotation_deg = 20";
-        let brdf = Brdf::from_parameters("conductor", text.parse().unwrap()).unwrap();
+        let brdf = of_model("conductor", text);
         let (seen, w_o) = (SeenBrdf::from_all_around(&brdf), dvec3(0.6, 0.0, 0.8));
         const COUNT: usize = 20_000;
         let azimuths = || (0..COUNT).map(|i| DVec2::from_angle(TAU * i as f64 / COUNT as f64));

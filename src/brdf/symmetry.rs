@@ -103,8 +103,7 @@ mod tests {
     const ALL: Symmetry = Symmetry { isotropic: true, half_turn: true, mirror_x: true, mirror_y: true };
 
     fn conductor(roughness: &str) -> Brdf {
-        let text = format!("distribution = 'ggx'\nmetal = 'Al'\n{}", roughness.replace(';', "\n"));
-        Brdf::from_parameters("conductor", text.parse().unwrap()).unwrap()
+        samples::of_model("conductor", &format!("distribution = 'ggx'; metal = 'Al'; {roughness}"))
     }
 
     #[test]

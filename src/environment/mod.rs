@@ -225,12 +225,7 @@ pub(crate) mod tests {
 
     /// A file of the reference images' folder, or nothing where it is absent.
     pub(crate) fn reference_environment(name: &str) -> Option<Environment> {
-        let data = std::env::var("THREADLIGHT_DATA").unwrap_or("../shared/data".into());
-        let path = std::path::Path::new(&data).join("../reference/env").join(name);
-        if !path.exists() {
-            println!("skipped: {} is not here", path.display());
-            return None;
-        }
+        let path = crate::files::measured(&format!("../reference/env/{name}"))?;
         Some(Environment::load(&path).unwrap())
     }
 

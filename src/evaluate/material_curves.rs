@@ -83,10 +83,11 @@ pub fn in_plane(theta_deg: f64) -> DVec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::brdf::tests::samples::of_model;
 
     #[test]
     fn curves_of_a_diffuse_surface_are_what_lambert_says() {
-        let lambert = Brdf::from_parameters("lambert", "reflectance = [0.9, 0.5, 0.1]".parse().unwrap()).unwrap();
+        let lambert = of_model("lambert", "reflectance = [0.9, 0.5, 0.1]");
         let [side] = Side::of(&lambert)[..] else { panic!("one side") };
         let f = dvec3(0.9, 0.5, 0.1) / std::f64::consts::PI;
         for [x, z] in side.lobe(30.0) {

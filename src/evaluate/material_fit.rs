@@ -320,11 +320,12 @@ fn mean_squares(samples: &[Sample], f: impl Fn(&Sample) -> DVec3) -> DVec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::brdf::tests::samples::of_model;
     use crate::brdf::{MerlTable, merl_bytes};
 
     /// What a file of the MERL database's form keeps of a model.
     fn measured(model: &str, parameters: &str) -> Brdf {
-        let brdf = Brdf::from_parameters(model, parameters.parse().unwrap()).unwrap();
+        let brdf = of_model(model, parameters);
         Brdf::MerlTable(MerlTable::from_bytes(&merl_bytes(&brdf)).unwrap())
     }
 
@@ -388,7 +389,7 @@ mod tests {
 
     #[test]
     fn what_no_fit_could_tell_of_is_refused() {
-        let black = Brdf::from_parameters("lambert", "reflectance = 0".parse().unwrap()).unwrap();
+        let black = of_model("lambert", "reflectance = 0");
         for (brdf, reason) in [(Brdf::builtin("silk").unwrap(), "anisotropic"), (black, "black")] {
             assert!(fit(&brdf, "lambert").unwrap_err().to_string().contains(reason), "{reason}");
         }

@@ -4,6 +4,8 @@ mod format;
 mod quote;
 mod read;
 mod seal;
+#[cfg(test)]
+mod test_data;
 mod whole_file;
 
 pub(crate) use cache_file::keep_file;
@@ -12,4 +14,6 @@ pub(crate) use format::{file_formats, is_misspelt};
 pub(crate) use quote::{quote_line, toml_problem};
 pub use read::{read, text};
 pub(crate) use seal::{sealed, unsealed};
+#[cfg(test)]
+pub(crate) use test_data::measured;
 pub use whole_file::{check_all_writable, check_not_read, check_writable, file_in, file_name, write_whole};

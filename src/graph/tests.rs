@@ -1,14 +1,8 @@
 //! Passes on a device: what their shaders, and what they have declared, hold them to.
 use super::*;
-use crate::vulkan::{Buffer, BufferUse, ComputePipeline, Device, Frames, Instance, PipelineCache, compiled};
+use crate::vulkan::{Buffer, BufferUse, ComputePipeline, Device, Frames, PipelineCache, compiled, test_device};
 use ash::vk;
 use std::sync::Arc;
-
-fn device() -> Arc<Device> {
-    let instance = Instance::new(false).expect("an instance");
-    let asked = std::env::var("THREADLIGHT_TEST_DEVICE").ok();
-    Device::new(&instance, asked.as_deref()).expect("a device")
-}
 
 fn pipeline(device: &Arc<Device>, shader: &crate::vulkan::Shader) -> ComputePipeline {
     let cache = PipelineCache::new(device, None).expect("a cache");
@@ -35,7 +29,7 @@ fn error_of<'a>(
 
 #[test]
 fn a_declaration_that_the_shader_contradicts_is_an_error_that_names_pass_and_resource() {
-    let device = device();
+    let device = test_device::open();
     let tone_map = &pipeline(&device, &compiled::TONE_MAP);
     let (size, wrong) = ([8, 8, 1], |resource: &str, problem: &str| {
         format!("pass `wrong`, `{resource}` of shader tone_map: {problem}")
@@ -70,7 +64,7 @@ fn a_declaration_that_the_shader_contradicts_is_an_error_that_names_pass_and_res
 
 #[test]
 fn what_a_shader_writes_has_to_be_of_the_graph() {
-    let device = device();
+    let device = test_device::open();
     let bare_lookups = &pipeline(&device, &compiled::BARE_LOOKUPS);
     let usage = vk::BufferUsageFlags::STORAGE_BUFFER;
     let outside = &Buffer::new(&device, "outside", 64, usage, BufferUse::Device).expect("a buffer");
@@ -81,7 +75,7 @@ fn what_a_shader_writes_has_to_be_of_the_graph() {
 
 #[test]
 fn workgroups_cover_all_invocations_and_access_follows_from_the_shader() {
-    let device = device();
+    let device = test_device::open();
     let tone_map = pipeline(&device, &compiled::TONE_MAP);
     assert_eq!(tone_map.group_size(), [8, 8, 1]);
     let mut graph = FrameGraph::new();
@@ -120,7 +114,7 @@ fn passes_after<'a>(
 
 #[test]
 fn a_pass_runs_again_if_what_it_is_given_differs_or_is_not_known_yet() {
-    let device = device();
+    let device = test_device::open();
     let (tone_map, other) = (&pipeline(&device, &compiled::TONE_MAP), &pipeline(&device, &compiled::TONE_MAP));
     let size = [8, 8, 1];
     let (first, kept) = passes_after(&Kept::default(), tone_map, |pass| pass.push(&PUSH).cover(size));
@@ -166,7 +160,7 @@ fn planted(device: &Arc<Device>, taken: usize) -> crate::Result<()> {
 
 #[test]
 fn a_pass_that_takes_what_it_has_not_declared_is_an_error_that_names_both() {
-    let device = device();
+    let device = test_device::open();
     planted(&device, 0).expect("what was declared");
     let wrong = |resource: &str| {
         format!(

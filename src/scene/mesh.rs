@@ -351,11 +351,7 @@ mod tests {
 
     #[test]
     fn the_dragon_loads() {
-        let data = std::env::var("THREADLIGHT_DATA").unwrap_or("../shared/data".into());
-        let path = Path::new(&data).join("mesh/dragon_100k.obj");
-        if !path.exists() {
-            return println!("skipped: {} is not here", path.display());
-        }
+        let Some(path) = crate::files::measured("mesh/dragon_100k.obj") else { return };
         let start = std::time::Instant::now();
         let mesh = Mesh::load(&path).unwrap();
         println!("{} triangles in {:?}", mesh.indices.len() / 3, start.elapsed());

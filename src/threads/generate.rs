@@ -128,6 +128,7 @@ mod tests {
     use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
     use super::*;
+    use crate::brdf::tests::samples::of_model;
     use crate::error::Error;
     use crate::threads::{MAX_COUNT, ThreadKind, test_materials};
 
@@ -301,7 +302,7 @@ mod tests {
 
     #[test]
     fn a_material_that_reflects_nothing_gets_a_cosine_pdf() {
-        let black = Brdf::from_parameters("lambert", toml::toml! { reflectance = 0.0 }).unwrap();
+        let black = of_model("lambert", "reflectance = 0.0");
         let table = generate(&black, &small(5, 4), &()).unwrap();
         assert!(table.samples.iter().all(|s| (f64::from(s.p) - s.direction().z / PI).abs() < 1e-6));
     }

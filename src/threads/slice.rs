@@ -373,6 +373,7 @@ fn climb(mut h: DVec3, mut step: f64, height: impl Fn(DVec3) -> f64) -> DVec3 {
 mod tests {
     use super::*;
     use crate::brdf::Brdf;
+    use crate::brdf::tests::samples::of_model;
     use crate::threads::test_materials;
 
     #[test]
@@ -394,7 +395,7 @@ mod tests {
             let text = format!(
                 "distribution = 'ggx'\nmetal = 'Al'\nalpha_x = {alpha_x}\nalpha_y = {alpha_y}\nrotation_deg = 20"
             );
-            let brdf = Brdf::from_parameters("conductor", text.parse().unwrap()).unwrap();
+            let brdf = of_model("conductor", &text);
             let lobe = LobeShape::of(&brdf);
             for (theta_o, phi_o) in [(0.0, 0.0), (1.0, 1.2), (1.5, 4.0)] {
                 let exact = brdf.albedo_from(theta_o, phi_o);
@@ -434,7 +435,7 @@ mod tests {
 
     #[test]
     fn points_of_a_diffuse_surface_are_cosine_distributed() {
-        let brdf = Brdf::from_parameters("lambert", toml::toml! { reflectance = 0.5 }).unwrap();
+        let brdf = of_model("lambert", "reflectance = 0.5");
         for theta_o_deg in [0.0f64, 40.0, 70.0] {
             let slice = Slice::new(&SeenBrdf::from_all_around(&brdf), theta_o_deg.to_radians());
             let (count, mut mean, mut square) = (20_000, DVec3::ZERO, 0.0);
@@ -461,7 +462,7 @@ mod tests {
         let [of_all, of_lobes] = [near(&slice), near(&lobes)];
         assert!(of_all < 0.3 && of_lobes > 2.0 * of_all, "{of_all} {of_lobes}");
         // Nothing stands out of Lambert: anywhere will do.
-        let lambert = Brdf::from_parameters("lambert", toml::toml! { reflectance = 0.5 }).unwrap();
+        let lambert = of_model("lambert", "reflectance = 0.5");
         let [_, lobes] = Slice::with_lobes(&SeenBrdf::from_all_around(&lambert), 0.5, Resolution::FULL);
         assert!(lobes.albedo() == DVec3::ZERO && lobes.direction(DVec2::splat(0.5)).z > 0.0);
     }

@@ -140,16 +140,17 @@ fn fit(answers: &[Answers], roughness_alpha: f64) -> (DVec3, f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::brdf::tests::samples::of_model;
 
     fn split_sum(model: &str, parameters: &str) -> SplitSum {
-        SplitSum::new(&Brdf::from_parameters(model, parameters.parse().unwrap()).unwrap())
+        SplitSum::new(&of_model(model, parameters))
     }
 
     #[test]
     fn roughness_of_ggx_is_found_again_and_the_terms_are_the_albedo() {
         for alpha in [0.02, 0.1, 0.4] {
             let parameters = format!("distribution = 'ggx'\nalpha = {alpha}\nior = 1.5\ndiffuse = [0.6, 0.3, 0.1]");
-            let brdf = Brdf::from_parameters("plastic", parameters.parse().unwrap()).unwrap();
+            let brdf = of_model("plastic", &parameters);
             let found = SplitSum::new(&brdf);
             assert!((0.6..1.5).contains(&(found.roughness_alpha / alpha)), "{alpha}: {}", found.roughness_alpha);
             for row in [0, 45, 90] {

@@ -1,43 +1,22 @@
 //! BRDFs that the tests of this module share.
-use std::path::PathBuf;
 use std::sync::LazyLock;
 
-use glam::{DVec3, dvec2};
+use glam::{DVec3, Vec3, dvec2};
 
 use super::slice_table::SliceTable;
-use crate::brdf::{Brdf, CustomBrdf, MerlTable};
+use crate::brdf::tests::{conductor, samples::of_model};
+use crate::brdf::{Brdf, CustomBrdf, MerlTable, merl_bytes_of_values};
+use crate::files::measured;
 
 static NARROW: LazyLock<Brdf> = LazyLock::new(|| conductor("ggx", 0.005));
 static ALUMINA_OXIDE: LazyLock<Option<Brdf>> = LazyLock::new(|| {
-    let data = std::env::var_os("THREADLIGHT_DATA").map_or("../shared/data".into(), PathBuf::from);
-    let path = data.join("merl/slices/alumina-oxide.slice");
-    let Ok(bytes) = std::fs::read(&path) else {
-        println!("skipped alumina-oxide: {} is not there", path.display());
-        return None;
-    };
+    let bytes = std::fs::read(measured("merl/slices/alumina-oxide.slice")?).expect("a readable file");
     let values: Vec<f32> = bytes.as_chunks().0.iter().map(|&value| f32::from_le_bytes(value)).collect();
-    Some(Brdf::MerlTable(MerlTable::from_bytes(&merl_from_slice(&values)).unwrap()))
+    // Measured at phi_d = 90 degrees, in rows of theta_d and columns of theta_h, and taken for the same at every phi_d.
+    let of_cell = |[theta_h, theta_d, _]: [usize; 3]| Vec3::from_slice(&values[3 * (90 * theta_d + theta_h)..]);
+    let bytes = merl_bytes_of_values(|cell| Some(of_cell(cell).as_dvec3()));
+    Some(Brdf::MerlTable(MerlTable::from_bytes(&bytes).unwrap()))
 });
-
-/// A MERL file from measured values at phi_d = 90 degrees (rows theta_d, columns theta_h, RGB), the same at every phi_d.
-fn merl_from_slice(values: &[f32]) -> Vec<u8> {
-    let mut bytes: Vec<u8> = [90i32, 90, 180].iter().flat_map(|dim| dim.to_le_bytes()).collect();
-    for (channel, scale) in [1.0, 1.15, 1.66].into_iter().enumerate() {
-        for cell in 0..90 * 90 * 180 {
-            let (theta_h, theta_d) = (cell / 16200, cell / 180 % 90);
-            let f = f64::from(values[3 * (90 * theta_d + theta_h) + channel]);
-            bytes.extend((f * 1500.0 / scale).to_le_bytes());
-        }
-    }
-    bytes
-}
-
-fn conductor(distribution: &str, alpha: f64) -> Brdf {
-    let parameters = format!(
-        "distribution = '{distribution}'\nalpha = {alpha}\neta = [0.2, 0.924, 1.102]\nk = [3.912, 2.448, 2.142]"
-    );
-    Brdf::from_parameters("conductor", parameters.parse().unwrap()).unwrap()
-}
 
 /// A lobe of 0.3 degrees.
 pub fn narrow() -> &'static Brdf {
@@ -47,7 +26,7 @@ pub fn narrow() -> &'static Brdf {
 /// A lobe on a base that has most of the mass.
 pub fn glossy_plastic() -> Brdf {
     let parameters = "distribution = 'ggx'\nalpha = 0.05\nior = 1.5\ndiffuse = [0.3, 0.3, 0.6]";
-    Brdf::from_parameters("plastic", parameters.parse().unwrap()).unwrap()
+    of_model("plastic", parameters)
 }
 
 /// A lobe that leans to one side of the normal: no turn and no mirror leaves it as it is.
@@ -68,7 +47,7 @@ impl CustomBrdf for Leaning {
 
 /// Anisotropic ones of each symmetry, by name: of 19, 37 and 73 azimuths of the view.
 pub fn anisotropic() -> Vec<(&'static str, Brdf)> {
-    let brushed = |text: &str| Brdf::from_parameters("conductor", text.parse().unwrap()).unwrap();
+    let brushed = |text: &str| of_model("conductor", text);
     vec![
         ("brushed", brushed("distribution = 'ggx'\nmetal = 'Al'\nalpha_x = 0.05\nalpha_y = 0.3")),
         (
@@ -103,7 +82,7 @@ pub fn all() -> Vec<(&'static str, Brdf)> {
         ("conductor 0.005", narrow().clone()),
         ("conductor 0.1", conductor("ggx", 0.1)),
         ("conductor 0.5", conductor("beckmann", 0.5)),
-        ("plastic", Brdf::from_parameters("plastic", plastic.parse().unwrap()).unwrap()),
+        ("plastic", of_model("plastic", plastic)),
     ];
     all.extend(ALUMINA_OXIDE.clone().map(|brdf| ("alumina-oxide", brdf)));
     all

@@ -254,7 +254,7 @@ mod tests {
     use super::*;
     use crate::memo::Memo;
     use crate::scene::{MaterialSource, Scene, Source};
-    use crate::vulkan::{Device, Instance};
+    use crate::vulkan::test_device;
     use std::sync::Arc;
 
     /// Waits until nothing is being loaded.
@@ -274,10 +274,7 @@ mod tests {
         scene.environment.source = Source::Builtin("white".to_owned());
         scene.shading.threads = Some(1);
         (scene.image.width, scene.image.height) = (32, 24);
-        let instance = Instance::new(false).expect("an instance");
-        let asked = std::env::var("THREADLIGHT_TEST_DEVICE").ok();
-        let device = Device::new(&instance, asked.as_deref()).expect("a device");
-        let mut viewer = Viewer::new(scene, &device, Memo::default(), || ());
+        let mut viewer = Viewer::new(scene, &test_device::open(), Memo::default(), || ());
         wait(&mut viewer);
         viewer
     }

@@ -4,7 +4,7 @@ use crate::graph::{Kept, MemoryRequirement, Plan, ResourceInfo, ResourceKind, Wo
 use crate::method::Method;
 use crate::prepare::prepare;
 use crate::scene::Scene;
-use crate::vulkan::Instance;
+use crate::vulkan::test_device;
 
 /// Memory as a plain device would ask for it, so that plans are the same on all: 16 bytes a texel, multiples of 64 KiB.
 fn memory(info: &ResourceInfo) -> MemoryRequirement {
@@ -24,9 +24,7 @@ struct Stage {
 
 impl Stage {
     fn new() -> Self {
-        let instance = Instance::new(false).expect("an instance");
-        let asked = std::env::var("THREADLIGHT_TEST_DEVICE").ok();
-        let device = Device::new(&instance, asked.as_deref()).expect("a device");
+        let device = test_device::open();
         let mut scene = Scene::default();
         (scene.image.width, scene.image.height) = (640, 480);
         scene.shading.method = Method::Cosine;

@@ -6,6 +6,7 @@ mod display;
 use super::*;
 use crate::scene::Source;
 use crate::vulkan::faults::{Fault, with_fault};
+use crate::vulkan::test_device;
 use ash::vk::Result as Call;
 use display::Display;
 use std::path::Path;
@@ -48,7 +49,7 @@ fn play() -> Result<Ended> {
     scene.shading.threads = Some(1);
     let settings = ViewerSettings {
         scene,
-        device: std::env::var("THREADLIGHT_TEST_DEVICE").ok(),
+        device: test_device::name(),
         validate: true,
         cache: Some("cache".into()),
         replay: input::parse_replay(&replay, Path::new(""))?,

@@ -51,13 +51,6 @@ pub(crate) fn with_fault<T>(fault: Option<Fault>, act: impl FnOnce() -> T) -> (T
 mod tests {
     use super::super::*;
     use super::{Fault, with_fault};
-    use std::sync::Arc;
-
-    fn open(messages: &mut Messages) -> Result<Arc<Device>, VulkanError> {
-        let instance = Instance::new(true)?;
-        *messages = instance.messages();
-        Device::new(&instance, std::env::var("THREADLIGHT_TEST_DEVICE").ok().as_deref())
-    }
 
     const STATE: GraphicsState = GraphicsState {
         attributes: &[(ash::vk::Format::R32G32B32_SFLOAT, 12)],
@@ -68,7 +61,7 @@ mod tests {
 
     /// Makes one of each kind of object, and records and submits.
     fn use_everything(messages: &mut Messages) -> Result<(), VulkanError> {
-        let device = open(messages)?;
+        let device = test_device::try_open_validated(messages)?;
         let cache = PipelineCache::new(&device, None)?;
         let compute = ComputePipeline::new(&device, &cache, &compiled::TONE_MAP, &[])?;
         let graphics = GraphicsPipeline::new(&device, &cache, PAIR[0], PAIR[1], &STATE)?;
@@ -157,8 +150,7 @@ mod tests {
 
     #[test]
     fn a_planted_hazard_is_seen() {
-        let mut messages = Messages::default();
-        let device = open(&mut messages).expect("a device");
+        let (device, messages) = test_device::open_validated();
         let make = |name| {
             let usage = ash::vk::BufferUsageFlags::TRANSFER_SRC | ash::vk::BufferUsageFlags::TRANSFER_DST;
             Buffer::new(&device, name, 64, usage, BufferUse::Device).expect("a buffer")

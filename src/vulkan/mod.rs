@@ -17,7 +17,7 @@
 //! commands, copies, frames     one recorded pass after another; frames in flight, timestamps
 //! upload, triangles, render    contents of buffers and images; meshes; drawing them
 //! swapchain, ui                images of a window; what egui has laid out
-//! faults                       (tests) calls that fail on purpose
+//! test_device, faults          (tests) the device that tests run on; calls that fail on purpose
 //! ```
 
 mod commands;
@@ -46,6 +46,8 @@ mod shader_statistics;
 mod surface;
 #[cfg(feature = "viewer")]
 mod swapchain;
+#[cfg(test)]
+pub(crate) mod test_device;
 mod triangles;
 #[cfg(feature = "viewer")]
 mod ui;

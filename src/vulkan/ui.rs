@@ -160,17 +160,14 @@ impl Drop for UiPainter {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Frames, ImageShape, Instance, Memory};
+    use super::super::{Frames, ImageShape, Memory, test_device};
     use super::*;
     use egui::epaint::{Mesh, Primitive};
     use egui::{Color32, Rect, TextureOptions, pos2};
 
     #[test]
     fn the_frame_of_an_update_may_draw_what_that_frees_and_later_ones_may_not() {
-        let instance = Instance::new(true).expect("an instance");
-        let messages = instance.messages();
-        let asked = std::env::var("THREADLIGHT_TEST_DEVICE").ok();
-        let device = Device::new(&instance, asked.as_deref()).expect("a device");
+        let (device, messages) = test_device::open_validated();
         let format = vk::Format::B8G8R8A8_UNORM;
         let mut painter = UiPainter::new(&device, format, 1).expect("a painter");
         let mut frames = Frames::new(&device, "frames", 1).expect("frames");

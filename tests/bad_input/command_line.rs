@@ -1,4 +1,5 @@
 //! Flags and arguments that say nothing, or nothing that can be done.
+use crate::common::{own_cache, program_with_cache};
 use crate::{refuses, render, workplace};
 
 #[test]
@@ -81,7 +82,8 @@ fn unknown_names_are_told_with_the_known_ones() {
 #[test]
 fn a_name_that_is_no_text_is_told() {
     use std::os::unix::ffi::OsStrExt;
-    let mut command = assert_cmd::Command::new(env!("CARGO_BIN_EXE_threadlight"));
+    let folder = workplace();
+    let mut command = program_with_cache(&folder, own_cache(&folder));
     command.args(["render", "-o", "image.png", "--mesh"]).arg(std::ffi::OsStr::from_bytes(b"dragon\xff.obj"));
     let output = command.output().unwrap();
     let said = String::from_utf8(output.stderr).unwrap();

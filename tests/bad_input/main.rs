@@ -9,7 +9,7 @@ mod meshes;
 mod outputs;
 mod scene_files;
 
-use assert_cmd::Command;
+use common::{own_cache, program_with_cache};
 use std::fs;
 use std::path::Path;
 use tempfile::TempDir;
@@ -24,13 +24,7 @@ fn workplace() -> TempDir {
 /// Runs threadlight with `arguments` (separated by spaces) in `folder` and checks how it refuses: `names` are in the reason.
 fn refuses(folder: &TempDir, arguments: &str, names: &[&str]) {
     let before = listing(folder.path());
-    let output = Command::new(env!("CARGO_BIN_EXE_threadlight"))
-        .current_dir(folder)
-        .env("THREADLIGHT_CACHE", folder.path().join("cache"))
-        .env_remove("RUST_LOG")
-        .args(arguments.split(' '))
-        .output()
-        .unwrap();
+    let output = program_with_cache(folder, own_cache(folder)).args(arguments.split(' ')).output().unwrap();
     let said = format!("threadlight {arguments}\n{}", String::from_utf8_lossy(&output.stderr));
     assert_eq!(output.status.code(), Some(2), "{said}");
     assert!(output.stdout.is_empty(), "{said}");

@@ -1,13 +1,16 @@
 //! The program as its user meets it: pictures, statistics, cache, scene files, help.
 //!
 //! Renders on the device that THREADLIGHT_TEST_DEVICE names, or else on the one that the program prefers, always validated.
+#[path = "../common/mod.rs"]
+mod common;
 mod pictures;
 mod text;
 
 use assert_cmd::Command;
+use common::{device_flags, own_cache, program, program_with_cache};
 use serde_json::Value;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use tempfile::TempDir;
 use threadlight::low_level::method::{Method, Pattern};
 use threadlight::low_level::picture::{PictureFile, read_image};
@@ -28,24 +31,15 @@ fn workplace() -> TempDir {
 
 /// The program in `folder`, with `arguments` separated by spaces, and the cache of all tests if there is one.
 fn threadlight(folder: &TempDir, arguments: &str) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_threadlight"));
-    let of_run = std::env::var_os("THREADLIGHT_TEST_CACHE").map(PathBuf::from);
-    let cache = of_run.unwrap_or_else(|| own_cache(folder));
-    command.current_dir(folder).env("THREADLIGHT_CACHE", cache).env_remove("RUST_LOG");
+    let mut command = Command::from_std(program(folder));
     command.args(arguments.split(' ').filter(|argument| !argument.is_empty()));
     command
-}
-
-fn own_cache(folder: &TempDir) -> PathBuf {
-    folder.path().join("cache")
 }
 
 /// `render` with validation on the device to test on.
 fn render(folder: &TempDir, arguments: &str) -> Command {
     let mut command = threadlight(folder, &format!("render --validate {arguments}"));
-    if let Some(device) = std::env::var_os("THREADLIGHT_TEST_DEVICE") {
-        command.arg("--device").arg(device);
-    }
+    command.args(device_flags());
     command
 }
 

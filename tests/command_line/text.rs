@@ -292,7 +292,7 @@ fn without_a_reader_files_are_written_and_verdicts_reached_all_the_same() {
     let folder = workplace_with_two_greys();
     let (code, said) = unheard(&threadlight(&folder, "compare a.png b.png --at-most 1e-4"));
     assert!(code == Some(1) && said.contains("the RMS is"), "{code:?} {said}");
-    let device = std::env::var("THREADLIGHT_TEST_DEVICE").map_or(String::new(), |device| format!("--device {device}"));
+    let device = device_flags().join(" ");
     let bench =
         "bench error --materials clay --environments map.hdr --methods fitted --counts 1 --size 24x18 --repeat 1";
     for (command, files) in [
@@ -317,10 +317,9 @@ fn without_a_reader_files_are_written_and_verdicts_reached_all_the_same() {
 fn unheard(command: &Command) -> (Option<i32>, String) {
     let (reader, writer) = std::io::pipe().unwrap();
     drop(reader);
-    let mut heard = std::process::Command::new(command.get_program());
-    heard.args(command.get_args()).current_dir(command.get_current_dir().unwrap());
-    heard.env("THREADLIGHT_CACHE", command.get_current_dir().unwrap().join("cache")).env_remove("RUST_LOG");
-    let output = heard.stdout(writer).output().unwrap();
+    let folder = command.get_current_dir().unwrap();
+    let mut heard = program_with_cache(folder, own_cache(folder));
+    let output = heard.args(command.get_args()).stdout(writer).output().unwrap();
     (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
 }
 

@@ -3,9 +3,12 @@
 //!
 //! `THREADLIGHT_FAULT_RUNS` is the number of random moments of each test that has such, in the place of a few.
 #![cfg(target_os = "linux")]
+#[path = "../common/mod.rs"]
+mod common;
 mod killed;
 mod refused;
 
+use common::{PROGRAM, device_flags, device_name};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -67,10 +70,10 @@ impl Place {
 
     /// The program, on the test device where it takes one.
     fn threadlight(&self, arguments: &[&str]) -> Command {
-        let mut command = self.command(env!("CARGO_BIN_EXE_threadlight"));
+        let mut command = self.command(PROGRAM);
         command.args(arguments);
-        if let (Some(&"render"), Ok(device)) = (arguments.first(), std::env::var("THREADLIGHT_TEST_DEVICE")) {
-            command.args(["--device", &device]);
+        if arguments.first() == Some(&"render") {
+            command.args(device_flags());
         }
         command
     }

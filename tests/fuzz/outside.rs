@@ -1,19 +1,19 @@
 //! Readers that take more than a function: the program, which reads its standard input, and a device, which reads its pipeline cache.
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::Stdio;
 use std::sync::{Arc, OnceLock};
 
-use threadlight::low_level::vulkan::{Device, Instance, PipelineCache};
+use threadlight::low_level::vulkan::{Device, PipelineCache};
 
+use crate::common::{bare_device, program};
 use crate::readers::Reader;
 
 /// Gives the program `bytes` on its standard input; the error is what it says.
 fn evaluate(arguments: &[&str], bytes: &[u8]) -> Result<(), String> {
-    let mut program = Command::new(env!("CARGO_BIN_EXE_threadlight"))
+    let mut program = program(env!("CARGO_TARGET_TMPDIR"))
         .args(["materials", "evaluate", "clay"])
         .args(arguments)
-        .env_remove("RUST_LOG")
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
@@ -67,9 +67,7 @@ pub fn evaluated_directions() -> Reader {
 fn device() -> &'static (Arc<Device>, PathBuf) {
     static DEVICE: OnceLock<(Arc<Device>, PathBuf)> = OnceLock::new();
     DEVICE.get_or_init(|| {
-        let instance = Instance::new(false).expect("an instance");
-        let asked = std::env::var("THREADLIGHT_TEST_DEVICE").ok();
-        let device = Device::new(&instance, asked.as_deref()).expect("a device");
+        let device = bare_device();
         let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("fuzz");
         // Nothing is in it but that file.
         let _ = std::fs::remove_dir_all(&folder);

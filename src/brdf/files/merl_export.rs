@@ -1,4 +1,4 @@
-//! Writes any BRDF as a file of the MERL database's form, which `merl.rs` reads.
+//! Writes any BRDF, or any values, as a file of the MERL database's form, which `merl.rs` reads.
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use glam::{DMat3, DVec2, DVec3};
@@ -25,12 +25,24 @@ pub fn merl_bytes(brdf: &Brdf) -> Vec<u8> {
         .into_par_iter()
         .map(|line| values_along_theta_h(brdf, line / PHI_D_BINS, line % PHI_D_BINS))
         .collect();
-    let cells: Vec<_> = (0..THETA_H_BINS).flat_map(|theta_h| lines.iter().map(move |line| line[theta_h])).collect();
+    merl_bytes_of_values(|[theta_h, theta_d, phi_d]| lines[theta_d * PHI_D_BINS + phi_d][theta_h])
+}
+
+/// The bytes of a `.binary` file of a BRDF that has this `value` in the cell of such bins of theta_h, theta_d and phi_d, in 1/sr; where it has
+/// none, -1 as in the database.
+pub fn merl_bytes_of_values(value: impl Fn([usize; 3]) -> Option<DVec3>) -> Vec<u8> {
+    merl_bytes_of_stored(|cell| {
+        let f = value(cell);
+        std::array::from_fn(|channel| f.map_or(-1.0, |f| f[channel] / SCALE[channel]))
+    })
+}
+
+/// The bytes of a `.binary` file whose cells hold these numbers for red, green and blue, not scaled: what is wrong with a file can be written, too.
+pub fn merl_bytes_of_stored(stored: impl Fn([usize; 3]) -> [f64; 3]) -> Vec<u8> {
+    let bins = |cell: usize| [cell / PHI_D_BINS / THETA_D_BINS, cell / PHI_D_BINS % THETA_D_BINS, cell % PHI_D_BINS];
+    let cells: Vec<_> = (0..THETA_H_BINS * THETA_D_BINS * PHI_D_BINS).map(|cell| stored(bins(cell))).collect();
     let sizes = [THETA_H_BINS, THETA_D_BINS, PHI_D_BINS].into_iter().flat_map(|size| (size as i32).to_le_bytes());
-    let plane = |channel: usize| {
-        let value = move |cell: &Option<DVec3>| cell.map_or(-1.0, |f| f[channel] / SCALE[channel]);
-        cells.iter().flat_map(move |cell| value(cell).to_le_bytes())
-    };
+    let plane = |channel: usize| cells.iter().flat_map(move |cell| cell[channel].to_le_bytes());
     sizes.chain((0..3).flat_map(plane)).collect()
 }
 
@@ -115,11 +127,12 @@ fn directions(theta_h: f64, theta_d: usize, phi_d: usize) -> (DVec3, DVec3) {
 mod tests {
     use super::*;
     use crate::brdf::MerlTable;
+    use crate::brdf::tests::samples::of_model;
 
     #[test]
     fn an_exported_brdf_comes_back() {
         let text = "distribution = 'ggx'\nalpha = 0.2\nior = 1.5\ndiffuse = [0.3, 0.1, 0.05]";
-        let brdf = Brdf::from_parameters("plastic", text.parse().unwrap()).unwrap();
+        let brdf = of_model("plastic", text);
         let table = Brdf::MerlTable(MerlTable::from_bytes(&merl_bytes(&brdf)).unwrap());
         for theta_o_deg in [0.0f64, 30.0, 60.0, 80.0] {
             let [found, expected] = [&table, &brdf].map(|brdf| brdf.albedo(theta_o_deg.to_radians()));
@@ -136,7 +149,7 @@ mod tests {
     fn lobes_as_narrow_as_cells_come_back_with_their_energy() {
         for alpha in [0.02, 0.005, 0.003] {
             let text = format!("distribution = 'ggx'\nalpha = {alpha}\nmetal = 'Al'");
-            let brdf = Brdf::from_parameters("conductor", text.parse().unwrap()).unwrap();
+            let brdf = of_model("conductor", &text);
             let table = Brdf::MerlTable(MerlTable::from_bytes(&merl_bytes(&brdf)).unwrap());
             for theta_o_deg in [5.0f64, 45.0, 70.0] {
                 let [found, expected] = [&table, &brdf].map(|brdf| brdf.albedo(theta_o_deg.to_radians()));

@@ -85,7 +85,8 @@ fn table(bytes: &[u8]) -> Result<Goniometric, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use glam::{DVec3, dvec3};
+    use crate::brdf::tests::direction;
+    use glam::dvec3;
 
     /// The bytes of a file of 3 angles, 4 or 8 azimuths and 2 turns, with `value` of plane, theta_in, theta_out, phi_diff and phi_in, in bins.
     fn made(is_half: bool, value: impl Fn(usize, [usize; 4]) -> f32) -> Vec<u8> {
@@ -98,12 +99,6 @@ mod tests {
             value(plane, [cell / 2 / azimuths / 3, cell / 2 / azimuths % 3, cell / 2 % azimuths, cell % 2])
         });
         header.into_iter().flat_map(i32::to_le_bytes).chain(values.flat_map(f32::to_le_bytes)).collect()
-    }
-
-    fn direction(theta_deg: f64, phi_deg: f64) -> DVec3 {
-        let ((sin_theta, cos_theta), (sin_phi, cos_phi)) =
-            (theta_deg.to_radians().sin_cos(), phi_deg.to_radians().sin_cos());
-        dvec3(sin_theta * cos_phi, sin_theta * sin_phi, cos_theta)
     }
 
     #[test]

@@ -60,7 +60,8 @@ fn table(bytes: &[u8]) -> Result<Goniometric, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use glam::{DVec3, dvec3};
+    use crate::brdf::tests::direction;
+    use glam::dvec3;
 
     /// The bytes of a file with `value` of plane, theta_i, phi_i, theta_v and phi_v, these in steps.
     fn made(value: impl Fn(usize, usize, usize, usize, usize) -> f64) -> Vec<u8> {
@@ -69,12 +70,6 @@ mod tests {
             value(plane, row / PHIS, row % PHIS, column / PHIS, column % PHIS)
         });
         cells.flat_map(f64::to_le_bytes).collect()
-    }
-
-    fn direction(theta_deg: f64, phi_deg: f64) -> DVec3 {
-        let ((sin_theta, cos_theta), (sin_phi, cos_phi)) =
-            (theta_deg.to_radians().sin_cos(), phi_deg.to_radians().sin_cos());
-        dvec3(sin_theta * cos_phi, sin_theta * sin_phi, cos_theta)
     }
 
     #[test]

@@ -44,6 +44,7 @@ fn mass_within(brdf: &Brdf, theta_h: f64) -> f64 {
 mod tests {
     use glam::DVec3;
 
+    use crate::brdf::tests::samples::of_model;
     use crate::brdf::{Brdf, CustomBrdf, LobeShape};
 
     /// A narrow lobe and a wide one, which has this part of the sum.
@@ -53,7 +54,7 @@ mod tests {
         fn of(narrow_alpha: f64, part_of_wide: f64) -> Self {
             let lobe = |alpha: f64| {
                 let parameters = format!("distribution = 'beckmann'\nalpha = {alpha}\neta = 0.2\nk = 3.9");
-                Brdf::from_parameters("conductor", parameters.parse().unwrap()).unwrap()
+                of_model("conductor", &parameters)
             };
             Self([narrow_alpha, 0.05].map(lobe), part_of_wide)
         }
@@ -85,10 +86,10 @@ mod tests {
         // A twentieth of what white paint under a coat without colour reflects is the coat's, but all of the lobe.
         for coat in ["alpha = 0.001\nior = 1.3", "alpha = 0.001\nior = 1.5", "alpha = 0.0045\nior = 1.5"] {
             let parameters = format!("distribution = 'ggx'\n{coat}\ndiffuse = 0.9");
-            let plastic = Brdf::from_parameters("plastic", parameters.parse().unwrap()).unwrap();
+            let plastic = of_model("plastic", &parameters);
             assert!(!LobeShape::of(&plastic).is_cusp, "{coat}");
         }
-        let lambert = Brdf::from_parameters("lambert", "reflectance = 0.5".parse().unwrap()).unwrap();
+        let lambert = of_model("lambert", "reflectance = 0.5");
         assert!(!LobeShape::of(&lambert).is_cusp);
     }
 }

@@ -42,7 +42,8 @@ pub(super) fn flank(brdf: &Brdf, azimuth: DVec2, width_rad: f64) -> (f64, bool) 
 
 #[cfg(test)]
 mod tests {
-    use crate::brdf::{Brdf, LobeShape};
+    use crate::brdf::LobeShape;
+    use crate::brdf::tests::samples::of_model;
 
     #[test]
     fn steep_flanks_are_those_of_gaussians_and_end_in_the_dark_or_in_scattered_light() {
@@ -59,7 +60,7 @@ mod tests {
             ("ashikhmin_shirley", "exponent = 445\nspecular = 0.05\ndiffuse = 0.5".to_owned(), 0.0, false),
             ("plastic", "distribution = 'ggx'\nalpha = 0.02\nior = 1.5\ndiffuse = 0.3".to_owned(), 0.0, false),
         ] {
-            let lobe = LobeShape::of(&Brdf::from_parameters(model, parameters.parse().unwrap()).unwrap());
+            let lobe = LobeShape::of(&of_model(model, &parameters));
             let flank = lobe.flank_rad;
             // One step of the angles that are tried.
             assert!((expected..=1.26 * expected).contains(&flank), "{parameters}: {flank}");

@@ -168,21 +168,22 @@ fn first_angle(is_so: impl Fn(f64) -> bool) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::brdf::tests::samples::of_model;
 
     #[test]
     fn widths_follow_roughness() {
         for (alpha, distribution) in [(0.001, "ggx"), (0.02, "beckmann"), (0.2, "ggx")] {
             let parameters = format!("distribution = '{distribution}'\nalpha = {alpha}\neta = 0.2\nk = 3.9");
-            let brdf = Brdf::from_parameters("conductor", parameters.parse().unwrap()).unwrap();
+            let brdf = of_model("conductor", &parameters);
             for width in [half_vector_width(&brdf), lobe_radius(&brdf, 0.0), lobe_radius(&brdf, 1.5)] {
                 assert!((0.3..1.0).contains(&(width / alpha)), "{distribution} {alpha}: {width}");
             }
         }
         // A lobe is found however much light is scattered beside it.
         let parameters = "distribution = 'ggx'\nalpha = 0.05\nior = 1.5\ndiffuse = 0.9";
-        let plastic = lobe_radius(&Brdf::from_parameters("plastic", parameters.parse().unwrap()).unwrap(), 0.0);
+        let plastic = lobe_radius(&of_model("plastic", parameters), 0.0);
         assert!((0.3..1.0).contains(&(plastic / 0.05)), "{plastic}");
-        let lambert = Brdf::from_parameters("lambert", "reflectance = 0.5".parse().unwrap()).unwrap();
+        let lambert = of_model("lambert", "reflectance = 0.5");
         assert_eq!((half_vector_width(&lambert), lobe_radius(&lambert, 0.0)), (FRAC_PI_2, FRAC_PI_2));
     }
 
@@ -192,7 +193,7 @@ mod tests {
             for rotation_deg in [0.0, 30.0, -77.7] {
                 let brdf = |roughness: String| {
                     let parameters = format!("distribution = 'ggx'\neta = 0.2\nk = 3.9\n{roughness}");
-                    Brdf::from_parameters("conductor", parameters.parse().unwrap()).unwrap()
+                    of_model("conductor", &parameters)
                 };
                 let stretched =
                     brdf(format!("alpha_x = {alpha_x}\nalpha_y = {alpha_y}\nrotation_deg = {rotation_deg}"));

@@ -22,13 +22,12 @@ pub(super) fn narrowing(brdf: &Brdf, radius_rad: f64) -> [f64; 4] {
 
 #[cfg(test)]
 mod tests {
-    use crate::brdf::{Brdf, LobeShape};
+    use crate::brdf::LobeShape;
+    use crate::brdf::tests::samples::of_model;
 
     #[test]
     fn a_matt_surface_that_mirrors_at_grazing_views_has_a_narrow_lobe_there_alone() {
-        let narrowing = |model: &str, parameters: &str| {
-            LobeShape::of(&Brdf::from_parameters(model, parameters.parse().unwrap()).unwrap()).narrowing
-        };
+        let narrowing = |model: &str, parameters: &str| LobeShape::of(&of_model(model, parameters)).narrowing;
         // Half a wavelength rough: to the eye it is smooth where cos theta_o is small.
         let parameters = "diffuse = 0\nsigma_um = 0.3\ntau_um = 2.5\nspecular_alpha = 0.018\nmetal = 'Al'";
         let [steep, half_way, slant, grazing] = narrowing("he_torrance", parameters);

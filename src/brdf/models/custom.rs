@@ -142,6 +142,7 @@ impl Model for Custom {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::brdf::tests::samples::of_model;
     use crate::brdf::{half_vector_width, lobe_radius, tabulate};
     use glam::{DVec2, dvec3};
     use std::f64::consts::{FRAC_PI_2, PI};
@@ -181,7 +182,7 @@ mod tests {
 
     fn ggx(alpha: f64) -> Brdf {
         let parameters = format!("distribution = 'ggx'\nalpha = {alpha}\neta = 0.2\nk = 3.9");
-        Brdf::from_parameters("conductor", parameters.parse().unwrap()).unwrap()
+        of_model("conductor", &parameters)
     }
 
     /// The integral of |f - g| cos over that of f cos, of the view angle `theta_o_deg`; points as in [`Brdf::albedo`].

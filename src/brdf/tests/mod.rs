@@ -6,21 +6,23 @@ mod closed_forms;
 mod every_model;
 mod published_fits;
 mod rgl;
-pub(super) mod samples;
+pub(crate) mod samples;
 
 /// A direction in the shading frame from angles in degrees.
-fn direction(theta_deg: f64, phi_deg: f64) -> DVec3 {
+pub(super) fn direction(theta_deg: f64, phi_deg: f64) -> DVec3 {
     let (sin_theta, cos_theta) = theta_deg.to_radians().sin_cos();
     let (sin_phi, cos_phi) = phi_deg.to_radians().sin_cos();
     dvec3(sin_theta * cos_phi, sin_theta * sin_phi, cos_theta)
 }
 
-fn from_toml(text: &str) -> Result<Brdf> {
+/// What a material file of this text holds.
+pub(super) fn from_toml(text: &str) -> Result<Brdf> {
     let (model, parameters) = model_of(text)?;
     Brdf::from_parameters(&model, parameters)
 }
 
-fn conductor(distribution: &str, alpha: f64) -> Brdf {
+/// Copper of this roughness_alpha.
+pub(crate) fn conductor(distribution: &str, alpha: f64) -> Brdf {
     from_toml(&format!(
         "model = 'conductor'\ndistribution = '{distribution}'\nalpha = {alpha}\neta = [0.2, 0.924, 1.102]\nk = [3.912, 2.448, 2.142]"
     ))
@@ -38,19 +40,10 @@ fn blinn_phong(exponent: f64) -> Brdf {
     from_toml(&format!("model = 'blinn_phong'\ndiffuse = 0.4\nspecular = 0.6\nexponent = {exponent}")).unwrap()
 }
 
-/// Bytes of a MERL file whose cells hold `stored(theta_h, theta_d, phi_d, channel)`.
-fn merl_bytes(stored: impl Fn(usize, usize, usize, usize) -> f64) -> Vec<u8> {
-    let mut bytes: Vec<u8> = [90i32, 90, 180].iter().flat_map(|dim| dim.to_le_bytes()).collect();
-    for channel in 0..3 {
-        for cell in 0..90 * 90 * 180 {
-            bytes.extend(stored(cell / 16200, cell / 180 % 90, cell % 180, channel).to_le_bytes());
-        }
-    }
-    bytes
-}
-
+/// A MERL table whose cells hold `stored(theta_h, theta_d, phi_d, channel)` in the file.
 fn merl(stored: impl Fn(usize, usize, usize, usize) -> f64) -> MerlTable {
-    MerlTable::from_bytes(&merl_bytes(stored)).unwrap()
+    let bytes = merl_bytes_of_stored(|[h, d, p]| std::array::from_fn(|channel| stored(h, d, p, channel)));
+    MerlTable::from_bytes(&bytes).unwrap()
 }
 
 /// w_i, w_o with the given position in the table's index space (bin i covers [i, i + 1)); w_o's azimuth is arbitrary.
@@ -299,11 +292,12 @@ fn merl_invalid_cells_do_not_leak() {
 fn merl_table_of_a_model_gives_back_the_model() {
     // Filled at bin centres; between them linear interpolation of so smooth a function is good to a few per cent.
     let model = plastic("ggx", 0.5, 0.4);
-    let scale = [1.0, 1.15, 1.66].map(|s| s / 1500.0);
-    let table = Brdf::MerlTable(merl(|h, d, p, c| {
-        let (w_i, w_o) = pair_at(h as f64 + 0.5, d as f64 + 0.5, p as f64 + 0.5);
-        model.evaluate(w_i, w_o)[c] / scale[c]
-    }));
+    let bytes = merl_bytes_of_values(|cell| {
+        let [h, d, p] = cell.map(|bin| bin as f64 + 0.5);
+        let (w_i, w_o) = pair_at(h, d, p);
+        Some(model.evaluate(w_i, w_o))
+    });
+    let table = Brdf::MerlTable(MerlTable::from_bytes(&bytes).unwrap());
     for theta_o_deg in [0.0f64, 30.0, 60.0, 80.0] {
         let theta_o = theta_o_deg.to_radians();
         let (measured, exact) = (table.albedo(theta_o), model.albedo(theta_o));
@@ -314,7 +308,7 @@ fn merl_table_of_a_model_gives_back_the_model() {
 #[test]
 fn merl_tables_as_shaders_have_them_err_by_what_the_guide_says() {
     for model in [plastic("ggx", 0.1, 0.4), conductor("ggx", 0.02), conductor("beckmann", 0.3), blinn_phong(200.0)] {
-        let table = MerlTable::from_bytes(&super::merl_bytes(&model)).unwrap();
+        let table = MerlTable::from_bytes(&merl_bytes(&model)).unwrap();
         let error = tabulate(&Brdf::MerlTable(table)).1;
         println!("{:.3} % {}", 100.0 * error, model.model());
         assert!(error < 3e-3, "{}: {error}", model.model());
@@ -333,7 +327,8 @@ fn merl_tables_as_shaders_have_them_err_by_what_the_guide_says() {
 
 #[test]
 fn merl_files_that_are_no_tables_are_refused_with_a_reason() {
-    let good = merl_bytes(|_, _, _, _| 1.0);
+    let constant = |stored: f64| merl_bytes_of_stored(|_| [stored; 3]);
+    let good = constant(1.0);
     let reason = |bytes: &[u8]| MerlTable::from_bytes(bytes).unwrap_err();
     assert!(reason(&good[..5]).contains("too short"));
     assert!(reason(&good[..good.len() - 1]).contains("bytes instead of"));
@@ -344,8 +339,8 @@ fn merl_files_that_are_no_tables_are_refused_with_a_reason() {
     let mut nan = good.clone();
     nan[12 + 8 * 181..][..8].copy_from_slice(&f64::NAN.to_le_bytes());
     assert!(reason(&nan).contains("NaN in the red cell theta_h 0, theta_d 1, phi_d 1"), "{}", reason(&nan));
-    assert!(reason(&merl_bytes(|_, _, _, _| 0.0)).contains("nothing but zero"));
-    assert!(reason(&merl_bytes(|_, _, _, _| -1.0)).contains("nothing but zero"));
+    assert!(reason(&constant(0.0)).contains("nothing but zero"));
+    assert!(reason(&constant(-1.0)).contains("nothing but zero"));
 }
 
 #[test]

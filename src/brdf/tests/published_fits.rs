@@ -1,8 +1,9 @@
 //! SGD and ABC with the published fits of MERL materials: they leave the errors that are known of them.
 use std::collections::HashMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use super::*;
+use crate::files::measured;
 
 /// The rows of a table of comma-separated values: each a map from column to text.
 fn rows(path: &Path) -> Option<Vec<HashMap<String, String>>> {
@@ -64,11 +65,7 @@ fn error(brdf: &Brdf, slice: &Path) -> Option<f64> {
 
 #[test]
 fn published_fits_leave_the_errors_that_are_known_of_them() {
-    let data = std::env::var_os("THREADLIGHT_DATA").map_or("../shared/data".into(), PathBuf::from);
-    if !data.join("params/sgd_merl.csv").is_file() || !data.join("merl/slices").is_dir() {
-        println!("skipped: {} has no fits of SGD and ABC with measured slices", data.display());
-        return;
-    }
+    let (Some(_), Some(slices)) = (measured("params/sgd_merl.csv"), measured("merl/slices")) else { return };
     let known = [
         ("alumina-oxide", 0.108, 0.063),
         ("aluminium", 0.089, 0.058),
@@ -78,7 +75,7 @@ fn published_fits_leave_the_errors_that_are_known_of_them() {
         ("gold-metallic-paint", 0.018, 0.028),
     ];
     for (model, keys) in [("sgd", SGD), ("abc", ABC)] {
-        let rows = rows(&data.join(format!("params/{model}_merl.csv"))).expect("a table");
+        let rows = rows(&measured(&format!("params/{model}_merl.csv")).expect("fits")).expect("a table");
         for row in &rows {
             let brdf = fitted(model, keys, row);
             let name = row["material"].as_str();
@@ -93,7 +90,7 @@ fn published_fits_leave_the_errors_that_are_known_of_them() {
             }
             let Some((_, sgd, abc)) = known.iter().find(|(known, ..)| *known == name) else { continue };
             let expected = if model == "sgd" { *sgd } else { *abc };
-            let found = error(&brdf, &data.join(format!("merl/slices/{name}.slice"))).expect("a slice");
+            let found = error(&brdf, &slices.join(format!("{name}.slice"))).expect("a slice");
             println!("{model} {name}: {found:.4}, known {expected}");
             // Half of the last digit that is known.
             assert!((found - expected).abs() < 0.01 * expected + 5e-4, "{model} {name}: {found}, known {expected}");

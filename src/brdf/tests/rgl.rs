@@ -1,21 +1,15 @@
 //! RGL's files: what they hold is what Mitsuba 3 finds in them; bytes that are no such file are refused; the table that shaders look up.
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use super::*;
+use crate::files::measured;
 
-/// The folder of measured files beside the project, if there is one.
-fn folder() -> Option<PathBuf> {
-    let data = std::env::var_os("THREADLIGHT_DATA").map_or("../shared/data".into(), PathBuf::from).join("bsdf/rgl");
-    if !data.is_dir() {
-        println!("skipped: there is no {}", data.display());
-        return None;
-    }
-    Some(data)
-}
+/// The folder of measured files.
+const FOLDER: &str = "bsdf/rgl";
 
 #[test]
 fn values_are_those_that_mitsuba_finds() {
-    let Some(folder) = folder() else { return };
+    let Some(folder) = measured(FOLDER) else { return };
     compare_with_mitsuba(&folder, include_str!("../../../tests/rgl_by_mitsuba.csv"), 1000);
 }
 
@@ -72,7 +66,7 @@ fn anisotropic_files_have_the_symmetry_by_which_parts_of_a_turn_were_left_out() 
 
 #[test]
 fn tables_of_measured_files_err_by_what_the_guide_says() {
-    let Some(folder) = folder() else { return };
+    let Some(folder) = measured(FOLDER) else { return };
     for (file, most) in [
         ("paper_white_rgb.bsdf", 0.01),
         ("cg_sunflower_rgb.bsdf", 0.03),
@@ -88,7 +82,7 @@ fn tables_of_measured_files_err_by_what_the_guide_says() {
 
 #[test]
 fn measured_files_reflect_no_more_than_they_receive() {
-    let Some(folder) = folder() else { return };
+    let Some(folder) = measured(FOLDER) else { return };
     for file in ["paper_white", "cg_sunflower", "vch_golden_yellow", "cc_ibiza_sunset"] {
         let brdf = Brdf::load(&folder.join(format!("{file}_rgb.bsdf"))).unwrap();
         assert!(brdf.is_isotropic(), "{file}");

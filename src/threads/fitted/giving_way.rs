@@ -48,6 +48,7 @@ impl GivingWay {
 mod tests {
     use super::*;
     use crate::brdf::Brdf;
+    use crate::brdf::tests::samples::of_model;
 
     fn table(count: usize, error: f32) -> FittedTable {
         FittedTable {
@@ -68,7 +69,7 @@ mod tests {
     /// Those of two-layer-gold and of chrome of the MERL database.
     #[test]
     fn many_kernels_go_by_the_cusp_on_a_wide_lobe_and_few_by_the_lobe() {
-        let lambert = Brdf::from_parameters("lambert", "reflectance = 0.5".parse().unwrap()).unwrap();
+        let lambert = of_model("lambert", "reflectance = 0.5");
         let plain = LobeShape::of(&lambert);
         let radius = |lobe: LobeShape, count| GivingWay::of(&lobe, &table(count, 0.01)).lobe_radius_rad;
         let gold = LobeShape { width_rad: 0.0003, radius_rad: 0.0646, ..plain };

@@ -10,6 +10,7 @@ use super::sets::pixels_have_own;
 use super::solve::{Effort, Fit};
 use super::stray::strays;
 use super::{FittedTable, MAX_COUNT, PackedKernel, draft, generate, validation_error};
+use crate::brdf::tests::samples::of_model;
 use crate::brdf::{BaseProfile, Brdf, CustomBrdf, LobeShape, MIN_COS_THETA_D, SeenBrdf, half_vector_width, luminance};
 use crate::error::Error;
 use crate::progress::Observer;
@@ -22,7 +23,7 @@ fn small(count: usize, rows: usize) -> ThreadSettings {
 }
 
 fn black() -> Brdf {
-    Brdf::from_parameters("lambert", toml::toml! { reflectance = 0.0 }).unwrap()
+    of_model("lambert", "reflectance = 0.0")
 }
 
 /// Every number of a table is one, and in its range.
@@ -42,7 +43,7 @@ fn check(name: &str, table: &FittedTable) {
 fn a_material_that_is_black_at_some_angles_only_has_numbers_in_all_rows() {
     // Glass as thin as air mirrors nothing but at the horizon.
     let parameters = "alpha = 0.3\neta = [1.0, 1.0, 1.0]\nk = [0.0, 0.0, 0.0]\ndistribution = 'beckmann'";
-    let brdf = Brdf::from_parameters("conductor", parameters.parse().unwrap()).unwrap();
+    let brdf = of_model("conductor", parameters);
     for kind in [ThreadKind::Fitted, ThreadKind::Gaussian] {
         let table = generate(&brdf, &ThreadSettings { kind, ..small(8, 90) }, &()).unwrap();
         check(&format!("{kind:?}"), &table);
@@ -82,7 +83,7 @@ fn many_kernels_of_a_near_mirror_are_no_narrower_than_its_lobe() {
 fn no_sharp_kernels_of_a_coat_stand_where_only_its_base_reflects() {
     // Each would show as a ghost of what the coat mirrors: there were 51 in six rows of 90, by the weight of half of the mirror image.
     let parameters = "distribution = 'beckmann'\nalpha = 0.003\nior = 1.5\ndiffuse = 0.8";
-    let brdf = Brdf::from_parameters("plastic", parameters.parse().unwrap()).unwrap();
+    let brdf = of_model("plastic", parameters);
     let table = generate(&brdf, &ThreadSettings { sets: 4, ..small(32, 15) }, &()).unwrap();
     let count = |row: usize| {
         let unit = luminance(glam::Vec3::from(table.albedo[row]).as_dvec3()) / std::f64::consts::TAU;
@@ -265,7 +266,7 @@ fn more_threads_leave_less_error() {
         [2, 8, 32].map(|count| generate(brdf, &small(count, 1), &()).unwrap().relative_error[0])
     };
     // To what the answers to lights of a base are good: Lambert's needs no threads.
-    let floor = errors(&Brdf::from_parameters("lambert", toml::toml! { reflectance = 0.5 }).unwrap());
+    let floor = errors(&of_model("lambert", "reflectance = 0.5"));
     for (name, brdf) in test_materials::all().into_iter().filter(|(name, _)| *name != "lambert") {
         let [few, some, many] = errors(&brdf);
         println!("{name}: relative error {few:.4} with 2 threads, {some:.4} with 8, {many:.4} with 32");
@@ -532,7 +533,7 @@ fn drafts_are_equal_to_the_bit_on_any_number_of_cores_and_can_be_cancelled() {
 /// A brushed metal of these roughnesses.
 fn brushed(alpha_x: f64, alpha_y: f64) -> Brdf {
     let text = format!("distribution = 'ggx'\nmetal = 'Al'\nalpha_x = {alpha_x}\nalpha_y = {alpha_y}");
-    Brdf::from_parameters("conductor", text.parse().unwrap()).unwrap()
+    of_model("conductor", &text)
 }
 
 #[test]

@@ -311,6 +311,7 @@ fn geometric_series(b: &Matrix) -> Matrix {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::brdf::tests::samples::of_model;
 
     #[test]
     fn over_a_diffuse_base_the_closed_form_is_the_sum_over_all_angles() {
@@ -319,8 +320,7 @@ mod tests {
         {
             let coat = Coat { alpha, ior, thickness_mm: 0.3, absorption: DVec3::splat(absorption) };
             let interface = coat.interface();
-            let lambert = format!("reflectance = {reflectance}");
-            let base = Brdf::from_parameters("lambert", lambert.parse().unwrap()).unwrap();
+            let base = of_model("lambert", &format!("reflectance = {reflectance}"));
             let [closed, summed] =
                 [Interreflection::new(&base, &coat, &interface), Interreflection::over_any(&base, &coat, &interface)];
             for cos_theta in [0.05, 0.3, 0.7, 1.0] {

@@ -6,13 +6,11 @@ use rayon::prelude::*;
 
 use super::*;
 use crate::brdf::base_files_of;
-use crate::brdf::tests::coarse_albedo;
+use crate::brdf::tests::{coarse_albedo, direction, from_toml};
 use crate::brdf::{fresnel_dielectric, merl_bytes};
 
 fn read(text: &str) -> Result<Brdf> {
-    let mut table: toml::Table = text.replace(';', "\n").parse().unwrap();
-    let model = table.remove("model").unwrap();
-    Brdf::from_parameters(model.as_str().unwrap(), table)
+    from_toml(&text.replace(';', "\n"))
 }
 
 fn brdf(text: &str) -> Brdf {
@@ -29,11 +27,6 @@ const MIRROR: &str = "{ model = 'multiscatter_conductor', alpha = 0.01, eta = 0.
 const WHITE_METAL: &str = "{ model = 'multiscatter_conductor', alpha = 0.3, eta = 0.01, k = 100 }";
 
 const VIEWS_DEG: [f64; 6] = [0.0, 30.0, 60.0, 75.0, 85.0, 89.0];
-
-fn direction(theta_deg: f64, phi_deg: f64) -> DVec3 {
-    let (sin, cos) = theta_deg.to_radians().sin_cos();
-    (glam::DVec2::from_angle(phi_deg.to_radians()) * sin).extend(cos)
-}
 
 fn pairs() -> impl Iterator<Item = (DVec3, DVec3)> {
     (0..400).map(f64::from).map(|t| (direction((t * 7.31) % 89.9, t * 31.7), direction((t * 3.77) % 89.9, t * 11.3)))
