@@ -266,6 +266,14 @@ fn fit_prints_time_beside_error_and_writes_json() {
 }
 
 #[test]
+fn help_shows_lists_as_they_are_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = command(&folder, "fit --help").output().unwrap();
+    let said = String::from_utf8(output.stdout).unwrap();
+    assert!(output.status.success() && said.contains("[default: 16,64]"), "{said}");
+}
+
+#[test]
 fn live_measures_the_drafts_of_a_dragged_parameter() {
     let folder = tempfile::tempdir().unwrap();
     let drag = "live --environment white --size 24x18 --threads 4 --drag gold.alpha --from 0.3 --to 0.4 --steps 4";

@@ -62,6 +62,11 @@ fn unknown_names_are_told_with_the_known_ones() {
     refuses(&folder, &render("--environment mars"), &["mars", "studio", ".hdr"]);
     refuses(&folder, &render("--mesh cube"), &["cube", "sphere", ".obj"]);
     refuses(&folder, &render("--method magic"), &["magic", "paper"]);
+    // Those that the command takes.
+    for command in ["view", "bench shaders"] {
+        let list = "[possible values: fitted, paper, gaussian, split_sum, uniform, cosine, importance, filtered, environment, ris, mis]";
+        refuses(&folder, &format!("{command} --method reference"), &["--method", list]);
+    }
     refuses(&folder, &render("--tolerance 1e-3"), &["--tolerance", "fitted"]);
     refuses(&folder, &render("--error 0.1"), &["--error", "--threads"]);
     refuses(&folder, "render --error 0.1 --method reference -o out/image.png", &["--error", "reference"]);
