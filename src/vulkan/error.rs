@@ -32,7 +32,17 @@ pub enum VulkanError {
         /// What it would take.
         extension: String,
     },
-    /// `--device` names none of the devices.
+    /// An environment variable holds what cannot be used.
+    #[error("{variable}: {problem}; {remedy}")]
+    Variable {
+        /// Its name.
+        variable: &'static str,
+        /// What is wrong with what it holds.
+        problem: String,
+        /// What it can hold.
+        remedy: &'static str,
+    },
+    /// None of the devices is called so.
     #[error("--device {asked:?}: no such Vulkan device; name one of: {available}")]
     NoSuchDevice {
         /// The name or index that was asked for.
@@ -104,7 +114,11 @@ pub enum VulkanError {
 
 impl From<VulkanError> for crate::Error {
     fn from(error: VulkanError) -> Self {
-        Self::Vulkan(Box::new(error))
+        match error {
+            // Input as any other, though it is this layer that reads it.
+            VulkanError::Variable { variable, problem, remedy } => Self::input(variable, problem, remedy),
+            other => Self::Vulkan(Box::new(other)),
+        }
     }
 }
 
