@@ -82,6 +82,8 @@ impl Renderer {
     /// # Errors
     /// As for [`Self::render`]; [`Error::Cancelled`](crate::Error::Cancelled).
     pub fn render_watched(&mut self, scene: &Scene, observer: &dyn Observer) -> Result<Picture> {
+        // Numbers that no scene may have are named as such, not as what this device cannot.
+        scene.check()?;
         check_picture(&self.device, scene)?;
         for path in scene.files() {
             self.memo.look_again(&path);
@@ -255,5 +257,30 @@ impl From<&str> for MeshSource {
 impl From<CustomMesh> for MeshSource {
     fn from(custom: CustomMesh) -> Self {
         Self::Custom(custom)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn errors_name_settings_and_not_flags() {
+        let absent = Renderer::on("nope").map(drop).unwrap_err().to_string();
+        assert!(absent.starts_with("device \"nope\": no such Vulkan device; name one of: "), "{absent}");
+        let asked = std::env::var("THREADLIGHT_TEST_DEVICE").ok();
+        let mut renderer = Renderer::open(asked.as_deref()).unwrap();
+        let mut refused = |scene: &Scene| renderer.render(scene).unwrap_err().to_string();
+        // What no scene may have, before what this device cannot.
+        let largest = refused(&Scene::default().with_size(u32::MAX, u32::MAX));
+        assert_eq!(largest, "width: 4294967295 is out of range; use a value from 1 to 16384");
+        let mut finest = Scene::default();
+        finest.image.subpixels = u32::MAX;
+        assert_eq!(refused(&finest), "subpixels: 4294967295 is out of range; use a value from 1 to 4");
+        // No device lists so many pixels, and none has images so wide.
+        let mut large = Scene::default().with_size(16384, 16384);
+        large.image.subpixels = 4;
+        let large = refused(&large);
+        assert!(large.starts_with("image size: ") && !large.contains("--"), "{large}");
     }
 }

@@ -312,7 +312,7 @@ pub fn check_picture(device: &Device, Scene { image, shading, .. }: &Scene) -> R
         return Ok(());
     }
     let problem = format!("is {width} x {height}, and shaders of this device list at most {most} pixels");
-    Err(Error::input("image size", problem, "use a smaller --size"))
+    Err(Error::input("image size", problem, "use a smaller size"))
 }
 
 fn check_cache_size(device: &Device, [width, height]: [u32; 2]) -> Result<()> {
@@ -321,7 +321,7 @@ fn check_cache_size(device: &Device, [width, height]: [u32; 2]) -> Result<()> {
         return Ok(());
     }
     let problem = format!("needs {width} x {height} sub-pixels, this device's images have at most {largest} a side");
-    Err(Error::input("image size", problem, "use a smaller --size or fewer --subpixels"))
+    Err(Error::input("image size", problem, "use a smaller size or fewer sub-pixels"))
 }
 
 /// Only pass 1 of the paper: the texels of the geometry cache, as [`Rendering::geometry`] has them. Needs no threads.

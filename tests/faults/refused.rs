@@ -167,7 +167,7 @@ fn a_device_without_memory_is_an_error_until_there_is_enough() {
         assert_refused(&with_mib(wrong).output().unwrap(), 2, &words);
     }
     for mib in ["0", "1"] {
-        let words = ["no memory for", "THREADLIGHT_DEVICE_MEMORY_MIB", "a smaller --size"];
+        let words = ["no memory for", "THREADLIGHT_DEVICE_MEMORY_MIB", "a smaller size"];
         assert_refused(&with_mib(mib).output().unwrap(), 1, &words);
         assert!(!place.path("picture.png").exists());
     }
