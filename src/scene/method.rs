@@ -62,6 +62,14 @@ impl std::fmt::Display for Method {
     }
 }
 
+impl std::str::FromStr for Method {
+    type Err = Error;
+
+    fn from_str(name: &str) -> Result<Self> {
+        Self::from_name(name)
+    }
+}
+
 impl TryFrom<String> for Method {
     type Error = Error;
 
@@ -83,7 +91,7 @@ mod tests {
     #[test]
     fn older_names_are_still_read() {
         assert_eq!(Method::from_name("resampled").unwrap(), Method::Ris);
-        assert_eq!(Method::from_name("combined").unwrap(), Method::Mis);
+        assert_eq!("combined".parse::<Method>().unwrap(), Method::Mis);
         assert!(Method::from_name("resample").unwrap_err().to_string().contains("fitted, paper"));
     }
 }

@@ -152,7 +152,7 @@ pub fn ready(scene: &Scene) -> Prepared {
 
 /// A material given by its model and parameters in TOML.
 pub fn model(text: &str) -> MaterialSource {
-    let mut parameters: toml::Table = text.parse().expect("TOML");
+    let mut parameters: threadlight::toml::Table = text.parse().expect("TOML");
     let model = parameters.remove("model").and_then(|model| model.as_str().map(str::to_owned)).expect("a model");
     MaterialSource::Model { model, parameters }
 }
