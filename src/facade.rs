@@ -39,6 +39,13 @@ pub struct Renderer {
     last: Option<DeviceScene>,
 }
 
+/// Names the device; what was made by it is no text.
+impl std::fmt::Debug for Renderer {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter) -> std::fmt::Result {
+        formatter.debug_struct("Renderer").field("device", &self.device_name()).finish_non_exhaustive()
+    }
+}
+
 impl Renderer {
     /// A renderer on the device that is likely to be the fastest.
     ///
@@ -84,6 +91,8 @@ impl Renderer {
     /// # Errors
     /// As for [`Self::render`]; [`Error::Cancelled`](crate::Error::Cancelled).
     pub fn render_watched(&mut self, scene: &Scene, observer: &dyn Observer) -> Result<Picture> {
+        // Numbers that no scene may have are named as such, not as what this device cannot.
+        scene.check()?;
         check_picture(&self.device, scene)?;
         for path in scene.files() {
             self.memo.look_again(&path);
@@ -202,9 +211,29 @@ impl Scene {
     }
 }
 
-/// A path is a file's, whatever is built in.
+/// A path is a file's, whatever is built in. Names that a program has made are as those in its text.
 macro_rules! from_paths {
     ($($source:ident),*) => {$(
+        /// A built-in's name, or the path of a file.
+        impl From<String> for $source {
+            fn from(name: String) -> Self {
+                name.as_str().into()
+            }
+        }
+
+        /// A built-in's name, or the path of a file.
+        impl From<&String> for $source {
+            fn from(name: &String) -> Self {
+                name.as_str().into()
+            }
+        }
+
+        impl From<&PathBuf> for $source {
+            fn from(path: &PathBuf) -> Self {
+                path.as_path().into()
+            }
+        }
+
         impl From<&Path> for $source {
             fn from(path: &Path) -> Self {
                 Self::File(path.to_owned())
@@ -257,5 +286,51 @@ impl From<&str> for MeshSource {
 impl From<CustomMesh> for MeshSource {
     fn from(custom: CustomMesh) -> Self {
         Self::Custom(custom)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_and_paths_are_taken_in_all_their_forms() {
+        let (name, path) = ("sphere".to_owned(), PathBuf::from("sphere"));
+        let builtin = Scene::default().with_mesh("sphere");
+        assert_eq!(Scene::default().with_mesh(&name), builtin);
+        assert_eq!(Scene::default().with_mesh(name), builtin);
+        let file = Scene::default().with_mesh(path.as_path());
+        assert_eq!(Scene::default().with_mesh(&path), file);
+        assert_eq!(Scene::default().with_mesh(path), file);
+        assert_ne!(file, builtin);
+        for name in ["clay", "clay.toml"].map(str::to_owned) {
+            assert_eq!(Scene::default().with_material(&name), Scene::default().with_material(name.as_str()));
+            assert_eq!(Scene::default().with_material(name.clone()), Scene::default().with_material(&name));
+        }
+        for name in ["sky", "sky.hdr"].map(str::to_owned) {
+            assert_eq!(Scene::default().with_environment(&name), Scene::default().with_environment(name.as_str()));
+            assert_eq!(Scene::default().with_environment(name.clone()), Scene::default().with_environment(&name));
+        }
+    }
+
+    #[test]
+    fn errors_name_settings_and_not_flags() {
+        let absent = Renderer::on("nope").unwrap_err().to_string();
+        assert!(absent.starts_with("device \"nope\": no such Vulkan device; name one of: "), "{absent}");
+        let asked = std::env::var("THREADLIGHT_TEST_DEVICE").ok();
+        let mut renderer = Renderer::open(asked.as_deref()).unwrap();
+        assert!(format!("{renderer:?}").contains(renderer.device_name()));
+        let mut refused = |scene: &Scene| renderer.render(scene).unwrap_err().to_string();
+        // What no scene may have, before what this device cannot.
+        let largest = refused(&Scene::default().with_size(u32::MAX, u32::MAX));
+        assert_eq!(largest, "width: 4294967295 is out of range; use a value from 1 to 16384");
+        let mut finest = Scene::default();
+        finest.image.subpixels = u32::MAX;
+        assert_eq!(refused(&finest), "subpixels: 4294967295 is out of range; use a value from 1 to 4");
+        // No device lists so many pixels, and none has images so wide.
+        let mut large = Scene::default().with_size(16384, 16384);
+        large.image.subpixels = 4;
+        let large = refused(&large);
+        assert!(large.starts_with("image size: ") && !large.contains("--"), "{large}");
     }
 }

@@ -52,4 +52,9 @@ pub use progress::Observer;
 pub use scene::{CustomMesh, Scene};
 pub use threads::Threads;
 
+/// The crate of vectors in what is public, in the version that it is of.
+pub use glam;
+/// The crate of TOML in what is public, in the version that it is of.
+pub use toml;
+
 use low_level::*;

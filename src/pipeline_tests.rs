@@ -46,7 +46,7 @@ fn wherever_the_device_fails_it_is_said_and_nothing_is_left() {
             let start = Instant::now();
             let fault = Fault { of: None, after: None, index, result, lasts: result == Call::ERROR_DEVICE_LOST };
             let error = render(&prepared, Some(fault)).0.expect_err("a call fails").to_string();
-            let remedy = if fault.lasts { "try again" } else { "a smaller --size" };
+            let remedy = if fault.lasts { "try again" } else { "a smaller size" };
             assert!(error.contains(name) && error.contains(remedy), "{index}, {name}: {error}");
             assert!(start.elapsed() < Duration::from_secs(60), "{index}, {name}: {:?}", start.elapsed());
         }

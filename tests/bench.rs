@@ -194,7 +194,10 @@ fn the_parts_of_a_sweep_together_are_the_whole() {
         bench(&folder, &format!("{sweep} --shard {part}/3 --json {part}.json"));
     }
     let merge = "report --from 1.json 2.json 3.json --json merged.json --plot merged";
-    let merged = without_times(&bench(&folder, merge));
+    // Without a device: nothing is measured.
+    let output = command(&folder, merge).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let merged = without_times(&String::from_utf8(output.stdout).unwrap());
     assert!(whole.len() > 30, "{whole:#?}");
     assert_eq!(merged, whole);
     assert_eq!(rows("merged.json"), rows("whole.json"));
@@ -257,6 +260,14 @@ fn fit_prints_time_beside_error_and_writes_json() {
     let of_gold = |field: &str| [2, 3].map(|row: usize| fits[row][field].as_f64().unwrap());
     let ([_, own], [one, many]) = (of_gold("fitted_error"), of_gold("validation_error"));
     assert!(many < 0.5 * one && many < 2.0 * own, "{own} {one} {many}");
+}
+
+#[test]
+fn help_shows_lists_as_they_are_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = command(&folder, "fit --help").output().unwrap();
+    let said = String::from_utf8(output.stdout).unwrap();
+    assert!(output.status.success() && said.contains("[default: 16,64]"), "{said}");
 }
 
 #[test]

@@ -2,8 +2,8 @@
 mod common;
 
 use common::{EVERYTHING, Validated, model, ready, sphere};
-use glam::{DVec3, Vec4};
 use threadlight::Method;
+use threadlight::glam::{DVec3, Vec4};
 use threadlight::low_level::brdf::{Brdf, Custom, CustomBrdf};
 use threadlight::low_level::scene::{MaterialSource, Source};
 

@@ -47,6 +47,6 @@ fn a_device_that_computes_wrongly_is_refused_with_the_reason() {
     let gpu = Validated::new();
     let refused = Verdict::Wrong("atomics lose counts".to_owned()).way_around(&gpu.device).unwrap_err().to_string();
     assert!(refused.contains(&gpu.device.description().name), "{refused}");
-    assert!(refused.contains("atomics lose counts") && refused.contains("--device"), "{refused}");
+    assert!(refused.contains("atomics lose counts") && refused.contains("choose another device"), "{refused}");
     gpu.finish();
 }

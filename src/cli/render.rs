@@ -118,7 +118,7 @@ impl Render {
         // A script may go through all methods with these.
         let ignored = [
             ("--threads", self.scene.threads.is_some() && is_reference),
-            ("--seed", self.scene.seed.is_some() && is_reference),
+            ("--seed", self.scene.seed.is_some() && !method.has_seed()),
             ("--repeat", self.repeat > 1 && is_reference),
             ("--pattern", self.scene.pattern.is_some() && !method.has_pattern()),
         ];

@@ -43,7 +43,7 @@ pub struct Stats<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     way_around: Option<&'static str>,
     method: &'a str,
-    /// Or samples; not for method `reference`.
+    /// Or samples: as many as were asked for, of which anisotropic materials may have fewer. Not for method `reference`.
     #[serde(skip_serializing_if = "Option::is_none")]
     threads: Option<u32>,
     subpixels: u32,

@@ -1,7 +1,7 @@
 //! The flags that say what is rendered, and on what: `render` and `view` have them in common.
 use super::{memo, nameable, number};
 use clap::builder::{PossibleValue, PossibleValuesParser, RangedI64ValueParser, TypedValueParser};
-use clap::value_parser;
+use clap::{Arg, value_parser};
 use std::path::PathBuf;
 use std::sync::Arc;
 use threadlight::Error;
@@ -25,7 +25,7 @@ pub struct SceneFlags {
     #[arg(long, help = nameable::environment("Light from all directions"), value_name = "NAME|FILE")]
     pub environment: Option<String>,
     /// Shading method.
-    #[arg(long, value_name = "NAME", value_parser = methods())]
+    #[arg(long, value_name = "NAME", value_parser = methods(|_| true))]
     pub method: Option<Method>,
     #[arg(long, help = nameable::counts(), value_name = "N", value_parser = value_parser!(u32).range(1..=i64::from(MAX_SAMPLES)))]
     pub threads: Option<u32>,
@@ -162,9 +162,15 @@ pub fn parse_size(text: &str) -> Result<(u32, u32), String> {
     sides.ok_or_else(|| format!("use width x height in pixels, each 1 to {MAX_SIZE_PX}, such as 640x480"))
 }
 
-/// The name of a method.
-fn methods() -> impl TypedValueParser<Value = Method> {
-    let names = Method::ALL.iter().map(|method| PossibleValue::new(method.name()).help(method.summary()));
+/// The flag --method of a command that takes some of the methods only: its help and its errors list no others.
+pub fn takes_methods(is_taken: fn(Method) -> bool) -> impl FnOnce(Arg) -> Arg {
+    move |method| method.value_parser(methods(is_taken))
+}
+
+/// The name of a method that the command takes.
+fn methods(is_taken: fn(Method) -> bool) -> impl TypedValueParser<Value = Method> {
+    let names = Method::ALL.iter().filter(|method| is_taken(**method));
+    let names = names.map(|method| PossibleValue::new(method.name()).help(method.summary()));
     PossibleValuesParser::new(names).try_map(|name| Method::from_name(&name))
 }
 

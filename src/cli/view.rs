@@ -1,5 +1,5 @@
 //! `threadlight view`: a window to look at a scene and change it.
-use super::scene_flags::{MachineFlags, SceneFlags};
+use super::scene_flags::{MachineFlags, SceneFlags, takes_methods};
 use super::{cache_folder, json, none_of, signals};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::value_parser;
@@ -7,6 +7,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 use threadlight::Error;
 use threadlight::low_level::files;
+use threadlight::low_level::method::Method;
 use threadlight::low_level::picture;
 use threadlight::low_level::viewer::latency::Record;
 use threadlight::low_level::viewer::{self, Ended, ViewerSettings, input};
@@ -30,7 +31,7 @@ In the window:
 
 /// Opens a window to look at a scene, change it, and save picture and scene. Flags override the scene file.
 #[derive(clap::Args)]
-#[command(after_help = EXAMPLES, allow_negative_numbers = true)]
+#[command(after_help = EXAMPLES, allow_negative_numbers = true, mut_arg("method", takes_methods(Method::runs_on_gpu)))]
 pub struct ViewArguments {
     #[command(flatten)]
     scene: SceneFlags,

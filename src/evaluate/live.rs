@@ -72,7 +72,7 @@ pub fn run(
     let image = &drag.scene.image;
     check_comparable_size(image.width as usize, image.height as usize)?;
     let method = drag.scene.shading.method;
-    if method != Method::Fitted {
+    if !method.has_drafts() {
         let remedy = format!("use method {}", Method::Fitted.name());
         return Err(Error::input(format!("method \"{}\"", method.name()), "has no drafts", remedy));
     }

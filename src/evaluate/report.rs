@@ -190,7 +190,7 @@ fn figure(picture: &RgbImage, caption: &str) -> Result<Markup> {
     let mut png = Cursor::new(Vec::new());
     picture
         .write_to(&mut png, ImageFormat::Png)
-        .map_err(|cause| Error::input(caption, format!("cannot be encoded ({cause})"), "use a smaller --size"))?;
+        .map_err(|cause| Error::input(caption, format!("cannot be encoded ({cause})"), "use a smaller size"))?;
     let source = format!("data:image/png;base64,{}", BASE64_STANDARD.encode(png.into_inner()));
     Ok(html! { figure { img src=(source) alt=(caption) width=(picture.width()); figcaption { (caption) } } })
 }

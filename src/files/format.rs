@@ -107,7 +107,9 @@ impl<T> FileKind<T> {
     pub fn remedy_for(&self, name: &str) -> String {
         let builtin = (self.builtin_names)();
         let files = format!("give {}", self.names());
-        match builtin.iter().find(|builtin| is_misspelt(name, builtin)) {
+        // The nearest: names may differ in a letter.
+        let near = builtin.iter().filter(|builtin| is_misspelt(name, builtin));
+        match near.min_by_key(|builtin| misspellings(name, builtin)) {
             Some(near) => format!("write {near}, or {files}"),
             None if builtin.is_empty() => files,
             None => format!("{files}, or a built-in: {}", builtin.join(", ")),
@@ -115,9 +117,16 @@ impl<T> FileKind<T> {
     }
 }
 
-/// Whether `given` is `word` but for a letter in four: others, of which one may begin as another, are farther from each other.
+/// Whether `given` is `word` in other letter cases, or but for a letter in four: others, of which one may begin as another, are farther from
+/// each other.
 pub(crate) fn is_misspelt(given: &str, word: &str) -> bool {
-    strsim::damerau_levenshtein(given, word) * 4 <= word.len() && !given.starts_with(word)
+    let is_in_other_cases = given.eq_ignore_ascii_case(word) && given != word;
+    is_in_other_cases || (misspellings(given, word) * 4 <= word.len() && !given.starts_with(word))
+}
+
+/// How many letters of `given` are not as in `word`, whatever their cases.
+fn misspellings(given: &str, word: &str) -> usize {
+    strsim::damerau_levenshtein(&given.to_ascii_lowercase(), &word.to_ascii_lowercase())
 }
 
 /// `a, b or c`.
@@ -145,5 +154,20 @@ mod tests {
         refused(Environment::load(path).unwrap_err(), &["x.jpg", ".hdr", ".exr", "studio"]);
         refused(Mesh::load(path).unwrap_err(), &["x.jpg", ".obj", "sphere"]);
         refused(Scene::FILES.load(path).map(drop).unwrap_err(), &["x.jpg", ".toml"]);
+    }
+
+    #[test]
+    fn a_name_in_other_letter_cases_is_told_as_it_is_written() {
+        for given in ["Gold", "GOLD", "GLOD"] {
+            assert!(Brdf::FILES.remedy_for(given).starts_with("write gold, or "), "{given}");
+        }
+        for given in ["Sky", "SKY"] {
+            assert!(Environment::FILES.remedy_for(given).starts_with("write sky, or "), "{given}");
+        }
+        assert!(Mesh::FILES.remedy_for("SPHERE").starts_with("write sphere, or "));
+        // What a file is called that has the name of a built-in, and what is far from any.
+        for given in ["gold", "goldfish", "bronze-age"] {
+            assert!(!Brdf::FILES.remedy_for(given).starts_with("write "), "{given}");
+        }
     }
 }

@@ -86,6 +86,16 @@ impl Method {
         self.properties().has_pattern
     }
 
+    /// Whether a seed makes a difference: kernels, fitted or Gaussians, and the split sum have nothing random, nor has the reference.
+    pub fn has_seed(self) -> bool {
+        self.runs_on_gpu() && !self.lookups().split_sum && !self.threads().is_some_and(ThreadKind::are_kernels)
+    }
+
+    /// Whether its threads have drafts while a parameter of a material is dragged.
+    pub fn has_drafts(self) -> bool {
+        self == Self::Fitted
+    }
+
     /// Whether a shader runs it: all but the reference.
     pub fn runs_on_gpu(self) -> bool {
         self != Self::Reference
@@ -95,6 +105,14 @@ impl Method {
 impl std::fmt::Display for Method {
     fn fmt(&self, formatter: &mut std::fmt::Formatter) -> std::fmt::Result {
         self.name().fmt(formatter)
+    }
+}
+
+impl std::str::FromStr for Method {
+    type Err = Error;
+
+    fn from_str(name: &str) -> Result<Self> {
+        Self::from_name(name)
     }
 }
 

@@ -56,7 +56,7 @@ impl BackgroundMap {
     /// # Errors
     /// No device memory left, or a map wider or higher than the device's images can be.
     pub fn new(device: &Arc<Device>, environment: &Environment) -> Result<Self> {
-        let remedy = "scale it down, or leave the background out with --background none";
+        let remedy = "scale it down, or leave the background out (none)";
         check_map_size(device, environment, [environment.width, environment.height], remedy)?;
         let texels = environment.texels.iter().map(|&[r, g, b]| [r, g, b, 1.0]);
         let single = vk::Format::R32G32B32A32_SFLOAT;

@@ -45,7 +45,7 @@ fn check_pixels(most: usize, environment: &Environment) -> Result<()> {
     }
     let problem =
         format!("is {width} x {height} pixels; on this device samples are drawn by the light of {most} at most");
-    Err(crate::Error::input(&environment.name, problem, "scale it down, or use --method filtered"))
+    Err(crate::Error::input(&environment.name, problem, "scale it down, or use method filtered"))
 }
 
 /// The irradiance by each base of the scene's materials, on the device.
@@ -173,7 +173,7 @@ impl DeviceLight {
 
 /// Uploads `map`, of `environment`: its radiance over `scale`.
 fn upload_map(device: &Arc<Device>, environment: &Environment, map: &LightMap, scale: f32) -> Result<vulkan::Image> {
-    check_map_size(device, environment, [map.width, map.height], "scale it down, or use --method filtered")?;
+    check_map_size(device, environment, [map.width, map.height], "scale it down, or use method filtered")?;
     let shape = ImageShape::plane(vk::Format::R32G32B32A32_SFLOAT, map.width as u32, map.height as u32);
     let texels: Vec<_> = map.texels.iter().map(|&[r, g, b, a]| [r / scale, g / scale, b / scale, a]).collect();
     Ok(vulkan::Image::with_texels(device, "environment map", shape, &[bytemuck::cast_slice(&texels).to_vec()])?)

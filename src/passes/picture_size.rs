@@ -17,7 +17,7 @@ pub fn check_picture(device: &Device, Scene { image, shading, .. }: &Scene) -> R
         return Ok(());
     }
     let problem = format!("is {width} x {height}, and shaders of this device list at most {most} pixels");
-    Err(Error::input("image size", problem, "use a smaller --size"))
+    Err(Error::input("image size", problem, "use a smaller size"))
 }
 
 /// An error for a geometry cache of so many columns and rows of sub-pixels, if images of `device` cannot be so large.
@@ -27,5 +27,5 @@ pub(crate) fn check_cache_size(device: &Device, [width, height]: [u32; 2]) -> Re
         return Ok(());
     }
     let problem = format!("needs {width} x {height} sub-pixels, this device's images have at most {largest} a side");
-    Err(Error::input("image size", problem, "use a smaller --size or fewer --subpixels"))
+    Err(Error::input("image size", problem, "use a smaller size or fewer sub-pixels"))
 }

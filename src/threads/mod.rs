@@ -179,6 +179,9 @@ impl Threads {
     }
 
     /// Where `thread` looks in `row`, unit, in the shading frame.
+    ///
+    /// # Panics
+    /// There are not so many rows or threads: [`Self::size`] has their numbers.
     pub fn direction(&self, row: usize, thread: usize) -> DVec3 {
         match self {
             Self::Fitted(table) | Self::Gaussian(table) => table.row(row)[thread].unpack().direction().as_dvec3(),

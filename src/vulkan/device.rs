@@ -64,7 +64,11 @@ fn memory_limit() -> Result<u64> {
     let Some(text) = std::env::var_os(MEMORY_LIMIT).filter(|text| !text.is_empty()) else { return Ok(u64::MAX) };
     let mib: Option<u64> = text.to_str().and_then(|text| text.parse().ok());
     let bytes = mib.and_then(|mib| mib.checked_mul(1 << 20));
-    bytes.ok_or_else(|| VulkanError::unfit(MEMORY_LIMIT, format!("{text:?} is no number of MiB")))
+    bytes.ok_or_else(|| VulkanError::Variable {
+        variable: MEMORY_LIMIT,
+        problem: format!("{text:?} is no number of MiB"),
+        remedy: "set it to a whole number, such as 1024, or unset it",
+    })
 }
 
 /// The one that `asked` names, or the best one; it may lack what the renderer needs.

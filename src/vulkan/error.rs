@@ -21,7 +21,7 @@ pub enum VulkanError {
     NoDriver,
     /// Validation was asked for, but its layer is not installed.
     #[error(
-        "validation: the layer VK_LAYER_KHRONOS_validation is not installed; install it (Debian, Ubuntu: apt-get install vulkan-validationlayers) or leave out --validate"
+        "validation: the layer VK_LAYER_KHRONOS_validation is not installed; install it (Debian, Ubuntu: apt-get install vulkan-validationlayers) or do without validation"
     )]
     NoValidationLayer,
     /// The driver cannot show anything in windows.
@@ -32,8 +32,18 @@ pub enum VulkanError {
         /// What it would take.
         extension: String,
     },
-    /// `--device` names none of the devices.
-    #[error("--device {asked:?}: no such Vulkan device; name one of: {available}")]
+    /// An environment variable holds what cannot be used.
+    #[error("{variable}: {problem}; {remedy}")]
+    Variable {
+        /// Its name.
+        variable: &'static str,
+        /// What is wrong with what it holds.
+        problem: String,
+        /// What it can hold.
+        remedy: &'static str,
+    },
+    /// None of the devices is called so.
+    #[error("device {asked:?}: no such Vulkan device; name one of: {available}")]
     NoSuchDevice {
         /// The name or index that was asked for.
         asked: String,
@@ -41,7 +51,7 @@ pub enum VulkanError {
         available: String,
     },
     /// The device lacks something that the renderer needs.
-    #[error("{device}: lacks {feature}, which Threadlight needs; update its driver or choose another with --device")]
+    #[error("{device}: lacks {feature}, which Threadlight needs; update its driver or choose another device")]
     Unsuitable {
         /// Device name.
         device: String,
@@ -49,9 +59,7 @@ pub enum VulkanError {
         feature: String,
     },
     /// The device computes wrongly.
-    #[error(
-        "{device}: does not compute as Vulkan promises: {fault}; update its driver or choose another with --device"
-    )]
+    #[error("{device}: does not compute as Vulkan promises: {fault}; update its driver or choose another device")]
     Faulty {
         /// Device name.
         device: String,
@@ -60,7 +68,7 @@ pub enum VulkanError {
     },
     /// The driver tells nothing of the shaders that it compiles.
     #[error(
-        "{device}: its driver does not say what shaders compile to (it lacks VK_KHR_pipeline_executable_properties); choose another with --device"
+        "{device}: its driver does not say what shaders compile to (it lacks VK_KHR_pipeline_executable_properties); choose another device"
     )]
     NoStatistics {
         /// Device name.
@@ -77,7 +85,7 @@ pub enum VulkanError {
         result: vk::Result,
     },
     /// Memory for an object could not be had.
-    #[error("no memory for {object}: {cause}; a smaller --size or fewer --subpixels needs less")]
+    #[error("no memory for {object}: {cause}; a smaller size or fewer sub-pixels need less")]
     Memory {
         /// Debug name of the object concerned.
         object: String,
@@ -104,7 +112,11 @@ pub enum VulkanError {
 
 impl From<VulkanError> for crate::Error {
     fn from(error: VulkanError) -> Self {
-        Self::Vulkan(Box::new(error))
+        match error {
+            // Input as any other, though it is this layer that reads it.
+            VulkanError::Variable { variable, problem, remedy } => Self::input(variable, problem, remedy),
+            other => Self::Vulkan(Box::new(other)),
+        }
     }
 }
 
@@ -129,10 +141,10 @@ impl VulkanError {
 fn remedy(result: vk::Result) -> &'static str {
     match result {
         vk::Result::ERROR_DEVICE_LOST => {
-            "; the driver has given the device up: try again, with a smaller --size if it happens again, or another --device"
+            "; the driver has given the device up: try again, with a smaller size if it happens again, or on another device"
         }
         vk::Result::ERROR_OUT_OF_DEVICE_MEMORY | vk::Result::ERROR_OUT_OF_HOST_MEMORY => {
-            "; a smaller --size or fewer --subpixels needs less"
+            "; a smaller size or fewer sub-pixels need less"
         }
         _ => "",
     }

@@ -188,7 +188,7 @@ impl Buffer {
         }
         let problem = format!(
             "it has {} bytes, and shaders of this device see {most_bytes} of a buffer; \
-             a smaller --size, fewer --subpixels or fewer materials need less",
+             a smaller size, fewer sub-pixels or fewer materials need less",
             self.size_bytes
         );
         Err(VulkanError::unfit(&self.name, problem))

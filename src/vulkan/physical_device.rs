@@ -37,7 +37,7 @@ impl DeviceKind {
 /// A physical device, as `threadlight devices` lists it.
 #[derive(Clone, Debug)]
 pub struct DeviceDescription {
-    /// Position in the loader's list: what `--device INDEX` means.
+    /// Position in the loader's list: what a number means where a device is named.
     pub index: usize,
     /// Name as the driver gives it.
     pub name: String,
@@ -68,7 +68,7 @@ impl DeviceDescription {
     }
 }
 
-/// Which of the devices `--device asked` means: the one of that index, or else those of which it is part of the name, as `4090` may be.
+/// Which of the devices is `asked` for: the one of that index, or else those of which it is part of the name, as `4090` may be.
 pub(super) fn named<'a>(devices: impl Iterator<Item = &'a DeviceDescription> + Clone, asked: &str) -> Vec<usize> {
     let asked = asked.trim();
     let of_index = asked.parse().ok().filter(|&index: &usize| devices.clone().any(|device| device.index == index));

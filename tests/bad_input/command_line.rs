@@ -52,8 +52,8 @@ fn numbers_out_of_range_name_the_flag_and_the_range() {
     // More sub-pixels than an image of the device holds, or more pixels than its shaders list, though each flag is within its range. It is said
     // before a material is asked for.
     let large = |size: &str| format!("render --material unobtainium {size} -o out/image.png");
-    refuses(&folder, &large("--size 16384x1 --subpixels 4"), &["65536 x 4", "--size"]);
-    refuses(&folder, &large("--size 16384x16384 --subpixels 1"), &["16384 x 16384", "--size"]);
+    refuses(&folder, &large("--size 16384x1 --subpixels 4"), &["65536 x 4", "a smaller size or fewer sub-pixels"]);
+    refuses(&folder, &large("--size 16384x16384 --subpixels 1"), &["16384 x 16384", "a smaller size"]);
 }
 
 #[test]
@@ -63,13 +63,18 @@ fn unknown_names_are_told_with_the_known_ones() {
     refuses(&folder, &render("--environment mars"), &["mars", "studio", ".hdr"]);
     refuses(&folder, &render("--mesh cube"), &["cube", "sphere", ".obj"]);
     refuses(&folder, &render("--method magic"), &["magic", "paper"]);
+    // Those that the command takes.
+    for command in ["view", "bench shaders"] {
+        let list = "[possible values: fitted, paper, gaussian, split_sum, uniform, cosine, importance, filtered, environment, ris, mis]";
+        refuses(&folder, &format!("{command} --method reference"), &["--method", list]);
+    }
     refuses(&folder, &render("--tolerance 1e-3"), &["--tolerance", "fitted"]);
     refuses(&folder, &render("--error 0.1"), &["--error", "--threads"]);
     refuses(&folder, "render --error 0.1 --method reference -o out/image.png", &["--error", "reference"]);
     refuses(&folder, &render("--reference-on gpu"), &["--reference-on", "fitted"]);
     refuses(&folder, &render("--method reference --reference-on tpu"), &["--reference-on", "tpu", "cpu, gpu"]);
     refuses(&folder, &render("--method reference --print-plan"), &["--print-plan", "reference"]);
-    refuses(&folder, &render("--device abacus"), &["--device \"abacus\"", "name one of"]);
+    refuses(&folder, &render("--device abacus"), &["device \"abacus\": ", "name one of"]);
     refuses(&folder, &render("--background black"), &["--background", "black", "environment, none"]);
     refuses(&folder, "threads unobtainium -o out/a.threads", &["unobtainium", "gold"]);
     refuses(&folder, "completions abacus", &["abacus", "bash"]);

@@ -98,11 +98,43 @@ fn drags_that_cannot_be_measured_are_refused() {
         ("--drag gold.alpha.x", &["gold", "alpha.x: is not a parameter"]),
         ("--drag silver.alpha", &["silver", "gold"]),
         ("--drag gold.beta", &["gold", "beta: is not a parameter"]),
-        ("--drag gold.alpha --method paper", &["paper", "fitted"]),
+        ("--drag gold.alpha --method paper", &["paper", "[possible values: fitted]"]),
         ("--drag gold.alpha --size 8x8", &["8 x 8", "11 x 11"]),
         ("--drag gold.alpha --reference-tolerance 0", &["--reference-tolerance", "positive"]),
     ] {
         refuses(&folder, &format!("bench live --from 0.1 --to 0.2 {arguments}"), names);
+    }
+}
+
+/// What `bench error --json` writes of a material of a file.
+const ROWS: &str = r#"[{"method": "paper", "threads": 4, "material": "my-nickel", "environment": "sky", "scene": "sphere", "rms": 0.1,
+    "rms_linear": 0.1, "ssim": 0.9, "flip": 0.1, "max": 0.3, "nan": 0, "gpu_ms": 1, "frame_ms": 1, "lookups": 1,
+    "covered_pixels": 1, "shade_ms": 1,
+    "settings": {"width": 80, "height": 60, "subpixels": 2, "seed": 0, "repeat": 3, "whole_picture": false}}]"#;
+
+#[test]
+fn flags_of_measurements_are_refused_where_nothing_is_measured() {
+    let folder = pictures();
+    fs::write(folder.path().join("rows.json"), ROWS).unwrap();
+    for flag in [
+        "--materials clay",
+        "--environments studio",
+        "--methods paper",
+        "--counts 4",
+        "--scene sphere",
+        "--size 24x18",
+        "--subpixels 2",
+        "--seed 0",
+        "--device 0",
+        "--no-cache",
+        "--threads 64",
+        "--reference-tolerance 1e-2",
+        "--reference-on cpu",
+        "--repeat 3",
+    ] {
+        let name = flag.split(' ').next().unwrap();
+        let arguments = format!("bench report --from rows.json {flag}");
+        refuses(&folder, &arguments, &[&format!("{name}: is of no use"), "without DIR"]);
     }
 }
 
@@ -111,6 +143,7 @@ fn galleries_and_reports_that_cannot_be_made_are_refused() {
     let folder = pictures();
     fs::write(folder.path().join("empty.json"), "[]").unwrap();
     fs::write(folder.path().join("other.json"), "{\"rows\": 3}").unwrap();
+    fs::write(folder.path().join("rows.json"), ROWS).unwrap();
     for (arguments, names) in [
         ("gallery", &["--plot"][..]),
         ("gallery --plot small.png", &["small.png"]),
@@ -129,6 +162,7 @@ fn galleries_and_reports_that_cannot_be_made_are_refused() {
         ("report out --from small.png", &["small.png", "bench error --json"]),
         ("report out --from empty.json", &["empty.json", "no measurements"]),
         ("report out --from other.json", &["other.json", "no measurements"]),
+        ("report out --from rows.json", &["rows.json", "my-nickel", "--materials"]),
         ("report out --environments mars", &["mars"]),
         ("report out --size 10x", &["--size"]),
     ] {

@@ -347,5 +347,10 @@ fn what_a_method_knows_nothing_of_is_ignored_with_a_warning() {
     for flag in ["--threads", "--seed", "--repeat"] {
         assert!(ignored.contains(&format!("{flag} is ignored: method \"reference\"")), "{ignored}");
     }
+    for method in ["fitted", "gaussian", "split_sum"] {
+        let ignored = warnings(&format!("--method {method} --threads 1 --seed 3"));
+        let warning = format!("--seed is ignored: method \"{method}\"");
+        assert!(ignored.contains(&warning) && ignored.lines().count() == 1, "{ignored}");
+    }
     assert_eq!(warnings("--method filtered --threads 2 --seed 3 --repeat 2 --pattern fixed"), "");
 }

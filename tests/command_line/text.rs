@@ -175,6 +175,9 @@ fn a_material_is_exported_and_plotted() {
     threadlight(&folder, "materials plot clay -o clay.svg").assert().success();
     assert!(String::from_utf8(bytes(&folder, "clay.svg")).unwrap().contains("</svg>"));
     threadlight(&folder, "materials export clay -o clay.png").assert().code(2);
+    // Endings count in any letter case.
+    threadlight(&folder, "materials export clay -o upper.BINARY").assert().success();
+    assert!(bytes(&folder, "upper.BINARY") == bytes(&folder, "clay.binary"));
     threadlight(&folder, "materials export clay -o exported.threads").assert().success();
     threadlight(&folder, "threads clay -o made.threads").assert().success();
     let [exported, made] =

@@ -161,9 +161,13 @@ fn a_device_without_memory_is_an_error_until_there_is_enough() {
         command.args(["--validate"]).env("THREADLIGHT_DEVICE_MEMORY_MIB", mib);
         command
     };
-    assert_refused(&with_mib("much").output().unwrap(), 1, &["THREADLIGHT_DEVICE_MEMORY_MIB", "much"]);
+    // That is not the machine's fault.
+    for wrong in ["much", "-1", "1.5", "18446744073709551615"] {
+        let words = ["THREADLIGHT_DEVICE_MEMORY_MIB: ", wrong, "is no number of MiB", "unset it"];
+        assert_refused(&with_mib(wrong).output().unwrap(), 2, &words);
+    }
     for mib in ["0", "1"] {
-        let words = ["no memory for", "THREADLIGHT_DEVICE_MEMORY_MIB", "a smaller --size"];
+        let words = ["no memory for", "THREADLIGHT_DEVICE_MEMORY_MIB", "a smaller size"];
         assert_refused(&with_mib(mib).output().unwrap(), 1, &words);
         assert!(!place.path("picture.png").exists());
     }

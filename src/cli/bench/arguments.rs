@@ -2,13 +2,15 @@
 use crate::cli::render::processor;
 use crate::cli::scene_flags::{DeviceFlags, parse_size};
 use crate::cli::{json, nameable, number, print, stem};
-use clap::value_parser;
+use clap::parser::ValueSource;
+use clap::{ArgMatches, Args, Command, FromArgMatches, value_parser};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use threadlight::low_level::brdf::Brdf;
 use threadlight::low_level::environment;
 use threadlight::low_level::evaluate::reference::{self, Processor, ReferenceSettings};
 use threadlight::low_level::evaluate::sweep::Measured;
-use threadlight::low_level::evaluate::{Cases, Shard, Sweep, sweep, tables};
+use threadlight::low_level::evaluate::{Cases, Row, Shard, Sweep, sweep, tables};
 use threadlight::low_level::files;
 use threadlight::low_level::memo::{Memo, Round};
 use threadlight::low_level::method::{Method, Variant};
@@ -46,6 +48,39 @@ pub struct CasesArguments {
     seed: u64,
     #[command(flatten)]
     pub device: DeviceFlags,
+}
+
+/// The flags that stand on the command line: others have their defaults. The first field of a command, as the later ones take values away.
+pub struct Given(Vec<String>);
+
+impl Given {
+    /// Whether the flag of this name, in which `_` is in the place of `-`, is there.
+    pub fn has(&self, name: &str) -> bool {
+        self.0.iter().any(|given| given == name)
+    }
+}
+
+impl FromArgMatches for Given {
+    fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
+        let names = matches.ids().map(|id| id.as_str());
+        let given = names.filter(|name| matches.value_source(name) == Some(ValueSource::CommandLine));
+        Ok(Self(given.map(str::to_owned).collect()))
+    }
+
+    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
+        *self = Self::from_arg_matches(matches)?;
+        Ok(())
+    }
+}
+
+impl Args for Given {
+    fn augment_args(command: Command) -> Command {
+        command
+    }
+
+    fn augment_args_for_update(command: Command) -> Command {
+        command
+    }
 }
 
 /// What a command measures where it is not told.
@@ -91,6 +126,33 @@ impl CasesArguments {
             return Err(Error::input("--counts", "has none that these methods can have", remedy));
         }
         Ok(cases)
+    }
+
+    /// Takes from `row`, which the file at `path` holds, what was not `given`: measurements beside it are to be of the same.
+    pub fn take_from(&mut self, row: &Row, path: &Path, given: &Given) -> Result<()> {
+        let materials: Vec<_> = Brdf::builtin_names().collect();
+        for (flag, what, texts, name, builtin) in [
+            ("materials", "material", &mut self.materials, &row.material, materials.as_slice()),
+            ("environments", "environment", &mut self.environments, &row.environment, environment::builtin_names()),
+            ("scene", "scene", &mut self.scene, &row.scene, mesh::builtin_names()),
+        ] {
+            if given.has(flag) {
+                continue;
+            }
+            // Rows have names, and not the files of these.
+            if !builtin.contains(&name.as_str()) {
+                let problem = format!("is of the {what} \"{name}\", which is not built in");
+                return Err(Error::in_file(path, problem, format!("name its file by --{flag}")));
+            }
+            *texts = vec![name.clone()];
+        }
+        let settings = &row.settings;
+        self.size = self.size.or(Some((settings.width, settings.height)));
+        self.subpixels = self.subpixels.or(Some(settings.subpixels));
+        if !given.has("seed") {
+            self.seed = settings.seed;
+        }
+        Ok(())
     }
 
     /// All files that are read for `cases`, which are what these arguments name.
@@ -265,6 +327,56 @@ pub fn check_folder(folder: &Path) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use clap::Parser;
+
+    #[derive(Parser)]
+    struct Measures {
+        #[command(flatten)]
+        given: Given,
+        #[command(flatten)]
+        cases: CasesArguments,
+    }
+
+    /// What is measured with these flags beside a row of `clay` in `sky`; names of materials and environments, size, sub-pixels, seed.
+    fn beside_a_row(flags: &[&str], material: &str) -> Result<(String, String, [u32; 3], u64)> {
+        let row = format!(
+            r#"{{"method": "paper", "threads": 4, "material": "{material}", "environment": "sky", "scene": "sphere", "rms": 0.1,
+            "rms_linear": 0.1, "ssim": 0.9, "flip": 0.1, "max": 0.3, "nan": 0, "gpu_ms": 1, "frame_ms": 1, "lookups": 1,
+            "covered_pixels": 1, "shade_ms": 1,
+            "settings": {{"width": 80, "height": 60, "subpixels": 3, "seed": 7, "repeat": 3, "whole_picture": false}}}}"#
+        );
+        let row = serde_json::from_str(&row).unwrap();
+        let Measures { given, mut cases } = Measures::try_parse_from([&["measure"], flags].concat()).unwrap();
+        cases.take_from(&row, Path::new("rows.json"), &given)?;
+        let defaults = Defaults {
+            materials: vec!["gold", "red-plastic"],
+            methods: vec![Method::Fitted],
+            counts: &[4],
+            size: Some((160, 120)),
+        };
+        let cases = cases.cases(&defaults)?;
+        let [materials, environments] = [
+            cases.materials.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>().join(","),
+            cases.environments.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>().join(","),
+        ];
+        let image = &cases.scenes[0].1.image;
+        Ok((materials, environments, [image.width, image.height, image.subpixels], cases.seed))
+    }
+
+    #[test]
+    fn what_is_measured_beside_earlier_rows_is_of_the_same_but_for_what_flags_say() {
+        let of_row = ("clay".to_owned(), "sky".to_owned(), [80, 60, 3], 7);
+        assert_eq!(beside_a_row(&[], "clay").unwrap(), of_row);
+        // Also where a flag says what it would be without.
+        let flags = "--materials gold,silver --environments studio --scene sphere --size 24x18 --subpixels 1 --seed 0";
+        let flags: Vec<_> = flags.split(' ').collect();
+        let of_flags = ("gold,silver".to_owned(), "studio".to_owned(), [24, 18, 1], 0);
+        assert_eq!(beside_a_row(&flags, "nickel-of-a-file").unwrap(), of_flags);
+        let refused = beside_a_row(&[], "nickel-of-a-file").unwrap_err().to_string();
+        let reason =
+            "rows.json: is of the material \"nickel-of-a-file\", which is not built in; name its file by --materials";
+        assert_eq!(refused, reason);
+    }
 
     #[test]
     fn a_folder_may_be_named_that_is_not_there_but_not_where_none_can_be() {

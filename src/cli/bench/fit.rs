@@ -30,7 +30,7 @@ pub struct BenchFit {
     #[arg(long, help = nameable::materials(), value_name = "LIST", value_delimiter = ',', default_value = "gold")]
     materials: Vec<String>,
     /// Numbers of threads, each 1 to 128.
-    #[arg(long, value_name = "LIST", value_delimiter = ',', default_values_t = [16, 64], value_parser = value_parser!(u32).range(1..=MAX_COUNT as i64))]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "16,64", value_parser = value_parser!(u32).range(1..=MAX_COUNT as i64))]
     counts: Vec<u32>,
     /// Fit this often; times are medians.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = value_parser!(u32).range(1..))]

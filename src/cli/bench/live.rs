@@ -3,10 +3,11 @@ use super::arguments::{JsonArgument, QUICK_TOLERANCE};
 use crate::cli::none_of;
 use crate::cli::number;
 use crate::cli::progress::TerminalProgress;
-use crate::cli::scene_flags::{MachineFlags, SceneFlags};
+use crate::cli::scene_flags::{MachineFlags, SceneFlags, takes_methods};
 use clap::value_parser;
 use threadlight::low_level::evaluate::live::{self, Drag};
 use threadlight::low_level::evaluate::reference::ReferenceSettings;
+use threadlight::low_level::method::Method;
 use threadlight::low_level::scene::Scene;
 use threadlight::{Error, Result};
 
@@ -29,7 +30,7 @@ The JSON is a list of steps with these fields, in this order:
 
 /// Drags a parameter of a material there and back, and measures the drafts of its threads.
 #[derive(clap::Args)]
-#[command(after_help = EXAMPLES, allow_negative_numbers = true)]
+#[command(after_help = EXAMPLES, allow_negative_numbers = true, mut_arg("method", takes_methods(Method::has_drafts)))]
 pub struct BenchLive {
     #[command(flatten)]
     scene: SceneFlags,

@@ -1,5 +1,7 @@
 //! `threadlight bench report`: everything measured, on one HTML page.
-use super::arguments::{CasesArguments, Defaults, OutputArguments, QUICK_TOLERANCE, TruthArguments, check_folder};
+use super::arguments::{
+    CasesArguments, Defaults, Given, OutputArguments, QUICK_TOLERANCE, TruthArguments, check_folder,
+};
 use super::error;
 use crate::cli::print;
 use crate::cli::progress::TerminalProgress;
@@ -36,14 +38,17 @@ Times are of the first material, environment and scene.
 --json and --plot write the errors, as those of `bench error` do.
 
 With --from, errors are those of earlier runs of `bench error --json`, such as all parts of one by --shard, and methods are shown side by side for the first material, \
-environment and scene only. Without DIR nothing is measured: the tables of these errors are printed, and --plot and --json write \
-what those of `bench error` write. Files that were not measured with the same settings, or that have the same row, are refused, and so \
+environment and scene only. Which these are, and size, sub-pixels and seed, is as in the first row, unless flags say otherwise; what was \
+read from a file then is to be named by its flag. Without DIR nothing is measured, and flags of what to measure are refused: the tables of \
+these errors are printed, and --plot and --json write what those of `bench error` write. Files that were not measured with the same settings, or that have the same row, are refused, and so \
 are parts by --shard if one is missing or was interrupted.";
 
 /// Measures everything and writes it as one HTML page. Lists are separated by commas.
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES, allow_negative_numbers = true)]
 pub struct BenchReport {
+    #[command(flatten)]
+    given: Given,
     /// Folder for report.html; made if it is not there. With --from it can be left out: only tables are printed.
     #[arg(value_name = "DIR", required_unless_present = "from")]
     folder: Option<PathBuf>,
@@ -64,8 +69,33 @@ pub struct BenchReport {
     output: OutputArguments,
 }
 
+/// The flags that say what to measure, and how.
+const MEASURING: [&str; 14] = [
+    "materials",
+    "environments",
+    "methods",
+    "counts",
+    "scene",
+    "size",
+    "subpixels",
+    "seed",
+    "device",
+    "no_cache",
+    "threads",
+    "reference_tolerance",
+    "reference_on",
+    "repeat",
+];
+
 impl BenchReport {
-    pub fn run(self) -> anyhow::Result<()> {
+    pub fn run(mut self) -> anyhow::Result<()> {
+        if self.folder.is_none()
+            && let Some(flag) = MEASURING.into_iter().find(|flag| self.given.has(flag))
+        {
+            let problem = "is of no use to tables of earlier rows: without DIR nothing is measured";
+            let remedy = "leave it out, or name a folder for report.html";
+            return Err(Error::input(format!("--{}", flag.replace('_', "-")), problem, remedy).into());
+        }
         self.folder.as_deref().map_or(Ok(()), check_folder)?;
         let files = self.from.iter().map(|path| Ok((path.as_path(), read_rows(path)?))).collect::<Result<Vec<_>>>()?;
         let earlier = merged(files)?;
@@ -74,6 +104,9 @@ impl BenchReport {
             self.output.check(&self.from)?;
             return error::write(&earlier, None, &self.output);
         };
+        if let Some((row, path)) = earlier.first().zip(self.from.first()) {
+            self.cases.take_from(row, path, &self.given)?;
+        }
         let cases = self.cases.cases(&Defaults {
             materials: vec!["gold", "red-plastic"],
             methods: vec![Method::Fitted, Method::Paper, Method::Importance, Method::Filtered],

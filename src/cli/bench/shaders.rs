@@ -2,7 +2,7 @@
 use super::arguments::JsonArgument;
 use crate::cli::memo;
 use crate::cli::progress::TerminalProgress;
-use crate::cli::scene_flags::SceneFlags;
+use crate::cli::scene_flags::{SceneFlags, takes_methods};
 use threadlight::Error;
 use threadlight::low_level::evaluate::shaders;
 use threadlight::low_level::method::Method;
@@ -30,7 +30,7 @@ The JSON is a list of rows with these fields, in this order:
 
 /// Lists what a driver's compiler makes of the shaders that a scene needs: registers, spills, estimated cycles. Nothing is rendered.
 #[derive(clap::Args)]
-#[command(after_help = EXAMPLES, allow_negative_numbers = true)]
+#[command(after_help = EXAMPLES, allow_negative_numbers = true, mut_arg("method", takes_methods(Method::runs_on_gpu)))]
 pub struct BenchShaders {
     #[command(flatten)]
     scene: SceneFlags,

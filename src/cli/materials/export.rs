@@ -1,7 +1,6 @@
 //! `threadlight materials export`: a BRDF as a file that other programs read, or its threads.
 use super::Named;
 use crate::cli::threads::Threads;
-use std::ffi::OsStr;
 use std::path::PathBuf;
 use threadlight::Error;
 use threadlight::low_level::brdf::{MerlTable, merl_bytes};
@@ -22,7 +21,8 @@ pub struct Export {
 
 impl Export {
     pub fn run(self) -> anyhow::Result<()> {
-        match self.output.extension().and_then(OsStr::to_str) {
+        let extension = self.output.extension().unwrap_or_default().to_ascii_lowercase();
+        match extension.to_str() {
             Some("binary") => {}
             Some("threads") => return Threads::of(self.named.material, self.output).run(),
             _ => {
