@@ -118,7 +118,7 @@ impl pulp::NullaryFnOnce for MomentsRow<'_> {
 #[inline(always)]
 fn moments(blocks: &[Block], normal: Vec3) -> Moments {
     // Short loops over lanes, of which compilers make vector instructions.
-    let mut sums = [[[0.0; LANES]; TERMS]; 4];
+    let mut light = [[[0.0; LANES]; TERMS]; 3];
     for block in blocks {
         let cosines = cosines(&block.centroid, normal);
         if is_below_horizon(&cosines) {
@@ -126,9 +126,9 @@ fn moments(blocks: &[Block], normal: Vec3) -> Moments {
         }
         let mut powers = cosines;
         for term in 0..TERMS {
-            for channel in 0..3 {
+            for (sums, power) in light.iter_mut().zip(&block.power) {
                 for j in 0..LANES {
-                    sums[channel][term][j] += powers[j] * block.power[channel][j];
+                    sums[term][j] += powers[j] * power[j];
                 }
             }
             for j in 0..LANES {
@@ -136,6 +136,7 @@ fn moments(blocks: &[Block], normal: Vec3) -> Moments {
             }
         }
     }
+    let mut constant = [[0.0; LANES]; TERMS];
     for block in blocks {
         let cosines = cosines(&block.middle, normal);
         if is_below_horizon(&cosines) {
@@ -145,16 +146,15 @@ fn moments(blocks: &[Block], normal: Vec3) -> Moments {
         for j in 0..LANES {
             powers[j] = cosines[j] * block.solid_angle[j];
         }
-        for term in 0..TERMS {
+        for sums in &mut constant {
             for j in 0..LANES {
-                sums[3][term][j] += powers[j];
-            }
-            for j in 0..LANES {
+                sums[j] += powers[j];
                 powers[j] *= cosines[j];
             }
         }
     }
-    sums.map(|terms| terms.map(|lanes| lanes.iter().sum()))
+    let [red, green, blue] = light;
+    [red, green, blue, constant].map(|terms| terms.map(|lanes| lanes.iter().sum()))
 }
 
 /// Of these directions to the normal; 0 below the horizon.
