@@ -4,7 +4,7 @@
 //! shading adds theirs exactly.
 use std::ops::Range;
 
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec3, Vec4};
 use rayon::prelude::*;
 
 use super::cube::{direction_of, face_of};
@@ -32,16 +32,13 @@ struct Cell {
     centroid: Vec3,
 }
 
-/// Cells that are summed over at once.
-const LANES: usize = 8;
-
-/// So many cells side by side.
+/// Four cells side by side.
 #[derive(Clone, Copy, Default)]
 struct Block {
-    centroid: [[f32; LANES]; 3],
-    power: [[f32; LANES]; 3],
-    middle: [[f32; LANES]; 3],
-    solid_angle: [f32; LANES],
+    centroid: [Vec4; 3],
+    power: [Vec4; 3],
+    middle: [Vec4; 3],
+    solid_angle: Vec4,
 }
 
 impl Block {
@@ -71,11 +68,15 @@ impl LightMoments {
     /// Those of `environment`. The only error is that `observer` cancels it.
     pub fn of(environment: &Environment, observer: &dyn Observer) -> Result<Self> {
         let cells = gather(environment, observer)?;
-        let blocks: Vec<_> = cells.chunks(LANES).map(Block::of).collect();
+        let blocks: Vec<_> = cells.chunks(4).map(Block::of).collect();
         let mut texels = vec![Moments::default(); 6 * FACE_SIZE * FACE_SIZE];
         texels.par_chunks_mut(FACE_SIZE).enumerate().try_for_each(|(row, texels)| {
             observer.check()?;
-            pulp::Arch::new().dispatch(MomentsRow { blocks: &blocks, row, texels });
+            for (column, texel) in texels.iter_mut().enumerate() {
+                let middle = |index: usize| (index as f64 + 0.5) / FACE_SIZE as f64;
+                let normal = direction_of(row / FACE_SIZE, middle(column), middle(row % FACE_SIZE)).as_vec3();
+                *texel = moments(&blocks, normal);
+            }
             Ok::<_, Error>(())
         })?;
         Ok(Self(texels))
@@ -93,88 +94,35 @@ impl LightMoments {
     }
 }
 
-/// A call of what makes a row of texels, counted over all faces, compiled for the vector instructions that are there.
-struct MomentsRow<'a> {
-    blocks: &'a [Block],
-    row: usize,
-    texels: &'a mut [Moments],
-}
-
-impl pulp::NullaryFnOnce for MomentsRow<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn call(self) {
-        let Self { blocks, row, texels } = self;
-        for (column, texel) in texels.iter_mut().enumerate() {
-            let middle = |index: usize| (index as f64 + 0.5) / FACE_SIZE as f64;
-            let normal = direction_of(row / FACE_SIZE, middle(column), middle(row % FACE_SIZE)).as_vec3();
-            *texel = moments(blocks, normal);
-        }
-    }
-}
-
 /// What of the light in `blocks` reaches a surface of this normal.
-#[inline(always)]
 fn moments(blocks: &[Block], normal: Vec3) -> Moments {
-    // Short loops over lanes, of which compilers make vector instructions.
-    let mut light = [[[0.0; LANES]; TERMS]; 3];
+    let cosines = |[x, y, z]: [Vec4; 3]| (normal.x * x + normal.y * y + normal.z * z).max(Vec4::ZERO);
+    let mut sums = [[Vec4::ZERO; TERMS]; 4];
+    let [red, green, blue, constant] = &mut sums;
     for block in blocks {
-        let cosines = cosines(&block.centroid, normal);
-        if is_below_horizon(&cosines) {
-            continue;
-        }
-        let mut powers = cosines;
-        for term in 0..TERMS {
-            for (sums, power) in light.iter_mut().zip(&block.power) {
-                for j in 0..LANES {
-                    sums[term][j] += powers[j] * power[j];
-                }
-            }
-            for j in 0..LANES {
-                powers[j] *= cosines[j];
+        let cosines = cosines(block.centroid);
+        // Half of all blocks are below the horizon.
+        if cosines != Vec4::ZERO {
+            let mut powers = cosines;
+            for term in 0..TERMS {
+                red[term] += powers * block.power[0];
+                green[term] += powers * block.power[1];
+                blue[term] += powers * block.power[2];
+                powers *= cosines;
             }
         }
     }
-    let mut constant = [[0.0; LANES]; TERMS];
     for block in blocks {
-        let cosines = cosines(&block.middle, normal);
-        if is_below_horizon(&cosines) {
-            continue;
-        }
-        let mut powers = [0.0; LANES];
-        for j in 0..LANES {
-            powers[j] = cosines[j] * block.solid_angle[j];
-        }
-        for sums in &mut constant {
-            for j in 0..LANES {
-                sums[j] += powers[j];
-                powers[j] *= cosines[j];
+        let cosines = cosines(block.middle);
+        if cosines != Vec4::ZERO {
+            let mut powers = cosines * block.solid_angle;
+            for term in constant.iter_mut() {
+                *term += powers;
+                powers *= cosines;
             }
         }
     }
-    let [red, green, blue] = light;
-    [red, green, blue, constant].map(|terms| terms.map(|lanes| lanes.iter().sum()))
-}
-
-/// Of these directions to the normal; 0 below the horizon.
-#[inline(always)]
-fn cosines([xs, ys, zs]: &[[f32; LANES]; 3], normal: Vec3) -> [f32; LANES] {
-    let mut cosines = [0.0; LANES];
-    for j in 0..LANES {
-        cosines[j] = (normal.x * xs[j] + normal.y * ys[j] + normal.z * zs[j]).max(0.0);
-    }
-    cosines
-}
-
-/// Whether all of a block is: half of all blocks are.
-#[inline(always)]
-fn is_below_horizon(cosines: &[f32; LANES]) -> bool {
-    let mut is_above = false;
-    for cosine in cosines {
-        is_above |= *cosine > 0.0;
-    }
-    !is_above
+    sums.map(|terms| terms.map(Vec4::element_sum))
 }
 
 /// The light of `environment` in cells.

@@ -37,7 +37,7 @@ pub fn write_png_of_gamma(path: &Path, width: u32, height: u32, rgba8: &[u8], al
     if gamma == SRGB_GAMMA {
         encoder.set_source_srgb(SrgbRenderingIntent::Perceptual);
     } else {
-        encoder.set_source_gamma(ScaledFloat::new((1.0 / gamma) as f32));
+        encoder.set_source_gamma(ScaledFloat::from_scaled((1e5 / gamma).round() as u32));
     }
     let rgb8: Vec<u8>;
     let (color, data) = if alpha {

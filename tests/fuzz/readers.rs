@@ -461,7 +461,7 @@ pub fn measurements() -> Reader {
     Reader {
         file_name: "x.json",
         seeds: || {
-            let row = r#"{"method":"paper","threads":4,"material":"m","environment":"e","scene":"s","rms":0.1,"rms_linear":0.1,"ssim":0.9,"flip":0.1,"max":1,"nan":0,"gpu_ms":1,"frame_ms":2,"lookups":3}"#;
+            let row = r#"{"method":"paper","threads":4,"material":"m","environment":"e","scene":"s","rms":0.1,"rms_linear":0.1,"ssim":0.9,"flip":0.1,"max":1,"nan":0,"gpu_ms":1,"frame_ms":2,"lookups":3,"covered_pixels":1,"shade_ms":1,"settings":{"width":4,"height":3,"subpixels":2,"seed":0,"repeat":3,"whole_picture":false}}"#;
             vec![format!("[{row},{row}]").into_bytes()]
         },
         words: &["{", "[", "\"", ",", "null", "\"rms\":"],
