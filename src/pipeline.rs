@@ -160,7 +160,7 @@ impl DeviceScene {
     /// [`render`](Self::render), watched by `observer`, which can stop it between frames, and between portions of a long one.
     ///
     /// # Errors
-    /// As there; [`Error::Cancelled`].
+    /// As there; [`Error::Cancelled`](crate::Error::Cancelled).
     pub fn render_watched(&self, wanted: Wanted, repeat: u32, observer: &dyn Observer) -> Result<Rendering> {
         let mut graph = FrameGraph::new();
         let region = match wanted.geometry {

@@ -57,6 +57,7 @@ mod tests {
     #[test]
     fn variants_of_methods_that_have_a_pattern_are_named_by_it() {
         for &method in Method::ALL {
+            assert_eq!(method.name().parse::<Method>().unwrap(), method);
             for pattern in Pattern::ALL {
                 let variant = Variant::new(method, pattern);
                 assert_eq!(Variant::from_name(&variant.name()).unwrap(), variant);
