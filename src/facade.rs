@@ -292,6 +292,7 @@ impl From<CustomMesh> for MeshSource {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::vulkan::test_device;
 
     #[test]
     fn names_and_paths_are_taken_in_all_their_forms() {
@@ -317,8 +318,7 @@ mod tests {
     fn errors_name_settings_and_not_flags() {
         let absent = Renderer::on("nope").unwrap_err().to_string();
         assert!(absent.starts_with("device \"nope\": no such Vulkan device; name one of: "), "{absent}");
-        let asked = std::env::var("THREADLIGHT_TEST_DEVICE").ok();
-        let mut renderer = Renderer::open(asked.as_deref()).unwrap();
+        let mut renderer = Renderer::open(test_device::name().as_deref()).unwrap();
         assert!(format!("{renderer:?}").contains(renderer.device_name()));
         let mut refused = |scene: &Scene| renderer.render(scene).unwrap_err().to_string();
         // What no scene may have, before what this device cannot.

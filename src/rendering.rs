@@ -62,7 +62,7 @@ impl Rendering {
 
     /// Time on the GPU of all passes but those that copy results back, in milliseconds.
     pub fn gpu_ms(&self) -> f64 {
-        self.passes.iter().filter(|pass| !pass.is_readback()).map(|pass| pass.gpu_ms).sum()
+        PassTime::ms_but_readbacks(&self.passes)
     }
 
     /// Time on the GPU of pass 2 alone, in milliseconds.

@@ -17,11 +17,10 @@ use threadlight::low_level::picture::Format;
 use threadlight::low_level::pipeline::{DeviceScene, Wanted};
 use threadlight::low_level::prepare::prepare;
 use threadlight::low_level::progress::Observer;
+use threadlight::low_level::rendering::Rendering;
 use threadlight::low_level::scene::Scene;
 use threadlight::low_level::steps::FitThreads;
 use threadlight::low_level::vulkan::Device;
-
-use threadlight::low_level::rendering::Rendering;
 use threadlight::{Error, Result};
 
 const EXAMPLES: &str = "\

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use crate::error::Result;
 use crate::graph::{Executable, FrameGraph};
 use crate::passes::{BareLookups, Readbacks, bare_lookups, texels};
-use crate::vulkan::{Device, Frames};
+use crate::vulkan::{Device, Frames, PassTime};
 
 /// Milliseconds on the GPU that `bare` takes, and the sums of its lookups, rgb.
 ///
@@ -19,6 +19,5 @@ pub fn time_bare_lookups(device: &Arc<Device>, bare: &BareLookups) -> Result<(f6
     let executable = Executable::new(device, graph, &imports)?;
     let mut frames = Frames::new(device, "bare lookups", 1)?;
     let passes = executable.execute_timed(device, &mut frames, &())?;
-    let gpu_ms = passes.iter().filter(|pass| !pass.is_readback()).map(|pass| pass.gpu_ms).sum();
-    Ok((gpu_ms, texels(Some(&target))))
+    Ok((PassTime::ms_but_readbacks(&passes), texels(Some(&target))))
 }

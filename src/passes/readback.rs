@@ -13,6 +13,11 @@ impl PassTime {
     pub fn is_readback(&self) -> bool {
         self.name.starts_with(PREFIX)
     }
+
+    /// Time on the GPU of all `passes` but these, in milliseconds.
+    pub fn ms_but_readbacks(passes: &[Self]) -> f64 {
+        passes.iter().filter(|pass| !pass.is_readback()).map(|pass| pass.gpu_ms).sum()
+    }
 }
 
 /// Adds copies into host memory to a graph.

@@ -2,9 +2,10 @@
 use glam::DVec3;
 
 use super::edit::Edit;
-use super::generate::{Neighbour, Row, carried, from_the_middle, most_moved};
+use super::generate::{Neighbour, carried, from_the_middle, most_moved};
 use super::kernel::{Kernel, WIDEST_LEVEL, all_between, scaled, sharpest_level};
 use super::lights::{BaseAnswers, Quadrature, TestLights};
+use super::row::Row;
 use super::sets::share_of_sets;
 use super::solve::{Effort, Fit};
 use super::table::FittedTable;

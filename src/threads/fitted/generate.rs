@@ -7,6 +7,7 @@ use super::base::base_of;
 use super::cells::in_sets;
 use super::kernel::{Kernel, all_between, scale_rad, scaled, sharpest_level};
 use super::lights::{BaseAnswers, Quadrature, TestLights};
+use super::row::Row;
 use super::sets::{pixels_have_own, share_of_sets};
 use super::solve::{Effort, Fit};
 use super::stray;
@@ -55,15 +56,6 @@ const LEAST_ERROR: f64 = 3e-3;
 
 /// Kernels narrower than this, in radians, stay where a facet mirrors the view to; wider ones stay where they are.
 const FOLLOWS_BELOW_RAD: f64 = 0.15;
-
-/// A fitted row.
-#[derive(Clone)]
-pub(super) struct Row {
-    pub kernels: Vec<Kernel>,
-    pub albedo: DVec3,
-    /// What is left of the error, relative to the answers (F23).
-    pub relative_error: f64,
-}
 
 /// What has been fitted next to a row, or to an azimuth of rows, and its number; none for the first one.
 pub(super) type Neighbour<'a, T = Row> = Option<(usize, &'a T)>;

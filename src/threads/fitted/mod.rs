@@ -9,6 +9,7 @@
 //! | where the fit of the first row starts | [`cells`] |
 //! | how kernels answer them | [`answers`] |
 //! | the fit of one row | [`solve`] |
+//! | what it makes | `row` |
 //! | of all rows | [`generate()`] |
 //! | sets of them, for sub-pixels | [`ThreadSettings::for_picture`](super::ThreadSettings::for_picture) |
 //! | of an edited BRDF, at once and coarsely | [`draft()`] |
@@ -26,6 +27,7 @@ mod generate;
 mod giving_way;
 pub mod kernel;
 pub mod lights;
+mod row;
 mod sets;
 pub mod solve;
 mod stray;

@@ -4,8 +4,8 @@
 use glam::{DVec3, Vec2, Vec3};
 use half::f16;
 
-use super::generate::Row;
 use super::kernel::{Kernel, SHARPEST_LEVEL, WIDEST_LEVEL, all_between, sharp_part};
+use super::row::Row;
 use crate::brdf::BaseProfile;
 use crate::packing::{
     STEREOGRAPHIC_EXTENT, pack_snorm_2x16, stereographic_decode, stereographic_encode, unpack_snorm_2x16,
