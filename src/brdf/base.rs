@@ -20,6 +20,11 @@ impl BaseProfile {
     /// Lambert's.
     pub const EVEN: Self = Self([1.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
 
+    /// How many of its coefficients count: those up to the last that is not 0.
+    pub fn terms(&self) -> usize {
+        self.0.iter().rposition(|term| *term != 0.0).map_or(0, |last| last + 1)
+    }
+
     /// That of `brdf`: over the azimuth f is least where it is the base alone.
     pub fn of(brdf: &Brdf) -> Self {
         /// View angles, in degrees: nearer to the normal light of all azimuths is near the lobe.

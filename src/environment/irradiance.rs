@@ -19,6 +19,10 @@ const FACE_SIZE: usize = 64;
 /// The light is gathered in cells of a cube map with faces of this size: 2 degrees, each with the centroid of its light.
 const CELLS_SIZE: usize = 48;
 
+/// Cells along the edge of a tile: so many are passed over as one where they are all below the horizon. Smaller ones leave fewer cells that
+/// are summed for nothing, larger ones fewer to look at.
+const TILE_SIZE: usize = 12;
+
 /// Pixels are divided until there are so many columns: cells then have ten samples and more.
 const FEWEST_COLUMNS: usize = 1024;
 
@@ -56,65 +60,98 @@ impl Block {
     }
 }
 
+/// The cells of a tile, within a cone.
+struct Tile {
+    axis: Vec3,
+    sin: f32,
+    blocks: Vec<Block>,
+}
+
+impl Tile {
+    fn of(cells: &[Cell]) -> Self {
+        let directions = || cells.iter().flat_map(|cell| [cell.middle, cell.centroid]);
+        let axis = directions().sum::<Vec3>().normalize();
+        let cos = directions().map(|direction| direction.dot(axis)).fold(1.0, f32::min);
+        // Wider by a hundredth of a degree, of which single precision is off by a part.
+        Self { axis, sin: (1.0 - cos * cos).sqrt() + 2e-4, blocks: cells.chunks(4).map(Block::of).collect() }
+    }
+
+    fn is_below(&self, normal: Vec3) -> bool {
+        self.axis.dot(normal) < -self.sin
+    }
+}
+
 const TERMS: usize = BaseProfile::TERMS;
 
 /// Red, green and blue light times each power of its cosine to a normal, from the first on, and the same of light of radiance 1.
 type Moments = [[f32; TERMS]; 4];
 
 /// The moments of an environment's light for every normal: what its irradiance by any base is a sum of.
-pub struct LightMoments(Vec<Moments>);
+pub struct LightMoments {
+    texels: Vec<Moments>,
+    terms: usize,
+}
 
 impl LightMoments {
-    /// Those of `environment`. The only error is that `observer` cancels it.
-    pub fn of(environment: &Environment, observer: &dyn Observer) -> Result<Self> {
+    /// Those of `environment`, for bases of so many terms at most. The only error is that `observer` cancels it.
+    pub fn of(environment: &Environment, terms: usize, observer: &dyn Observer) -> Result<Self> {
         let cells = gather(environment, observer)?;
-        let blocks: Vec<_> = cells.chunks(4).map(Block::of).collect();
+        // Lambert's alone takes less than half of the time.
+        match terms {
+            ..=1 => Self::of_cells::<1>(&cells, observer),
+            _ => Self::of_cells::<TERMS>(&cells, observer),
+        }
+    }
+
+    fn of_cells<const N: usize>(cells: &[Cell], observer: &dyn Observer) -> Result<Self> {
+        let tiles: Vec<_> = tiles(cells).iter().map(|cells| Tile::of(cells)).collect();
         let mut texels = vec![Moments::default(); 6 * FACE_SIZE * FACE_SIZE];
         texels.par_chunks_mut(FACE_SIZE).enumerate().try_for_each(|(row, texels)| {
             observer.check()?;
             for (column, texel) in texels.iter_mut().enumerate() {
                 let middle = |index: usize| (index as f64 + 0.5) / FACE_SIZE as f64;
                 let normal = direction_of(row / FACE_SIZE, middle(column), middle(row % FACE_SIZE)).as_vec3();
-                *texel = moments(&blocks, normal);
+                for (texel, terms) in texel.iter_mut().zip(moments::<N>(&tiles, normal)) {
+                    texel[..N].copy_from_slice(&terms);
+                }
             }
             Ok::<_, Error>(())
         })?;
-        Ok(Self(texels))
+        Ok(Self { texels, terms: N })
     }
 
-    /// Irradiance over pi by a base of this profile: a cube map of one level.
-    pub fn irradiance(&self, BaseProfile(profile): &BaseProfile) -> Pyramid {
+    /// Irradiance over pi by a base of this profile, which has no more terms: a cube map of one level.
+    pub fn irradiance(&self, profile: &BaseProfile) -> Pyramid {
+        debug_assert!(profile.terms() <= self.terms);
+        let BaseProfile(profile) = profile;
         let texel = |moments: &Moments| {
             let sum = |moments: &[f32; TERMS]| moments.iter().zip(profile).map(|(moment, term)| moment * term).sum();
             let [red, green, blue, constant]: [f32; 4] = moments.each_ref().map(sum);
             // Over what a constant gives, which is pi but for the size of the cells: constants stay as they are.
             [red, green, blue].map(|light| light / constant)
         };
-        Pyramid { face_size: FACE_SIZE, levels: vec![self.0.iter().map(texel).collect()] }
+        Pyramid { face_size: FACE_SIZE, levels: vec![self.texels.iter().map(texel).collect()] }
     }
 }
 
-/// What of the light in `blocks` reaches a surface of this normal.
-fn moments(blocks: &[Block], normal: Vec3) -> Moments {
+/// What of the light in `tiles` reaches a surface of this normal, by the first powers of its cosine.
+fn moments<const N: usize>(tiles: &[Tile], normal: Vec3) -> [[f32; N]; 4] {
     let cosines = |[x, y, z]: [Vec4; 3]| (normal.x * x + normal.y * y + normal.z * z).max(Vec4::ZERO);
-    let mut sums = [[Vec4::ZERO; TERMS]; 4];
+    let mut sums = [[Vec4::ZERO; N]; 4];
     let [red, green, blue, constant] = &mut sums;
-    for block in blocks {
-        let cosines = cosines(block.centroid);
-        // Half of all blocks are below the horizon.
-        if cosines != Vec4::ZERO {
+    for tile in tiles.iter().filter(|tile| !tile.is_below(normal)) {
+        for block in &tile.blocks {
+            let cosines = cosines(block.centroid);
             let mut powers = cosines;
-            for term in 0..TERMS {
+            for term in 0..N {
                 red[term] += powers * block.power[0];
                 green[term] += powers * block.power[1];
                 blue[term] += powers * block.power[2];
                 powers *= cosines;
             }
         }
-    }
-    for block in blocks {
-        let cosines = cosines(block.middle);
-        if cosines != Vec4::ZERO {
+        for block in &tile.blocks {
+            let cosines = cosines(block.middle);
             let mut powers = cosines * block.solid_angle;
             for term in constant.iter_mut() {
                 *term += powers;
@@ -123,6 +160,17 @@ fn moments(blocks: &[Block], normal: Vec3) -> Moments {
         }
     }
     sums.map(|terms| terms.map(Vec4::element_sum))
+}
+
+/// The cells of each tile.
+fn tiles(cells: &[Cell]) -> Vec<Vec<Cell>> {
+    const TILES: usize = CELLS_SIZE / TILE_SIZE;
+    let tile = |tile: usize| {
+        let (face, row, column) = (tile / TILES / TILES, tile / TILES % TILES * TILE_SIZE, tile % TILES * TILE_SIZE);
+        let rows = (row..row + TILE_SIZE).map(|row| (face * CELLS_SIZE + row) * CELLS_SIZE + column);
+        rows.flat_map(|start| &cells[start..start + TILE_SIZE]).copied().collect()
+    };
+    (0..6 * TILES * TILES).map(tile).collect()
 }
 
 /// The light of `environment` in cells.
@@ -204,12 +252,20 @@ mod tests {
     fn a_constant_stays_as_it_is_however_few_pixels_it_has() {
         for (width, height) in [(1, 1), (3, 2), (64, 32), (1, 300), (300, 1)] {
             let map = environment(width, height, |_, _| [1.0, 0.1, 7.0]);
-            let moments = LightMoments::of(&map, &()).unwrap();
+            let moments = LightMoments::of(&map, TERMS, &()).unwrap();
             let irradiance = [BaseProfile::EVEN, COATED].map(|base| moments.irradiance(&base));
             for texel in irradiance.iter().flat_map(|map| &map.levels[0]) {
                 assert!((Vec3::from(*texel) / Vec3::new(1.0, 0.1, 7.0) - 1.0).abs().max_element() < 1e-5, "{texel:?}");
             }
         }
+    }
+
+    #[test]
+    fn lamberts_base_has_the_same_irradiance_whether_or_not_light_is_gathered_for_others() {
+        let map = environment(128, 64, |x, y| [((x * 7 + y * 3) % 13) as f32, if y < 9 { 50.0 } else { 0.0 }, 1.0]);
+        let [alone, among] = [1, TERMS].map(|terms| LightMoments::of(&map, terms, &()).unwrap());
+        assert_eq!(alone.irradiance(&BaseProfile::EVEN).levels, among.irradiance(&BaseProfile::EVEN).levels);
+        assert_eq!([BaseProfile::EVEN, COATED].map(|base| base.terms()), [1, TERMS]);
     }
 
     #[test]
@@ -221,7 +277,7 @@ mod tests {
         let sources = map.small_sources();
         let sources: Vec<_> = sources.leaves().collect();
         assert_eq!(sources.len(), 1);
-        let moments = LightMoments::of(&map.part(false), &()).unwrap();
+        let moments = LightMoments::of(&map.part(false), TERMS, &()).unwrap();
         let irradiance = [BaseProfile::EVEN, COATED].map(|base| (base, moments.irradiance(&base)));
         for (i, (base, irradiance)) in (0..200).flat_map(|i| irradiance.iter().map(move |of_base| (i, of_base))) {
             let z: f64 = 1.0 - (f64::from(i) + 0.5) / 100.0;

@@ -38,19 +38,22 @@ impl BoxFilter<'_> {
     }
 }
 
-/// What irradiance of an environment by any base is a sum of.
-struct GatherLight<'a>(&'a Keyed<Environment>);
+/// What irradiance of an environment is a sum of, by any base of so many terms.
+struct GatherLight<'a> {
+    environment: &'a Keyed<Environment>,
+    terms: usize,
+}
 
 impl Step for GatherLight<'_> {
     type Output = LightMoments;
     const NAME: &'static str = "light by cosines";
 
     fn key(&self, _: &Memo) -> Result<Key> {
-        Ok(Key::builder("moments").key(self.0.key).build())
+        Ok(Key::builder("moments").key(self.environment.key).number(self.terms as u64).build())
     }
 
     fn make(&self, round: &Round) -> Result<LightMoments> {
-        LightMoments::of(self.0, round.observer())
+        LightMoments::of(self.environment, self.terms, round.observer())
     }
 }
 
@@ -184,11 +187,23 @@ pub fn light(
         prefiltered: match lookups.split_sum {
             true => Some(PrefilteredLight {
                 by_ggx: round.ask(&GgxFilter(environment))?,
-                irradiance: round.ask(&Irradiance(&round.ask(&GatherLight(environment))?, BaseProfile::EVEN))?,
+                irradiance: irradiance(round, environment, &[BaseProfile::EVEN])?.remove(0),
             }),
             false => None,
         },
     })
+}
+
+/// Irradiance over pi by each of these bases.
+fn irradiance(round: &Round, environment: &Keyed<Environment>, bases: &[BaseProfile]) -> Result<Vec<Keyed<Pyramid>>> {
+    let for_any = GatherLight { environment, terms: BaseProfile::TERMS };
+    let for_even = GatherLight { environment, terms: BaseProfile::EVEN.terms() };
+    let by_cosines = match bases.iter().all(|base| base.terms() <= for_even.terms) {
+        // What was made for other bases has these terms, too.
+        true => round.known(&for_any)?.map_or_else(|| round.ask(&for_even), Ok)?,
+        false => round.ask(&for_any)?,
+    };
+    bases.iter().map(|base| round.ask(&Irradiance(&by_cosines, *base))).collect()
 }
 
 /// What fitted threads look up of `environment` for these materials, or those of any others with the same bases, too.
@@ -209,8 +224,7 @@ pub fn blurred_light(
     };
     let rest = part(false)?;
     let (bases, _) = bases(materials.iter().map(|material| material.threads));
-    let by_cosines = round.ask(&GatherLight(&rest))?;
-    let irradiance = bases.into_iter().map(|base| round.ask(&Irradiance(&by_cosines, base))).collect::<Result<_>>()?;
+    let irradiance = irradiance(round, &rest, &bases)?;
     let rest = round.ask(&Blur { environment: &rest, device })?;
     let needs = match for_any {
         true => KernelNeeds::of_any(environment),
