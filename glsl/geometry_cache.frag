@@ -5,7 +5,7 @@
 #include "has_tangents.glsl" // whether a material of the scene needs them
 #include "geometry_texel.glsl"
 
-layout(location = 0) in vec3 eye_position;
+layout(location = 0) in vec3 world_position;
 layout(location = 1) in vec3 world_normal;
 #if HAS_TANGENTS
 layout(location = 2) in vec3 world_tangent;
@@ -13,12 +13,18 @@ layout(location = 2) in vec3 world_tangent;
 
 layout(location = 0) out uvec2 geometry;
 
+// The triangle's own normal, of any length: towards the eye, whatever the winding, since x of the picture is to the right and y is down.
+vec3 facet_normal_to_eye() {
+    // What is linear on the picture goes on beyond the horizon of the triangle's plane, where a neighbouring pixel may be; positions do not.
+    float over_w = gl_FragCoord.w;
+    vec3 position_over_w = world_position * over_w;
+    vec3 to_right = dFdx(position_over_w) - dFdx(over_w) * world_position;
+    vec3 down = dFdy(position_over_w) - dFdy(over_w) * world_position;
+    return cross(down, to_right);
+}
+
 void main() {
-    // The triangle's own normal, turned to the eye: tells which side is seen, whatever the winding.
-    vec3 facet_normal = cross(dFdx(eye_position), dFdy(eye_position));
-    if (dot(facet_normal, eye_position) > 0.0) {
-        facet_normal = -facet_normal;
-    }
+    vec3 facet_normal = facet_normal_to_eye();
     vec3 normal = world_normal;
     // Interpolated normals that cancel out leave nothing to normalise: the facet's normal stands in. 1e-20 is far
     // below any sum of unit vectors that is not a cancellation, and its square root is still a normal float.

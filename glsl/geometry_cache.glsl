@@ -1,21 +1,26 @@
 // What both stages of the geometry cache know of the object being drawn.
 
 layout(push_constant) uniform Object {
-    // Rows of what takes positions from the mesh's middle to world axes with the eye at the origin, in units of the scene's extent: far from
-    // either origin, coordinates would not keep the precision.
-    vec4 to_eye[3];
-    // Unit vectors of the camera and what its image plane spans (right and up divided by the half-extents); w: the tangent at the mesh's middle
+    // Rows of what takes positions from the mesh's middle to world axes, in units of the scene's extent; w: the tangent at the mesh's middle
     // around the axis, its x, y and z.
-    vec4 right_over_extent;
-    vec4 up_over_extent;
-    vec4 forward;
+    vec4 to_world[3];
+    // Rows of what takes positions from the mesh's middle to clip space, in the same units: from far away or through a narrow camera,
+    // coordinates from the eye would not keep the precision of what they differ by on the picture.
+    vec4 clip_x;
+    vec4 clip_y;
+    vec4 clip_w;
     // The axis that tangents go by, in object space; w: how, as below.
     vec4 tangent_axis;
     // Cosine and sine of the material's rotation, by which tangents are turned.
     vec2 tangent_turn;
     uint material;
-    float near_plane;
+    // From the mesh's middle to the far plane, along the view.
+    float far_plane;
 } object;
+
+// Distance of the near plane in units of the extent of what may be seen: with reversed depth it costs no precision to keep it nearer than any
+// surface that a camera outside of the scene sees.
+const float NEAR_PLANE = 1e-6;
 
 // How tangents go by the axis of an object: not at all, since its material needs none; around it; along it; not by
 // it but by the mesh's texture coordinates.
@@ -24,8 +29,11 @@ const float TANGENT_AROUND = 1.0;
 const float TANGENT_ALONG = 2.0;
 const float TANGENT_OF_MESH = 3.0;
 
-// Reversed, infinite projection: depth 1 at the near plane, 0 at infinity, so float precision is where it is needed.
-vec4 project(vec3 from_eye) {
-    return vec4(dot(object.right_over_extent.xyz, from_eye), -dot(object.up_over_extent.xyz, from_eye),
-                object.near_plane, dot(object.forward.xyz, from_eye));
+// Reversed projection: depth 1 at the near plane, 0 at the far plane, so float precision is where it is needed. The far plane is just behind
+// all that may be seen, and what is left to it is not taken from w: from far away, w would not keep it.
+vec4 project(vec3 position) {
+    vec4 at = vec4(position, 1.0);
+    float along_view = dot(object.clip_w.xyz, position); // from the mesh's middle
+    return vec4(dot(object.clip_x, at), dot(object.clip_y, at), NEAR_PLANE * (object.far_plane - along_view),
+                object.clip_w.w + along_view);
 }

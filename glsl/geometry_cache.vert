@@ -8,19 +8,17 @@ layout(location = 0) in vec3 position; // from the mesh's middle
 layout(location = 1) in vec3 normal;
 layout(location = 2) in vec3 tangent; // of texture coordinates; the normal of a mesh that has none
 
-layout(location = 0) out vec3 eye_position;
+layout(location = 0) out vec3 world_position; // from the mesh's middle
 layout(location = 1) out vec3 world_normal;
 #if HAS_TANGENTS
 layout(location = 2) out vec3 world_tangent; // of any length
 #endif
 
 void main() {
-    vec4 at = vec4(position, 1.0);
-    vec3 from_eye = vec3(dot(object.to_eye[0], at), dot(object.to_eye[1], at), dot(object.to_eye[2], at));
-    eye_position = from_eye;
+    mat3 linear_part = transpose(mat3(object.to_world[0].xyz, object.to_world[1].xyz, object.to_world[2].xyz));
+    world_position = linear_part * position;
     // Cofactors of the linear part: the normal matrix up to scale, right for mirrored and sheared objects too.
     // Taken relative to the largest entry, since squares of any could leave the range of floats.
-    mat3 linear_part = transpose(mat3(object.to_eye[0].xyz, object.to_eye[1].xyz, object.to_eye[2].xyz));
     vec3 largest = max(max(abs(linear_part[0]), abs(linear_part[1])), abs(linear_part[2]));
     linear_part /= max(max(largest.x, largest.y), largest.z);
     mat3 cofactors = mat3(cross(linear_part[1], linear_part[2]), cross(linear_part[2], linear_part[0]),
@@ -29,9 +27,9 @@ void main() {
 #if HAS_TANGENTS
     // Both are linear in the position, so what is interpolated is right within a triangle too.
     vec3 axis = object.tangent_axis.xyz;
-    vec3 at_middle = vec3(object.right_over_extent.w, object.up_over_extent.w, object.forward.w);
+    vec3 at_middle = vec3(object.to_world[0].w, object.to_world[1].w, object.to_world[2].w);
     vec3 along = object.tangent_axis.w == TANGENT_AROUND ? at_middle + cross(axis, position) : axis;
     world_tangent = linear_part * (object.tangent_axis.w == TANGENT_OF_MESH ? tangent : along);
 #endif
-    gl_Position = project(from_eye);
+    gl_Position = project(position);
 }

@@ -21,9 +21,9 @@ const DEPTH_FORMAT: vk::Format = vk::Format::D32_SFLOAT;
 /// Bytes of a position, of a normal, and of a tangent.
 const VERTEX_STRIDE: u32 = size_of::<[f32; 3]>() as u32;
 
-/// Distance of the near plane in units of the extent of what may be seen: with reversed, infinite depth it costs no precision to keep it
-/// nearer than any surface that a camera outside of the scene sees.
-const NEAR_PLANE: f32 = 1e-6;
+/// How far the far plane is behind all that may be seen, in units of its extent: more than rounding moves a vertex, and no more than what
+/// the narrowest camera sees is deep.
+const BEHIND: f64 = 1e-6;
 
 /// What the vertex shader may be off by, of the size of what it adds: some ten roundings of 2^-24.
 const ROUNDING: f64 = 1e-6;
@@ -113,14 +113,14 @@ pub struct GeometryCache {
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct Push {
-    to_eye: [[f32; 4]; 3],
-    right_over_extent: [f32; 4],
-    up_over_extent: [f32; 4],
-    forward: [f32; 4],
+    to_world: [[f32; 4]; 3],
+    clip_x: [f32; 4],
+    clip_y: [f32; 4],
+    clip_w: [f32; 4],
     tangent_axis: [f32; 4],
     tangent_turn: [f32; 2],
     material: u32,
-    near_plane: f32,
+    far_plane: f32,
 }
 
 /// What its pipeline is besides shaders.
@@ -153,13 +153,15 @@ impl GeometryCache {
         let (right, up, forward) = view.camera.basis();
         let eye = view.camera.eye;
         let half_size = view.half_size();
+        let clip_axes = [right / half_size.x, -up / half_size.y, forward];
         let pack = |v: DVec3, w: f64| v.extend(w).as_vec4().to_array();
         let unit = self.extent(view);
         let draw = |object: &PlacedMesh| {
             let middle = self.meshes[object.mesh].sphere.centre;
-            // Subtracted in double precision: far from the origin the difference is what counts.
-            let (matrix3, from_eye) = (object.to_world.matrix3, object.to_world.transform_point3(middle) - eye);
-            let row = |i: usize| pack(matrix3.row(i) / unit, from_eye[i] / unit);
+            // Subtracted in double precision: far from the origin or from the eye the difference is what counts.
+            let (matrix3, from_eye) =
+                (object.to_world.matrix3 / unit, (object.to_world.transform_point3(middle) - eye) / unit);
+            let [clip_x, clip_y, clip_w] = clip_axes.map(|axis| pack(matrix3.transpose() * axis, axis.dot(from_eye)));
             let (axis, how, at_middle) = match object.tangent.map(|tangent| tangent.rule) {
                 None => (Vec3::ZERO, 0.0, DVec3::ZERO),
                 Some(TangentRule::Around(axis)) => (axis, TANGENT_AROUND, axis.as_dvec3().cross(middle)),
@@ -167,14 +169,14 @@ impl GeometryCache {
                 Some(TangentRule::Uv) => (Vec3::ZERO, TANGENT_OF_MESH, DVec3::ZERO),
             };
             let push = Push {
-                to_eye: [0, 1, 2].map(row),
-                right_over_extent: pack(right / half_size.x, at_middle.x),
-                up_over_extent: pack(up / half_size.y, at_middle.y),
-                forward: pack(forward, at_middle.z),
+                to_world: [0, 1, 2].map(|i| pack(matrix3.row(i), at_middle[i])),
+                clip_x,
+                clip_y,
+                clip_w,
                 tangent_axis: axis.extend(how).to_array(),
                 tangent_turn: object.tangent.map_or(DVec2::X, PlacedTangent::turn).as_vec2().to_array(),
                 material: object.material,
-                near_plane: NEAR_PLANE,
+                far_plane: (1.0 + BEHIND - forward.dot(from_eye)) as f32,
             };
             (&self.meshes[object.mesh].triangles, push)
         };
