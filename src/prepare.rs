@@ -253,7 +253,7 @@ fn prepare_by(scene: &Scene, round: &Round, ask_threads: &AskThreads) -> Result<
     Ok(prepared)
 }
 
-/// The key of all that `scene` on a device is made of: of all but what a frame is given anew each time, such as the camera.
+/// The key of all that `scene` on a device is made of: of all but what frames are given anew ([`Scene::with_frame_settings_of`]).
 ///
 /// # Errors
 /// A file that cannot be read, a model that there is not.

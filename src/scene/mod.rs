@@ -290,6 +290,20 @@ impl Scene {
         self.objects = vec![ObjectSettings::new(mesh, &material)];
     }
 
+    /// The same with what each frame is given anew as `other` has it: camera, size, exposure, gamma, and the turn and intensity of the light.
+    /// Nothing is loaded or made for these.
+    #[must_use]
+    pub fn with_frame_settings_of(self, other: &Self) -> Self {
+        let ImageSettings { width, height, exposure, gamma, .. } = other.image;
+        let EnvironmentSettings { rotation_deg, intensity, .. } = other.environment;
+        Self {
+            image: ImageSettings { width, height, exposure, gamma, ..self.image },
+            environment: EnvironmentSettings { rotation_deg, intensity, ..self.environment },
+            camera: other.camera,
+            ..self
+        }
+    }
+
     /// The files that it names: of its environment, its meshes and its materials, with those under their coats.
     pub fn files(&self) -> Vec<PathBuf> {
         let of_meshes = self.objects.iter().filter_map(|object| object.mesh.file());

@@ -72,7 +72,7 @@ impl Change {
         }
     }
 
-    /// Whether frames show it without anything being loaded or made.
+    /// Whether it is of what frames are given anew ([`Scene::with_frame_settings_of`]): then they show it without anything being loaded or made.
     pub fn is_seen_at_once(&self) -> bool {
         matches!(
             self,
@@ -153,7 +153,47 @@ pub(super) fn check_picture_size(size: [u32; 2]) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::memo::Memo;
+    use crate::prepare::key_of;
     use crate::scene::MaterialSettings;
+
+    #[test]
+    fn what_is_seen_at_once_is_what_frames_are_given_anew_and_is_not_in_the_key_of_a_scene() {
+        let mut before = Scene::default();
+        before.shading.method = Method::Importance;
+        let torus = MeshSource::Builtin("torus".into());
+        let roughness = Change::Parameter { material: "gold".into(), key: "alpha".into(), value: 0.3.into() };
+        let silver = MaterialSource::Builtin("silver".into());
+        let changes = [
+            Change::Material(silver.clone()),
+            Change::OneMaterial { material: "gold".into(), source: silver },
+            roughness,
+            Change::Environment(EnvironmentSource::Builtin("sky".into())),
+            Change::Rotation(20.0),
+            Change::Intensity(2.0),
+            Change::Mesh(torus),
+            Change::Method(Method::Fitted),
+            Change::Threads(Some(5)),
+            Change::Pattern(Pattern::Fixed),
+            Change::Seed(3),
+            Change::Size(20, 30),
+            Change::Subpixels(1),
+            Change::Exposure(2.0),
+            Change::Gamma(1.5),
+            Change::Background(Background::None),
+            Change::Camera(Some(Camera::framing(glam::DVec3::ZERO, 2.0, 1.0))),
+        ];
+        let memo = Memo::default();
+        let key = |scene: &Scene| key_of(scene, &memo).unwrap();
+        for change in changes {
+            let mut after = before.clone();
+            change.apply(&mut after).unwrap();
+            assert_ne!(after, before, "{change:?}");
+            let seen_at_once = before.clone().with_frame_settings_of(&after) == after;
+            assert_eq!(change.is_seen_at_once(), seen_at_once, "{change:?}");
+            assert_eq!(key(&after) == key(&before), seen_at_once, "{change:?}");
+        }
+    }
 
     #[test]
     fn a_parameter_turns_a_builtin_into_a_model() {

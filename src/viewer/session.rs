@@ -5,7 +5,7 @@
 //! nothing, and leaves other changes as they are.
 use super::change::Change;
 use crate::error::Result;
-use crate::scene::{ImageSettings, ObjectSettings, Scene};
+use crate::scene::{ObjectSettings, Scene};
 use std::path::Path;
 
 /// The scene that is asked for, and the one that is seen.
@@ -95,13 +95,7 @@ impl Session {
 
     /// Shows `scene`, in the way that is wanted by now.
     fn show(&mut self, scene: Scene) {
-        let Scene { image, camera, environment, .. } = &self.wanted;
-        // Sub-pixels and background are compiled and uploaded.
-        let ImageSettings { subpixels, background, .. } = scene.image;
-        self.shown =
-            Scene { image: ImageSettings { subpixels, background, ..image.clone() }, camera: *camera, ..scene };
-        self.shown.environment.rotation_deg = environment.rotation_deg;
-        self.shown.environment.intensity = environment.intensity;
+        self.shown = scene.with_frame_settings_of(&self.wanted);
     }
 
     /// What was wanted cannot be: what is seen is wanted again, with the changes but those that `cannot_be`, or without any if there are none of
