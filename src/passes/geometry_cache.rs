@@ -194,15 +194,17 @@ impl GeometryCache {
 
     /// Where in the picture objects may be, in tiles of this size.
     pub fn region(&self, view: &View, tile_px: [u32; 2]) -> Region {
+        let (_, _, forward) = view.camera.basis();
         let corners = self.seen(view).flat_map(|object| {
             let &DeviceMesh { sphere, bounds: (low, high), .. } = &*self.meshes[object.mesh];
             let middle = sphere.centre;
             let from_eye = object.to_world.transform_point3(middle) - view.camera.eye;
+            let off_axis = from_eye.reject_from_normalized(forward).length();
             let matrix3 = object.to_world.matrix3;
             (0..8).map(move |index| {
                 let corner = Vec3::select(BVec3::from([1, 2, 4].map(|bit| index & bit != 0)), high, low);
                 let turned = matrix3 * (corner.as_dvec3() - middle);
-                Corner { from_eye: turned + from_eye, error: ROUNDING * (turned.length() + from_eye.length()) }
+                Corner { from_eye: turned + from_eye, error: ROUNDING * (turned.length() + off_axis) }
             })
         });
         Region::of_boxes(view, tile_px, corners)

@@ -19,7 +19,8 @@ pub struct Region {
 pub struct Corner {
     /// Where it is.
     pub from_eye: DVec3,
-    /// How far off single precision, in which vertices are drawn, may put a vertex there.
+    /// How far to the side single precision, in which vertices are drawn, may put a vertex there; along the view by as much, or in
+    /// proportion to its distance.
     pub error: f64,
 }
 
