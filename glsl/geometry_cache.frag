@@ -38,9 +38,9 @@ void main() {
     normal = normalize(normal);
     geometry = pack_geometry(normal, object.material);
 #if HAS_TANGENTS
-    if (object.tangent_axis.w != NO_TANGENT) {
+    if (tangent_rule() != NO_TANGENT) {
         vec3 tangent = tangent_along(world_tangent, normal);
-        geometry = with_tangent(geometry, turned_tangent(tangent, normal, object.tangent_turn));
+        geometry = with_tangent(geometry, turned_tangent(tangent, normal, unpackSnorm2x16(object.tangent_turn)));
     }
 #endif
 }

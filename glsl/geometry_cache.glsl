@@ -9,10 +9,15 @@ layout(push_constant) uniform Object {
     vec4 clip_x;
     vec4 clip_y;
     vec4 clip_w;
-    // The axis that tangents go by, in object space; w: how, as below.
-    vec4 tangent_axis;
-    // Cosine and sine of the material's rotation, by which tangents are turned.
-    vec2 tangent_turn;
+    // The axis that tangents go by, in object space.
+    vec3 tangent_axis;
+    // To the mesh's middle from about where the object may be nearest to the eye, in world axes and the same units, as half floats: positions from
+    // there are interpolated, so that what is seen from near is not told by small differences of large numbers. At the end how tangents go by
+    // the axis, as below.
+    uint to_middle_xy;
+    uint to_middle_z_and_rule;
+    // Cosine and sine of the material's rotation, by which tangents are turned, in 2 x 16 bits.
+    uint tangent_turn;
     uint material;
     // From the mesh's middle to the far plane, along the view.
     float far_plane;
@@ -21,6 +26,14 @@ layout(push_constant) uniform Object {
 // Distance of the near plane in units of the extent of what may be seen: with reversed depth it costs no precision to keep it nearer than any
 // surface that a camera outside of the scene sees.
 const float NEAR_PLANE = 1e-6;
+
+vec3 to_middle() {
+    return vec3(unpackHalf2x16(object.to_middle_xy), unpackHalf2x16(object.to_middle_z_and_rule).x);
+}
+
+float tangent_rule() {
+    return unpackHalf2x16(object.to_middle_z_and_rule).y;
+}
 
 // How tangents go by the axis of an object: not at all, since its material needs none; around it; along it; not by
 // it but by the mesh's texture coordinates.

@@ -106,3 +106,30 @@ fn both_sides_of_a_wide_ground_face_the_eye_up_to_the_horizon() {
     }
     gpu.finish();
 }
+
+/// A patch of ground in small triangles, far from the middle of a mesh that has two others at its ends.
+#[test]
+fn ground_near_the_eye_faces_it_however_large_its_mesh_is() {
+    let gpu = Validated::new();
+    let (end, place, cells) = (4e5_f32, [1.4e5_f32, -6e4], 40);
+    let mut corners = vec![[end, 0.0, end], [end, 0.0, 0.0], [0.0, 0.0, end]];
+    corners.extend([[-end, 0.0, -end], [-end, 0.0, 0.0], [0.0, 0.0, -end]]);
+    let mut triangles = vec![[0, 1, 2], [3, 4, 5]];
+    let first = corners.len() as u32;
+    let along = |cell: u32, axis: usize| place[axis] + (cell as f32 - cells as f32 / 2.0) * 0.5;
+    corners.extend((0..=cells).flat_map(|z| (0..=cells).map(move |x| [along(x, 0), 0.0, along(z, 1)])));
+    for (x, z) in (0..cells).flat_map(|z| (0..cells).map(move |x| (x, z))) {
+        let corner = |right, down| first + (z + down) * (cells + 1) + x + right;
+        triangles.extend([[corner(0, 0), corner(0, 1), corner(1, 1)], [corner(0, 0), corner(1, 1), corner(1, 0)]]);
+    }
+    let mesh = CustomMesh::new("ground", corners, triangles, None, None).unwrap();
+    let mut scene = grey_sphere().with_mesh(MeshSource::from(mesh));
+    let target = dvec3(f64::from(place[0]), 0.0, f64::from(place[1]));
+    let eye = target + dvec3(0.5, 1.0, 0.75);
+    scene.camera = Some(Camera { eye, target, up: DVec3::Y, fov_y_deg: 60.0 });
+    for (texel, ray) in seen(&gpu, &scene) {
+        let normal = texel.expect("ground all over the picture").normal;
+        assert!(normal.y > 0.999, "{ray}: {normal}");
+    }
+    gpu.finish();
+}

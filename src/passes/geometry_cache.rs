@@ -4,6 +4,7 @@ use super::{Region, View};
 use crate::Result;
 use crate::graph::{FrameGraph, ImageDesc, ImageHandle};
 use crate::memo::Keyed;
+use crate::packing::pack_snorm_2x16;
 use crate::scene::{BoundingSphere, Mesh, TangentRule};
 use crate::shader_constants::geometry_cache::{TANGENT_ALONG, TANGENT_AROUND, TANGENT_OF_MESH};
 use crate::vulkan::{
@@ -12,6 +13,7 @@ use crate::vulkan::{
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 use glam::{BVec3, DAffine3, DVec2, DVec3, Vec3};
+use half::f16;
 use std::sync::Arc;
 
 /// [`GeometryTexel`](crate::geometry_texel::GeometryTexel).
@@ -117,8 +119,9 @@ struct Push {
     clip_x: [f32; 4],
     clip_y: [f32; 4],
     clip_w: [f32; 4],
-    tangent_axis: [f32; 4],
-    tangent_turn: [f32; 2],
+    tangent_axis: [f32; 3],
+    to_middle_and_rule: [f16; 4],
+    tangent_turn: u32,
     material: u32,
     far_plane: f32,
 }
@@ -162,7 +165,9 @@ impl GeometryCache {
             let (matrix3, from_eye) =
                 (object.to_world.matrix3 / unit, (object.to_world.transform_point3(middle) - eye) / unit);
             let [clip_x, clip_y, clip_w] = clip_axes.map(|axis| pack(matrix3.transpose() * axis, axis.dot(from_eye)));
-            let (axis, how, at_middle) = match object.tangent.map(|tangent| tangent.rule) {
+            let radius = self.sphere(object).radius / unit;
+            let to_middle = from_eye * (radius / from_eye.length()).min(1.0);
+            let (axis, rule, at_middle) = match object.tangent.map(|tangent| tangent.rule) {
                 None => (Vec3::ZERO, 0.0, DVec3::ZERO),
                 Some(TangentRule::Around(axis)) => (axis, TANGENT_AROUND, axis.as_dvec3().cross(middle)),
                 Some(TangentRule::Along(axis)) => (axis, TANGENT_ALONG, DVec3::ZERO),
@@ -173,8 +178,9 @@ impl GeometryCache {
                 clip_x,
                 clip_y,
                 clip_w,
-                tangent_axis: axis.extend(how).to_array(),
-                tangent_turn: object.tangent.map_or(DVec2::X, PlacedTangent::turn).as_vec2().to_array(),
+                tangent_axis: axis.to_array(),
+                to_middle_and_rule: to_middle.extend(rule.into()).to_array().map(f16::from_f64),
+                tangent_turn: pack_snorm_2x16(object.tangent.map_or(DVec2::X, PlacedTangent::turn).as_vec2()),
                 material: object.material,
                 far_plane: (1.0 + BEHIND - forward.dot(from_eye)) as f32,
             };
