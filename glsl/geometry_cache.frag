@@ -27,9 +27,9 @@ void main() {
     vec3 facet_normal = facet_normal_to_eye();
     vec3 normal = world_normal;
     // Interpolated normals that cancel out leave nothing to normalise: the facet's normal stands in. 1e-20 is far
-    // below any sum of unit vectors that is not a cancellation, and its square root is still a normal float. Over its largest component: through a
-    // narrow camera it is so short that a float would not hold its square.
+    // below any sum of unit vectors that is not a cancellation, and its square root is still a normal float.
     if (dot(normal, normal) < 1e-20) {
+        // Divided by its largest component: through a narrow camera it is so short that a float would not hold its square.
         vec3 size = abs(facet_normal);
         normal = facet_normal / max(max(size.x, size.y), size.z);
     }

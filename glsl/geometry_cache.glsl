@@ -11,9 +11,9 @@ layout(push_constant) uniform Object {
     vec4 clip_w;
     // The axis that tangents go by, in object space.
     vec3 tangent_axis;
-    // To the mesh's middle from about where the object may be nearest to the eye, in world axes and the same units, as half floats: positions from
-    // there are interpolated, so that what is seen from near is not told by small differences of large numbers. At the end how tangents go by
-    // the axis, as below.
+    // Four half floats. The first three: the vector to the mesh's middle from the point of its bounding sphere that is nearest to the eye, in world
+    // axes and the same units. Positions are interpolated from there, so that those near the eye are small numbers. The last: how tangents
+    // go by the axis, as below.
     uint to_middle_xy;
     uint to_middle_z_and_rule;
     // Cosine and sine of the material's rotation, by which tangents are turned, in 2 x 16 bits.

@@ -60,7 +60,7 @@ impl Block {
     }
 }
 
-/// The cells of a tile, within a cone.
+/// The cells of a tile, and a cone that holds them.
 struct Tile {
     axis: Vec3,
     sin: f32,
@@ -72,7 +72,7 @@ impl Tile {
         let directions = || cells.iter().flat_map(|cell| [cell.middle, cell.centroid]);
         let axis = directions().sum::<Vec3>().normalize();
         let cos = directions().map(|direction| direction.dot(axis)).fold(1.0, f32::min);
-        // Wider by a hundredth of a degree, of which single precision is off by a part.
+        // Wider by a hundredth of a degree: more than single precision is off by.
         Self { axis, sin: (1.0 - cos * cos).sqrt() + 2e-4, blocks: cells.chunks(4).map(Block::of).collect() }
     }
 
