@@ -13,7 +13,7 @@ use crate::steps::{
     CheckDevice, CompileCompute, CompileGeometryCache, KeyedMaterial, UploadBackground, UploadIrradiance, UploadLight,
     UploadMaterials, UploadMesh, UploadShaders, light, pipelines,
 };
-use crate::vulkan::{Device, Frames, PassTime, Shader, compiled};
+use crate::vulkan::{Device, Frames, PassTime, compiled};
 use std::sync::Arc;
 
 /// Which results of a frame are wanted; what none of them needs is not computed.
@@ -81,9 +81,6 @@ impl DeviceScene {
     /// No device memory left, a limit of the device exceeded, a method that does not run there; cancelled.
     pub fn new(device: &Arc<Device>, prepared: &Prepared, round: &Round) -> Result<Self> {
         let &Prepared { method, sampling, ref view, ref environment, .. } = prepared;
-        let compile = |shader: &'static Shader, constants: &[(&'static str, u32)]| {
-            round.ask(&CompileCompute { device, shader, constants })
-        };
         let shader = shade_shader(method)?;
         // Held, so that it is opened once for all that is compiled.
         pipelines(round, device)?;
@@ -105,28 +102,40 @@ impl DeviceScene {
         let irradiance = light.blurred.as_ref().map(|light| round.ask(&UploadIrradiance { device, light, way_around }));
         let irradiance = irradiance.transpose()?;
         let light = round.ask(&UploadLight { device, method, environment, light: &light, way_around })?;
-        let of_classes = shaders.constants_of_classes().map(|constants| compile(shader, &constants));
-        let pipelines = of_classes.collect::<Result<_>>()?;
+        let background_shader =
+            if prepared.show_environment { &compiled::BACKGROUND } else { &compiled::CLEAR_UNCOVERED };
+        let around = [
+            (&compiled::CLASSIFY, classify_constants(prepared, &shaders)),
+            (background_shader, vec![]),
+            (&compiled::TONE_MAP, vec![]),
+        ];
+        let of_classes = shaders.constants_of_classes().map(|constants| (shader, constants));
+        // Drivers take long, and several cores where they may.
+        let all: Vec<_> = around.into_iter().chain(of_classes).collect();
+        let all: Vec<_> = all.iter().map(|(shader, constants)| CompileCompute { device, shader, constants }).collect();
+        let mut pipelines = round.ask_all(&all)?.into_iter();
+        let mut next = || pipelines.next().expect("as many as were asked for");
+        let [classify, background, tone_map] = [next(), next(), next()];
         let background = match prepared.show_environment {
             true => Background::Environment {
-                pipeline: compile(&compiled::BACKGROUND, &[])?,
+                pipeline: background,
                 map: round.ask(&UploadBackground { device, environment })?,
             },
-            false => Background::Nothing(compile(&compiled::CLEAR_UNCOVERED, &[])?),
+            false => Background::Nothing(background),
         };
         Ok(Self {
             view: view.clone(),
             geometry_cache,
             classify: Classify {
-                pipeline: compile(&compiled::CLASSIFY, &classify_constants(prepared, &shaders))?,
+                pipeline: classify,
                 smooth_variance: prepared.smooth_variance(),
                 shaders: round.ask(&UploadShaders { device, of_materials: &shaders.of_materials })?,
                 shader_count: shaders.constants.len() as u32,
                 shader_of_mixed: shaders.of_mixed,
             },
-            shade: Shade { pipelines, materials, light, irradiance, sampling, method },
+            shade: Shade { pipelines: pipelines.collect(), materials, light, irradiance, sampling, method },
             background,
-            tone_map: ToneMap { pipeline: compile(&compiled::TONE_MAP, &[])? },
+            tone_map: ToneMap { pipeline: tone_map },
             way_around,
             device: device.clone(),
             _held: round.held(),

@@ -87,6 +87,7 @@ const TERMS: usize = BaseProfile::TERMS;
 type Moments = [[f32; TERMS]; 4];
 
 /// The moments of an environment's light for every normal: what its irradiance by any base is a sum of.
+#[derive(Debug, PartialEq)]
 pub struct LightMoments {
     texels: Vec<Moments>,
     terms: usize,
@@ -118,6 +119,28 @@ impl LightMoments {
             Ok::<_, Error>(())
         })?;
         Ok(Self { texels, terms: N })
+    }
+
+    /// How many powers of the cosine there are.
+    pub fn terms(&self) -> usize {
+        self.terms
+    }
+
+    /// For each normal red, green, blue and constant light times these powers.
+    pub fn values(&self) -> impl Iterator<Item = f32> {
+        self.texels.iter().flatten().flat_map(|powers| &powers[..self.terms]).copied()
+    }
+
+    /// The moments that have these values; none where they are too many or too few, or of no such number of powers.
+    pub fn of_values(terms: usize, values: impl ExactSizeIterator<Item = f32>) -> Option<Self> {
+        const TEXELS: usize = 6 * FACE_SIZE * FACE_SIZE;
+        if ![1, TERMS].contains(&terms) || values.len() != TEXELS * 4 * terms {
+            return None;
+        }
+        let mut texels = vec![Moments::default(); TEXELS];
+        let places = texels.iter_mut().flatten().flat_map(|powers| &mut powers[..terms]);
+        places.zip(values).for_each(|(place, value)| *place = value);
+        Some(Self { texels, terms })
     }
 
     /// Irradiance over pi by a base of this profile, which has no more terms: a cube map of one level.

@@ -14,6 +14,7 @@ mod irradiance;
 mod light_map;
 mod lights;
 mod load;
+pub mod moments_file;
 mod procedural;
 pub mod pyramid;
 pub mod sources;

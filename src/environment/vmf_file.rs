@@ -1,32 +1,20 @@
-//! Pyramids of vMF kernels as files.
-//!
-//! | bytes | content, little-endian |
-//! |---|---|
-//! | 8 | magic `VMFMAPS\0` |
-//! | 4 | u32 format version |
-//! | 4 | u32 texels along the edge of a face of level 0 |
-//! | ... | levels from fine to coarse: RGB, f32 |
-//! | 32 | BLAKE3 digest of everything before |
+//! Pyramids of vMF kernels as files: of the form in src/files/values.rs, whose number is the texels along the edge of a face of level 0, and
+//! whose values are red, green and blue of each texel, levels from fine to coarse.
 use std::path::Path;
 
 use super::pyramid::MAX_FACE_SIZE;
 use super::{BlurKernel, Pyramid, VmfPyramid};
-use crate::error::{Error, Result};
-use crate::files::{self, sealed, unsealed, write_whole};
+use crate::error::Result;
+use crate::files::{self, ValuesFormat, write_whole};
 
 /// Version of the file format and of the maps in it: to be raised when the same environment gets others.
 pub const FORMAT_VERSION: u32 = 5;
 
-const MAGIC: &[u8; 8] = b"VMFMAPS\0";
+const FORMAT: ValuesFormat = ValuesFormat { magic: b"VMFMAPS\0", version: FORMAT_VERSION };
 
 fn encode(pyramid: &VmfPyramid) -> Vec<u8> {
-    let mut bytes = MAGIC.to_vec();
-    bytes.extend(FORMAT_VERSION.to_le_bytes());
-    bytes.extend((pyramid.levels.face_size as u32).to_le_bytes());
-    for map in &pyramid.levels.levels {
-        bytes.extend(map.as_flattened().iter().flat_map(|value| value.to_le_bytes()));
-    }
-    sealed(bytes)
+    let Pyramid { face_size, levels } = &pyramid.levels;
+    FORMAT.encode(*face_size as u32, levels.iter().flat_map(|level| level.as_flattened()).copied())
 }
 
 /// Writes `pyramid` to the file at `path`, whole or not at all.
@@ -50,25 +38,23 @@ pub fn read(path: &Path) -> Result<VmfPyramid> {
 /// # Errors
 /// They are not a whole file of this version.
 pub fn parse(path: &Path, bytes: &[u8]) -> Result<VmfPyramid> {
-    decode(bytes).ok_or_else(|| Error::in_file(path, "is damaged", "it is made again"))
+    FORMAT.parse(path, bytes, decode)
 }
 
-fn decode(bytes: &[u8]) -> Option<VmfPyramid> {
-    let rest = unsealed(bytes)?.strip_prefix(MAGIC)?.strip_prefix(&FORMAT_VERSION.to_le_bytes())?;
-    let (&face_size, mut rest) = rest.split_first_chunk()?;
-    let face_size = u32::from_le_bytes(face_size) as usize;
+fn decode(face_size: u32, values: &[[u8; 4]]) -> Option<VmfPyramid> {
+    let (mut texels, []) = values.as_chunks() else { return None };
+    let face_size = face_size as usize;
     if !face_size.is_power_of_two() || face_size > MAX_FACE_SIZE {
         return None;
     }
-    let mut maps = Vec::new();
+    let mut levels = Vec::new();
     let steps = VmfPyramid::steps(face_size).into_iter().filter(|step| step.kernel != BlurKernel::Mean);
     for size in steps.map(|step| step.size) {
-        let (map, after) = rest.split_at_checked(6 * size * size * size_of::<[f32; 3]>())?;
-        let values = map.as_chunks().0.iter().map(|&value| f32::from_le_bytes(value));
-        maps.push(values.collect::<Vec<_>>().as_chunks().0.to_vec());
-        rest = after;
+        let (level, after) = texels.split_at_checked(6 * size * size)?;
+        levels.push(level.iter().map(|texel: &[_; 3]| texel.map(f32::from_le_bytes)).collect());
+        texels = after;
     }
-    rest.is_empty().then_some(VmfPyramid { levels: Pyramid { face_size, levels: maps } })
+    texels.is_empty().then_some(VmfPyramid { levels: Pyramid { face_size, levels } })
 }
 
 #[cfg(test)]
@@ -82,32 +68,24 @@ mod tests {
     }
 
     #[test]
-    fn what_is_written_is_read_to_the_bit_and_a_damaged_file_is_refused() {
+    fn what_is_written_is_read_to_the_bit() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("x.pyramid");
         write(&path, &pyramid()).unwrap();
         assert_eq!(read(&path).unwrap(), pyramid());
-        let whole = std::fs::read(&path).unwrap();
-        let mut flipped = whole.clone();
-        flipped[1000] ^= 1;
-        for damaged in [&whole[..100], &whole[..10], &flipped, b""] {
-            std::fs::write(&path, damaged).unwrap();
-            assert!(read(&path).unwrap_err().to_string().contains("x.pyramid"));
-        }
     }
 
     #[test]
     fn sizes_that_do_not_fit_the_content_are_refused() {
-        let whole = encode(&pyramid());
-        let content = unsealed(&whole).unwrap();
-        let is_read = |content: Vec<u8>| decode(&sealed(content)).is_some();
-        assert!(is_read(content.to_vec()));
-        assert!(!is_read(content[..content.len() - 4].to_vec()));
-        assert!(!is_read([content, &[0; 4]].concat()));
-        for face_size in [0, 3, 1, 2 * MAX_FACE_SIZE as u32, u32::MAX] {
-            let mut other = content.to_vec();
-            other[12..16].copy_from_slice(&face_size.to_le_bytes());
-            assert!(!is_read(other), "{face_size}");
+        let pyramid = pyramid();
+        let values = || pyramid.levels.levels.iter().flatten().flatten().copied();
+        let is_read = |size, values: Vec<f32>| parse(Path::new("x"), &FORMAT.encode(size, values)).is_ok();
+        let size = pyramid.levels.face_size as u32;
+        assert!(is_read(size, values().collect()));
+        assert!(!is_read(size, values().skip(1).collect()));
+        assert!(!is_read(size, values().chain([0.0]).collect()));
+        for size in [0, 3, 1, 2 * MAX_FACE_SIZE as u32, u32::MAX] {
+            assert!(!is_read(size, values().collect()), "{size}");
         }
     }
 }

@@ -6,6 +6,7 @@ mod read;
 mod seal;
 #[cfg(test)]
 mod test_data;
+mod values;
 mod whole_file;
 
 pub(crate) use cache_file::keep_file;
@@ -16,4 +17,5 @@ pub use read::{read, text};
 pub(crate) use seal::{sealed, unsealed};
 #[cfg(test)]
 pub(crate) use test_data::measured;
+pub(crate) use values::ValuesFormat;
 pub use whole_file::{check_all_writable, check_not_read, check_writable, file_in, file_name, write_whole};

@@ -17,6 +17,7 @@ pub use key::{Key, KeyBuilder};
 use crate::error::Result;
 use crate::progress::Observer;
 use files::Files;
+use rayon::prelude::*;
 use std::any::Any;
 use std::cell::RefCell;
 use std::collections::HashMap;
@@ -186,6 +187,37 @@ impl Memo {
     }
 }
 
+/// An output, where it came from, and how long that took.
+struct Found<T> {
+    output: Arc<T>,
+    origin: Origin,
+    time: Duration,
+}
+
+/// What of a round makes outputs, on any thread.
+#[derive(Clone, Copy)]
+struct Maker<'r> {
+    memo: &'r Memo,
+    observer: &'r dyn Observer,
+    within: Option<&'static str>,
+}
+
+impl Maker<'_> {
+    fn make<S: Step>(&self, step: &S, key: Key) -> Result<Found<S::Output>> {
+        let start = Instant::now();
+        self.observer.begin(S::NAME);
+        // What is only needed on the way is let go at its end.
+        let output = step.make(&Round { within: Some(S::NAME), ..self.memo.round(self.observer) })?;
+        if let Some(name) = self.within {
+            self.observer.begin(name);
+        }
+        if let Some((stored, folder)) = step.stored().zip(self.memo.folder()) {
+            stored.write(folder, key, &output);
+        }
+        Ok(Found { output: Arc::new(output), origin: Origin::Made, time: start.elapsed() })
+    }
+}
+
 /// Asks a memo for what belongs together, and holds it.
 pub struct Round<'r> {
     memo: &'r Memo,
@@ -202,12 +234,36 @@ impl<'r> Round<'r> {
     /// # Errors
     /// Those of the step; cancelled.
     pub fn ask<S: Step>(&self, step: &S) -> Result<Keyed<S::Output>> {
-        let start = Instant::now();
         let key = self.key_of(step)?;
-        match self.find(step, key, start) {
+        match self.find(step, key) {
             Some(output) => Ok(output),
-            None => Ok(self.hold(step, key, Arc::new(self.make(step, key)?), Origin::Made, start)),
+            None => Ok(self.hold(step, key, self.maker().make(step, key)?)),
         }
+    }
+
+    /// The outputs of `steps`, as of [`Self::ask`]; those that have to be made are made side by side.
+    ///
+    /// # Errors
+    /// Those of any of the steps; cancelled.
+    pub fn ask_all<S: Step + Sync>(&self, steps: &[S]) -> Result<Vec<Keyed<S::Output>>> {
+        let keys = steps.iter().map(|step| self.key_of(step)).collect::<Result<Vec<_>>>()?;
+        let mut outputs = HashMap::new();
+        let mut missing = Vec::new();
+        for (step, &key) in steps.iter().zip(&keys) {
+            if outputs.contains_key(&key) || missing.iter().any(|&(_, other)| other == key) {
+                continue;
+            }
+            match self.find(step, key) {
+                Some(output) => _ = outputs.insert(key, output),
+                None => missing.push((step, key)),
+            }
+        }
+        let maker = self.maker();
+        let made = missing.par_iter().map(|&(step, key)| maker.make(step, key)).collect::<Result<Vec<_>>>()?;
+        for ((step, key), found) in missing.into_iter().zip(made) {
+            outputs.insert(key, self.hold(step, key, found));
+        }
+        Ok(keys.iter().map(|key| outputs[key].clone()).collect())
     }
 
     /// The output of `step` if it is in memory or on disk; it is not made.
@@ -215,8 +271,7 @@ impl<'r> Round<'r> {
     /// # Errors
     /// A step that has no key; cancelled.
     pub fn known<S: Step>(&self, step: &S) -> Result<Option<Keyed<S::Output>>> {
-        let start = Instant::now();
-        Ok(self.find(step, self.key_of(step)?, start))
+        Ok(self.find(step, self.key_of(step)?))
     }
 
     /// Two steps of different outputs have no key in common.
@@ -225,43 +280,30 @@ impl<'r> Round<'r> {
         Ok(Key::builder(std::any::type_name::<S::Output>()).key(step.key(self.memo)?).build())
     }
 
-    fn find<S: Step>(&self, step: &S, key: Key, start: Instant) -> Option<Keyed<S::Output>> {
+    fn find<S: Step>(&self, step: &S, key: Key) -> Option<Keyed<S::Output>> {
+        let start = Instant::now();
+        let found = |output, origin| Found { output, origin, time: start.elapsed() };
         if let Some(output) = self.memo.find(key).and_then(|output| output.downcast().ok()) {
-            return Some(self.hold(step, key, output, Origin::Memory, start));
+            return Some(self.hold(step, key, found(output, Origin::Memory)));
         }
         let output = step.stored()?.read(self.memo.folder()?, key)?;
-        Some(self.hold(step, key, Arc::new(output), Origin::Disk, start))
+        Some(self.hold(step, key, found(Arc::new(output), Origin::Disk)))
     }
 
-    fn make<S: Step>(&self, step: &S, key: Key) -> Result<S::Output> {
-        self.observer.begin(S::NAME);
-        // What is only needed on the way is let go at its end.
-        let output = step.make(&Round { within: Some(S::NAME), ..self.memo.round(self.observer) })?;
-        if let Some(name) = self.within {
-            self.observer.begin(name);
-        }
-        if let Some((stored, folder)) = step.stored().zip(self.memo.folder()) {
-            stored.write(folder, key, &output);
-        }
-        Ok(output)
+    fn maker(&self) -> Maker<'r> {
+        Maker { memo: self.memo, observer: self.observer, within: self.within }
     }
 
-    /// Holds what came of `step`, and notes where it came from.
-    fn hold<S: Step>(
-        &self,
-        step: &S,
-        key: Key,
-        output: Arc<S::Output>,
-        origin: Origin,
-        start: Instant,
-    ) -> Keyed<S::Output> {
+    /// Holds what was found of `step`, and notes where it came from.
+    fn hold<S: Step>(&self, step: &S, key: Key, found: Found<S::Output>) -> Keyed<S::Output> {
+        let Found { output, origin, time } = found;
         let held: Output = output.clone();
         if origin != Origin::Memory {
             self.memo.remember(key, &held);
-            tracing::debug!("{}: {origin:?}, {:.1} ms", S::NAME, start.elapsed().as_secs_f64() * 1e3);
+            tracing::debug!("{}: {origin:?}, {:.1} ms", S::NAME, time.as_secs_f64() * 1e3);
         }
         self.held.borrow_mut().insert(key, held);
-        self.asked.borrow_mut().push(Asked { step: S::NAME, origin, time: start.elapsed() });
+        self.asked.borrow_mut().push(Asked { step: S::NAME, origin, time });
         Keyed { key: step.content_key(&output).unwrap_or(key), output }
     }
 
@@ -362,6 +404,20 @@ mod tests {
         let round = round.round(&());
         assert_eq!(*round.known(&Number(1, true)).unwrap().unwrap(), 1);
         assert_eq!(round.asked("number")[0].origin, Origin::Disk);
+    }
+
+    #[test]
+    fn what_is_asked_for_at_once_is_each_made_once_and_given_in_order() {
+        let memo = Memo::default();
+        let round = memo.round(&());
+        round.ask(&Number(2, false)).unwrap();
+        let numbers = [3, 1, 2, 3, 1].map(|number| Number(number, false));
+        let outputs = round.ask_all(&numbers).unwrap();
+        assert_eq!(outputs.iter().map(|output| **output).collect::<Vec<_>>(), [3, 1, 2, 3, 1]);
+        let origins = round.asked("number").iter().map(|asked| asked.origin).collect::<Vec<_>>();
+        assert_eq!(origins, [Origin::Made, Origin::Memory, Origin::Made, Origin::Made]);
+        assert_eq!(memo.outputs_in_memory(), 3);
+        assert!(round.ask_all(&[4, 13].map(|number| Number(number, false))).is_err());
     }
 
     #[test]

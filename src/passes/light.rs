@@ -211,7 +211,7 @@ impl DevicePyramid {
                     bytemuck::cast_slice(&pyramid.texels_rgba16f(level, scale)).to_vec()
                 }
             };
-            pyramids.iter().flat_map(of_pyramid).collect()
+            pyramids.iter().map(of_pyramid).collect::<Vec<_>>().concat()
         };
         let first = pyramids[0];
         let levels: Vec<_> = (0..first.levels.len()).map(level).collect();

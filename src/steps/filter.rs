@@ -1,7 +1,7 @@
 //! Filters environments: what the methods look up of them, in memory.
 use crate::Result;
 use crate::brdf::BaseProfile;
-use crate::environment::{Environment, LightMoments, Pyramid, VmfPyramid, ggx_pyramid, vmf_file};
+use crate::environment::{Environment, LightMoments, Pyramid, VmfPyramid, ggx_pyramid, moments_file, vmf_file};
 use crate::light::{BlurredLight, KernelNeeds, Light, PrefilteredLight, bases};
 use crate::memo::{Key, Keyed, Memo, Round, Step, Stored};
 use crate::method::Method;
@@ -49,11 +49,16 @@ impl Step for GatherLight<'_> {
     const NAME: &'static str = "light by cosines";
 
     fn key(&self, _: &Memo) -> Result<Key> {
-        Ok(Key::builder("moments").key(self.environment.key).number(self.terms as u64).build())
+        let of = Key::builder("moments").key(self.environment.key).number(self.terms as u64);
+        Ok(of.number(moments_file::FORMAT_VERSION).build())
     }
 
     fn make(&self, round: &Round) -> Result<LightMoments> {
         LightMoments::of(self.environment, self.terms, round.observer())
+    }
+
+    fn stored(&self) -> Option<Stored<'_, LightMoments>> {
+        Some(Stored { extension: "moments", read: Box::new(moments_file::read), write: Box::new(moments_file::write) })
     }
 }
 

@@ -39,13 +39,13 @@ pub(super) fn before(name: &'static str) -> ash::prelude::VkResult<()> {
     if fails { Err(fault.result) } else { Ok(()) }
 }
 
-/// What comes of `act` with a `fault` of this thread, and the calls that it made.
-pub(crate) fn with_fault<T>(fault: Option<Fault>, act: impl FnOnce() -> T) -> (T, Vec<&'static str>) {
-    MADE.take();
-    FAULT.set(fault.map(|fault| (fault, 0, 0)));
-    let result = act();
-    FAULT.set(None);
-    (result, MADE.take())
+/// What comes of `act` with a `fault`, and the calls that it made; what it would do side by side it does on one thread.
+pub(crate) fn with_fault<T: Send>(fault: Option<Fault>, act: impl FnOnce() -> T + Send) -> (T, Vec<&'static str>) {
+    let one_thread = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    one_thread.install(|| {
+        FAULT.set(fault.map(|fault| (fault, 0, 0)));
+        (act(), MADE.take())
+    })
 }
 
 mod tests {
@@ -87,7 +87,7 @@ mod tests {
     }
 
     /// Lets each call of `act` fail in turn; among them are those `expected`.
-    fn fail_each_call(act: impl Fn(&mut Messages) -> Result<(), VulkanError>, expected: &[&str]) {
+    fn fail_each_call(act: impl Fn(&mut Messages) -> Result<(), VulkanError> + Sync, expected: &[&str]) {
         // Each `act` opens an instance with validation, and those do not keep drivers loaded.
         drop(Instance::new(false).expect("an instance"));
         let mut messages = Messages::default();

@@ -149,6 +149,7 @@ readers! {
     readers::scene,
     readers::threads,
     readers::pyramid,
+    readers::moments,
     readers::kept_reference,
     readers::device_verdict,
     #[cfg(feature = "viewer")]

@@ -4,7 +4,7 @@ use std::path::Path;
 use glam::{DVec3, dvec3};
 use threadlight::low_level::brdf::{BaseProfile, Brdf};
 use threadlight::low_level::device_check::Verdict;
-use threadlight::low_level::environment::{Environment, Pyramid, VmfPyramid, vmf_file};
+use threadlight::low_level::environment::{Environment, LightMoments, Pyramid, VmfPyramid, moments_file, vmf_file};
 use threadlight::low_level::evaluate::{Row, reference};
 use threadlight::low_level::picture::{ExrHeader, parse_image, write_exr, write_png};
 use threadlight::low_level::scene::{Mesh, Scene};
@@ -396,21 +396,39 @@ pub fn threads() -> Reader {
     }
 }
 
+fn environment() -> Environment {
+    let picture = written("x.exr", |path| {
+        write_exr(path, 4, 2, &pixels(), false, &ExrHeader::default()).expect("a file");
+    });
+    Environment::FILES.parse(Path::new("x.exr"), &picture).expect("a picture")
+}
+
 pub fn pyramid() -> Reader {
     Reader {
         file_name: "x.pyramid",
         seeds: || {
-            let picture = written("x.exr", |path| {
-                write_exr(path, 4, 2, &pixels(), false, &ExrHeader::default()).expect("a file");
-            });
-            let environment = Environment::FILES.parse(Path::new("x.exr"), &picture).expect("a picture");
-            let pyramid = VmfPyramid::new(&Pyramid::box_filtered(&environment), &()).expect("a pyramid");
+            let pyramid = VmfPyramid::new(&Pyramid::box_filtered(&environment()), &()).expect("a pyramid");
             vec![written("x.pyramid", |path| vmf_file::write(path, &pyramid).expect("a file"))]
         },
         words: &["VMFMAPS\0", "\x04\0\0\0", "\x10\0\0\0", "\0\0\0\0"],
         seal: Some(seal_end),
         bytes_per_byte: 4,
         read: |path, bytes| vmf_file::parse(path, bytes).map(drop).map_err(text),
+    }
+}
+
+pub fn moments() -> Reader {
+    Reader {
+        file_name: "x.moments",
+        seeds: || {
+            let moments = LightMoments::of(&environment(), 1, &()).expect("moments");
+            vec![written("x.moments", |path| moments_file::write(path, &moments).expect("a file"))]
+        },
+        words: &["MOMENTS\0", "\x01\0\0\0", "\x06\0\0\0", "\0\0\0\0"],
+        seal: Some(seal_end),
+        // They are in memory as for bases of six terms.
+        bytes_per_byte: 6,
+        read: |path, bytes| moments_file::parse(path, bytes).map(drop).map_err(text),
     }
 }
 
