@@ -110,7 +110,7 @@ impl DeviceScene {
             (&compiled::TONE_MAP, vec![]),
         ];
         let of_classes = shaders.constants_of_classes().map(|constants| (shader, constants));
-        // Drivers take long, and several cores where they may.
+        // Compiling takes long: so all are asked for at once, and are compiled on several cores.
         let all: Vec<_> = around.into_iter().chain(of_classes).collect();
         let all: Vec<_> = all.iter().map(|(shader, constants)| CompileCompute { device, shader, constants }).collect();
         let mut pipelines = round.ask_all(&all)?.into_iter();

@@ -68,11 +68,18 @@ mod tests {
     }
 
     #[test]
-    fn what_is_written_is_read_to_the_bit() {
+    fn what_is_written_is_read_to_the_bit_and_a_damaged_file_is_refused() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("x.pyramid");
         write(&path, &pyramid()).unwrap();
         assert_eq!(read(&path).unwrap(), pyramid());
+        let whole = std::fs::read(&path).unwrap();
+        let mut flipped = whole.clone();
+        flipped[1000] ^= 1;
+        for damaged in [&whole[..100], &whole[..10], &flipped, b""] {
+            std::fs::write(&path, damaged).unwrap();
+            assert!(read(&path).unwrap_err().to_string().contains("x.pyramid"));
+        }
     }
 
     #[test]
