@@ -1,7 +1,7 @@
 //! What all passes know of the view: camera, resolution, rotation of the environment.
 use crate::scene::Camera;
 use bytemuck::{Pod, Zeroable};
-use glam::{DVec2, Vec2, Vec3};
+use glam::{DMat3, DVec2, Vec2, Vec3};
 
 /// The camera as shaders see it (`Camera` in glsl/camera.glsl): right and up scaled to the edges of the image.
 #[repr(C)]
@@ -16,7 +16,7 @@ impl CameraRays {
     /// The rays of `camera` for images of this width over height.
     pub fn new(camera: &Camera, aspect: f64) -> Self {
         let (right, up, forward) = camera.basis();
-        let half_size = half_size(camera, aspect);
+        let half_size = camera.half_size(aspect);
         let pack = |v: glam::DVec3| v.as_vec3().extend(0.0).to_array();
         Self { right: pack(right * half_size.x), up: pack(up * half_size.y), forward: pack(forward) }
     }
@@ -33,12 +33,6 @@ impl CameraRays {
         let [right, up, forward] = [self.right, self.up, self.forward].map(|v| Vec3::new(v[0], v[1], v[2]));
         forward + offset.x * right + offset.y * up
     }
-}
-
-/// Half the width and half the height of what `camera` sees at distance 1, in images of this width over height.
-fn half_size(camera: &Camera, aspect: f64) -> DVec2 {
-    let half_height = (camera.fov_y_deg.to_radians() / 2.0).tan();
-    DVec2::new(half_height * aspect, half_height)
 }
 
 /// Camera, resolution and display settings of one frame.
@@ -69,7 +63,7 @@ impl View {
 
     /// Half the width and half the height of what is seen at distance 1.
     pub fn half_size(&self) -> DVec2 {
-        half_size(&self.camera, self.aspect())
+        self.camera.half_size(self.aspect())
     }
 
     /// Variance along each axis, in rad^2, of the views of a pixel's sub-pixels. Twin of `view_variance` in glsl/shared_sum.glsl.
@@ -83,7 +77,12 @@ impl View {
         CameraRays::new(&self.camera, self.aspect())
     }
 
-    /// Cosine and sine of the environment's rotation.
+    /// Takes directions in the world to directions in the environment's own picture.
+    pub fn to_environment(&self) -> DMat3 {
+        DMat3::from_rotation_y(-self.rotation_deg.to_radians())
+    }
+
+    /// Cosine and sine of the environment's rotation: the same as shaders have it.
     pub fn rotation(&self) -> [f32; 2] {
         let (sin, cos) = self.rotation_deg.to_radians().sin_cos();
         [cos as f32, sin as f32]
@@ -111,7 +110,19 @@ impl View {
 mod tests {
     use crate::prepare::view_of;
     use crate::scene::{BoundingSphere, Scene};
-    use glam::DVec3;
+    use glam::{DMat3, DVec3};
+
+    #[test]
+    fn turning_the_environment_takes_z_towards_x() {
+        let mut scene = Scene::default();
+        let mut to_environment = |rotation_deg: f64| {
+            scene.environment.rotation_deg = rotation_deg;
+            view_of(&scene, BoundingSphere { centre: DVec3::ZERO, radius: 1.0 }).unwrap().to_environment()
+        };
+        // What the picture has at +Z is now seen towards +X.
+        assert!((to_environment(90.0) * DVec3::X - DVec3::Z).length() < 1e-15);
+        assert_eq!(to_environment(0.0), DMat3::IDENTITY);
+    }
 
     #[test]
     fn a_view_that_is_too_large_keeps_its_shape() {

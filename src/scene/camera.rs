@@ -1,5 +1,5 @@
 //! The pinhole camera: its axes, its rays, and the view that frames a scene by default.
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 
 use super::three_numbers;
@@ -118,14 +118,20 @@ impl Camera {
         (right, right.cross(forward), forward)
     }
 
+    /// Half the width and half the height of what is seen at distance 1, in images of this width over height.
+    pub fn half_size(&self, aspect: f64) -> DVec2 {
+        let half_height = (0.5 * self.fov_y_deg).to_radians().tan();
+        DVec2::new(half_height * aspect, half_height)
+    }
+
     /// The unit direction through the centre of pixel (column `pixel_x`, row `pixel_y`); fractions name points between the
     /// centres, so that the pixel covers -0.5 to 0.5 around them.
     pub fn ray(&self, pixel_x: f64, pixel_y: f64, width: u32, height: u32) -> DVec3 {
         let (right, up, forward) = self.basis();
         let (width, height) = (f64::from(width), f64::from(height));
-        let tangent = (0.5 * self.fov_y_deg).to_radians().tan();
-        let x = (2.0 * (pixel_x + 0.5) / width - 1.0) * tangent * width / height;
-        let y = (1.0 - 2.0 * (pixel_y + 0.5) / height) * tangent;
+        let half_size = self.half_size(width / height);
+        let x = (2.0 * (pixel_x + 0.5) / width - 1.0) * half_size.x;
+        let y = (1.0 - 2.0 * (pixel_y + 0.5) / height) * half_size.y;
         (forward + x * right + y * up).normalize()
     }
 }

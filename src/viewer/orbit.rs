@@ -81,8 +81,9 @@ impl Orbit {
     /// Moves eye and target along the image such that what is under the cursor, as far away as the target, stays under it.
     pub fn pan(&mut self, drag_px: DVec2, image_rows: f64) {
         let drag = finite(drag_px / image_rows);
-        let image_height = 2.0 * self.distance * (0.5 * self.fov_y_deg).to_radians().tan();
-        let (right, up, _) = self.camera().basis();
+        let camera = self.camera();
+        let image_height = 2.0 * self.distance * camera.half_size(1.0).y;
+        let (right, up, _) = camera.basis();
         self.target += image_height * (drag.y * up - drag.x * right);
         self.hold();
     }

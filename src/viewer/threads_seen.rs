@@ -59,7 +59,7 @@ impl SurfacePoint {
         let (n, w_o) = (normal.try_normalize()?, -direction);
         let x = (w_o - n.dot(w_o) * n).try_normalize().unwrap_or_else(|| n.any_orthonormal_vector());
         let to_world = DMat3::from_cols(x, n.cross(x), n);
-        let to_environment = DMat3::from_rotation_y(-view.rotation_deg.to_radians()) * to_world;
+        let to_environment = view.to_environment() * to_world;
         let phi_o_rad = tangent.map_or(0.0, |(tangent, turn)| {
             -turn.rotate(DVec2::new(tangent.dot(x), tangent.dot(to_world.y_axis))).to_angle()
         });

@@ -13,7 +13,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
-use glam::{DMat3, DVec3, UVec2, dvec3};
+use glam::{DVec3, UVec2, dvec3};
 use rayon::prelude::*;
 
 use crate::evaluate::metrics::Display;
@@ -109,7 +109,7 @@ impl ReferenceImage {
             return self.radiance.clone();
         }
         let View { camera, width, height, .. } = prepared.view;
-        let to_environment = to_environment(prepared.view.rotation_deg);
+        let to_environment = prepared.view.to_environment();
         let pixels = self.radiance.iter().enumerate().map(|(pixel, &[r, g, b, coverage])| {
             if coverage >= 1.0 {
                 return [r, g, b, coverage];
@@ -149,11 +149,6 @@ pub fn tone_map(radiance: &[[f32; 4]], view: &View) -> Vec<u8> {
         [shown(r), shown(g), shown(b), byte(alpha)]
     };
     radiance.iter().flat_map(pixel).collect()
-}
-
-/// Takes directions in the world to directions in the own picture of an environment that is rotated by so many degrees.
-fn to_environment(rotation_deg: f64) -> DMat3 {
-    DMat3::from_rotation_y(-rotation_deg.to_radians())
 }
 
 /// The reference of `prepared`, for the geometry that `device` rasterises. The observer of `round` hears of rows of pixels, or of frames.
@@ -260,7 +255,7 @@ impl Integrator<'_> {
     pub fn points(&self, view: &View, geometry: &[[u32; 2]], x: usize, y: usize) -> Vec<Point> {
         let side = view.subpixels as usize;
         let [width, height] = view.cache_size();
-        let to_environment = to_environment(view.rotation_deg);
+        let to_environment = view.to_environment();
         let subpixels = (0..side).flat_map(|v| (0..side).map(move |u| (x * side + u, y * side + v)));
         subpixels
             .filter_map(|(u, v)| {

@@ -362,13 +362,6 @@ fn the_picture_is_the_same_on_any_number_of_threads_and_can_be_cancelled() {
 }
 
 #[test]
-fn turning_the_environment_takes_z_towards_x() {
-    // What the picture has at +Z is now seen towards +X.
-    assert!((to_environment(90.0) * DVec3::X - DVec3::Z).length() < 1e-15);
-    assert_eq!(to_environment(0.0), glam::DMat3::IDENTITY);
-}
-
-#[test]
 fn a_sun_beside_a_near_mirror_leaves_what_is_mirrored() {
     // The mirrored direction is a node of the coarsest cells, some of which the sun is in, too.
     for (sun, alpha) in [(1e3, 0.001), (1e4, 0.003), (1e6, 0.001), (1e6, 0.01)] {

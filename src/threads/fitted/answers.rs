@@ -96,8 +96,13 @@ impl Answers {
     pub fn new(kernels: &[Kernel], lights: &TestLights) -> Self {
         let zeros = || vec![0.0; kernels.len() * lights.count()];
         let mut answers = Self { value: zeros(), by_cos: zeros(), by_level: [zeros(), zeros()] };
-        pulp::Arch::new().dispatch(Answering { kernels, lights, answers: &mut answers });
+        answers.replace(kernels, lights);
         answers
+    }
+
+    /// Those of other `kernels`, as many as before, in the place of these: what is allocated stays.
+    pub fn replace(&mut self, kernels: &[Kernel], lights: &TestLights) {
+        pulp::Arch::new().dispatch(Answering { kernels, lights, answers: self });
     }
 }
 

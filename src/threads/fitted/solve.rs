@@ -1,4 +1,6 @@
 //! The fit of one row: kernels and weights that answer test lights as the slice does, by Levenberg and Marquardt's method.
+use std::mem::swap;
+
 use faer::linalg::matmul::triangular::{BlockStructure, matmul};
 use faer::linalg::solvers::{Llt, Solve};
 use faer::{Accum, Mat, MatRef, Par, Side};
@@ -6,7 +8,7 @@ use glam::{DVec3, dvec3};
 
 use super::answers::Answers;
 use super::kernel::{Kernel, WIDEST_LEVEL, all_between, scale_rad};
-use super::lights::TestLights;
+use super::lights::{LANES, TestLights};
 use crate::error::Result;
 use crate::progress::Observer;
 
@@ -179,11 +181,9 @@ impl<'a> Fit<'a> {
     /// a kink would keep all from moving (F25).
     fn level_bounds(&self, kernels: &[Kernel], answers: &Answers, rest: &Rest) -> Vec<[f64; 2]> {
         let slope = |k: usize, side: usize| -> f64 {
-            let answers = &answers.by_level[side][k * self.lights.count()..];
-            let channels = (0..3).map(|c| {
-                let terms = rest.of_sets[k % self.sets][c].iter().zip(answers);
-                kernels[k].weight[c] * terms.map(|(r, answer)| f64::from(r * answer)).sum::<f64>()
-            });
+            let count = self.lights.count();
+            let answers = &answers.by_level[side][k * count..(k + 1) * count];
+            let channels = (0..3).map(|c| kernels[k].weight[c] * product(&rest.of_sets[k % self.sets][c], answers));
             channels.sum::<f64>()
                 + self.prior.map_or(0.0, |(before, strength)| strength * (kernels[k].level - before[k].level))
         };
@@ -200,11 +200,12 @@ impl<'a> Fit<'a> {
         (0..kernels.len()).map(|k| bounds(k).map(|level| level.max(self.sharpest_level(k)))).collect()
     }
 
-    /// What the answers of each kernel differ by from those of the base, whose weight is what kernels leave of the albedo.
-    fn differences(&self, answers: &Answers) -> Vec<f32> {
+    /// To `columns`, what the answers of each kernel differ by from those of the base, whose weight is what kernels leave of the albedo.
+    fn differences(&self, answers: &Answers, columns: &mut Vec<f32>) {
         let cosine = &self.lights.cosine;
-        let of_kernel = |answers: &[f32]| answers.iter().zip(cosine).map(|(answer, cosine)| answer - cosine).collect();
-        answers.value.chunks(cosine.len()).flat_map::<Vec<f32>, _>(of_kernel).collect()
+        for answers in answers.value.chunks(cosine.len()) {
+            columns.extend(answers.iter().zip(cosine).map(|(answer, cosine)| answer - cosine));
+        }
     }
 
     /// The weighted design, a row a light: answers of each kernel less the cosine's, then their derivatives by two tangents and the level,
@@ -212,8 +213,8 @@ impl<'a> Fit<'a> {
     fn design(&self, kernels: &[Kernel], answers: &Answers, levels: &[[f64; 2]], rest: &Rest) -> Vec<f32> {
         let [lights_x, lights_y, lights_z] = &self.lights.direction;
         let count = self.lights.count();
-        let mut columns = self.differences(answers);
-        columns.reserve_exact(count * 3 * (kernels.len() + self.sets));
+        let mut columns = Vec::with_capacity(count * (4 * kernels.len() + 3 * self.sets));
+        self.differences(answers, &mut columns);
         for (k, kernel) in kernels.iter().enumerate() {
             let of_kernel = k * count..(k + 1) * count;
             let (x, y) = kernel.direction.any_orthonormal_pair();
@@ -236,7 +237,8 @@ impl<'a> Fit<'a> {
         let mut rest = self.rest(kernels, &answers);
         let mut damping = LEAST_DAMPING;
         for _ in 0..WEIGHT_STEPS {
-            let mut columns = self.differences(&answers);
+            let mut columns = Vec::with_capacity(self.lights.count() * (kernels.len() + 3 * self.sets));
+            self.differences(&answers, &mut columns);
             rest.of_sets.iter().flatten().for_each(|residuals| columns.extend_from_slice(residuals));
             let products = products(&columns, self.lights.count());
             let next = self.with_better_weights(kernels, &products, damping);
@@ -304,7 +306,8 @@ impl<'a> Fit<'a> {
     /// Which of `candidates` takes most of what `kernels` leave, if it is one of `set` and they stay as they are; none if none takes any.
     pub fn best_place(&self, kernels: &[Kernel], set: usize, candidates: &[Kernel]) -> Option<Kernel> {
         let rest = self.rest(kernels, &Answers::new(kernels, self.lights));
-        let columns = self.differences(&Answers::new(candidates, self.lights));
+        let mut columns = Vec::new();
+        self.differences(&Answers::new(candidates, self.lights), &mut columns);
         let taken = |column: &[f32]| -> f32 {
             let product = |other: &[f32]| column.iter().zip(other).map(|(a, b)| a * b).sum::<f32>();
             rest.of_sets[set].iter().map(|rest| product(rest).min(0.0).powi(2)).sum::<f32>() / product(column)
@@ -322,6 +325,7 @@ impl<'a> Fit<'a> {
         let mut damping = FIRST_DAMPING;
         let mut tried = 0;
         let mut answers = Answers::new(kernels, self.lights);
+        let mut next_answers = Answers::new(kernels, self.lights);
         let mut rest = self.rest(kernels, &answers);
         while tried < effort.steps {
             let levels = self.level_bounds(kernels, &answers, &rest);
@@ -332,10 +336,11 @@ impl<'a> Fit<'a> {
                 observer.check()?;
                 tried += 1;
                 let next = step(kernels, &levels, &hessian, &gradient, damping);
-                let next_answers = Answers::new(&next, self.lights);
+                next_answers.replace(&next, self.lights);
                 let next_rest = self.rest(&next, &next_answers);
                 if next_rest.cost < rest.cost {
-                    (*kernels, answers, rest) = (next, next_answers, next_rest);
+                    (*kernels, rest) = (next, next_rest);
+                    swap(&mut answers, &mut next_answers);
                     damping = (DAMPING_FALLS * damping).max(LEAST_DAMPING);
                     break;
                 }
@@ -414,7 +419,16 @@ impl<'a> Fit<'a> {
 }
 
 fn squares(channels: &[Vec<f32>; 3]) -> f64 {
-    channels.iter().flatten().map(|&value| f64::from(value).powi(2)).sum()
+    channels.iter().map(|channel| product(channel, channel)).sum()
+}
+
+/// The sum over lights of the products of two numbers of each. Each lane has a sum of its own: one alone would wait for each addition before the next.
+fn product(a: &[f32], b: &[f32]) -> f64 {
+    let mut sums = [0.0; LANES];
+    for (a, b) in a.as_chunks::<LANES>().0.iter().zip(b.as_chunks::<LANES>().0) {
+        (0..LANES).for_each(|j| sums[j] += f64::from(a[j]) * f64::from(b[j]));
+    }
+    sums.iter().sum()
 }
 
 /// The products of all pairs of columns of `length`: the lower half.
