@@ -4,7 +4,7 @@
 //! shading adds theirs exactly.
 use std::ops::Range;
 
-use glam::{DVec3, Vec3, Vec4};
+use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 
 use super::cube::{direction_of, face_of};
@@ -231,17 +231,13 @@ fn gather_rows(
     let mut cells = vec![Cell::default(); 6 * CELLS_SIZE * CELLS_SIZE];
     let edge = |row: usize| (std::f64::consts::PI * row as f64 / (times[1] * environment.height) as f64).cos();
     let place = |index: usize, times: usize| (index as f64 + 0.5) / times as f64 - 0.5;
-    // Sines take longer than all the rest, so each is taken once: of columns along the horizon, where theta has the sine 1, of rows at phi = 0.
-    let horizon = environment.height as f64 / 2.0 - 0.5;
-    let columns = (0..times[0] * environment.width).map(|column| place(column, times[0]));
-    let columns: Vec<_> = columns.map(|column| (column, environment.direction(column, horizon))).collect();
+    let columns = || (0..times[0] * environment.width).map(|column| place(column, times[0]));
+    let directions = environment.directions(columns());
     for row in rows {
         observer.check()?;
         let solid_angle = std::f64::consts::TAU / (times[0] * environment.width) as f64 * (edge(row) - edge(row + 1));
         let row = place(row, times[1]);
-        let DVec3 { y, z: minus_sin, .. } = environment.direction(-0.5, row);
-        for &(column, along_horizon) in &columns {
-            let direction = DVec3 { y, ..-minus_sin * along_horizon };
+        for (column, direction) in columns().zip(directions.of_row(row)) {
             let light = (solid_angle * environment.radiance_at(column, row)).as_vec3();
             let (face, s, t) = face_of(direction);
             let index = |x: f64| ((x * CELLS_SIZE as f64) as usize).min(CELLS_SIZE - 1);

@@ -63,9 +63,8 @@ pub(super) fn with_lights(mut environment: Environment, lights: &[Light]) -> Env
     let two_rows = TAU / environment.height as f64;
     let cos_reaches: Vec<f64> =
         lights.iter().map(|light| (light.cos_reach().acos() + two_rows).min(PI).cos()).collect();
-    let added = (0..environment.texels.len()).into_par_iter().map(|i| {
-        let (column, row) = ((i % environment.width) as f64, (i / environment.width) as f64);
-        let centre = environment.direction(column, row);
+    let directions = environment.directions((0..environment.width).map(|column| column as f64));
+    let added = |(column, row): (f64, f64), centre: DVec3| {
         let near = lights.iter().zip(&cos_reaches).filter(|(light, reach)| centre.dot(light.centre) > **reach);
         let mut covered: Vec<_> = near.map(|(light, _)| (light, 0.0)).collect();
         if covered.is_empty() {
@@ -81,8 +80,12 @@ pub(super) fn with_lights(mut environment: Environment, lights: &[Light]) -> Env
             covered.iter_mut().for_each(|(light, sum)| *sum += if light.covers(direction) { sin_theta } else { 0.0 });
         }
         covered.into_iter().map(|(light, sum)| light.radiance * (sum / all)).sum()
-    });
-    let added: Vec<DVec3> = added.collect();
+    };
+    let of_row = |row| {
+        let centres = directions.of_row(row as f64).enumerate();
+        centres.map(move |(column, centre)| added((column as f64, row as f64), centre))
+    };
+    let added: Vec<DVec3> = (0..environment.height).into_par_iter().flat_map_iter(of_row).collect();
     for (texel, light) in Arc::make_mut(&mut environment.texels).iter_mut().zip(added) {
         *texel = (to_dvec3(texel) + light).as_vec3().to_array();
     }

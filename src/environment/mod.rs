@@ -71,6 +71,20 @@ pub struct Environment {
     fingerprint: OnceLock<blake3::Hash>,
 }
 
+/// What [`Environment::directions`] gives.
+struct Directions<'a> {
+    environment: &'a Environment,
+    along_horizon: Vec<DVec3>,
+}
+
+impl Directions<'_> {
+    /// Those of a row, as [`Environment::direction`] has them.
+    fn of_row(&self, row: f64) -> impl Iterator<Item = DVec3> {
+        let DVec3 { y, z: minus_sin, .. } = self.environment.direction(-0.5, row);
+        self.along_horizon.iter().map(move |along_horizon| DVec3 { y, ..-minus_sin * along_horizon })
+    }
+}
+
 impl Environment {
     /// A picture whose pixels are finite and not negative.
     pub(crate) fn new(
@@ -150,6 +164,13 @@ impl Environment {
         let phi = TAU * (column + 0.5) / self.width as f64;
         let theta = PI * (row + 0.5) / self.height as f64;
         DVec3::new(theta.sin() * phi.sin(), theta.cos(), -theta.sin() * phi.cos())
+    }
+
+    /// The directions of these columns in any row. Sines take longer than most of what is done with a direction, so each is taken once: of columns
+    /// along the horizon, where theta has the sine 1, of rows at phi = 0.
+    fn directions(&self, columns: impl Iterator<Item = f64>) -> Directions<'_> {
+        let horizon = self.height as f64 / 2.0 - 0.5;
+        Directions { environment: self, along_horizon: columns.map(|column| self.direction(column, horizon)).collect() }
     }
 
     /// Where in a lat-long picture `direction` (any length but 0) is seen: parts of its width and height, 0 to 1.
@@ -246,6 +267,20 @@ pub(crate) mod tests {
             assert!((v - (row + 0.5) / 4.0).abs() < 1e-15, "{column} {row}");
             // At the poles every column is as good.
             assert!(expected.y != 0.0 || (u - (column + 0.5) / 8.0).abs() < 1e-15, "{column} {row}");
+        }
+    }
+
+    #[test]
+    fn directions_of_a_row_are_those_of_its_pixels() {
+        for (width, height) in [(64, 32), (7, 5), (1, 1)] {
+            let sky = environment(width, height, |_, _| [1.0; 3]);
+            let columns = || (0..2 * width).map(|column| column as f64 / 2.0 - 0.25);
+            let directions = sky.directions(columns());
+            for row in (0..=2 * height).map(|row| row as f64 / 2.0 - 0.5) {
+                for (column, found) in columns().zip(directions.of_row(row)) {
+                    assert!((found - sky.direction(column, row)).length() < 1e-15, "{column} {row}");
+                }
+            }
         }
     }
 

@@ -50,10 +50,10 @@ impl Environment {
 /// The picture of a function of direction, sampled at the pixel centres: functions here are smooth over a pixel.
 fn procedural(name: &str, (width, height): (usize, usize), radiance: impl Fn(DVec3) -> DVec3 + Sync) -> Environment {
     let mut environment = Environment::new(name.into(), width, height, Vec::new(), RepairCounts::default());
-    let texels = (0..width * height)
-        .into_par_iter()
-        .map(|i| radiance(environment.direction((i % width) as f64, (i / width) as f64)).as_vec3().to_array());
-    environment.texels = Arc::new(texels.collect());
+    let directions = environment.directions((0..width).map(|column| column as f64));
+    let of_row = |row| directions.of_row(row as f64).map(|direction| radiance(direction).as_vec3().to_array());
+    let texels = (0..height).into_par_iter().flat_map_iter(of_row).collect();
+    environment.texels = Arc::new(texels);
     environment
 }
 

@@ -11,6 +11,7 @@ use super::cube::{self, direction_of, exact_texel_solid_angle, face_of};
 use super::{Environment, to_dvec3};
 use crate::error::Result;
 use crate::progress::Observer;
+use crate::vector_math::half_floats;
 
 /// Level 0 is no finer than this: 6 x 1024^2 texels of 16 bytes are 96 MiB.
 pub(super) const MAX_FACE_SIZE: usize = 1024;
@@ -137,8 +138,7 @@ impl Pyramid {
 
     /// Texels of a level divided by `scale` (see [`Self::radiance_scale`]), alpha 1, for the GPU.
     pub fn texels_rgba16f(&self, level: usize, scale: f32) -> Vec<[f16; 4]> {
-        let encode = |value: f32| f16::from_f32(value / scale);
-        self.levels[level].par_iter().map(|&[r, g, b]| [encode(r), encode(g), encode(b), f16::ONE]).collect()
+        self.levels[level].par_iter().map(|&[r, g, b]| half_floats([r / scale, g / scale, b / scale, 1.0])).collect()
     }
 
     /// What the GPU has of it where it has half floats of radiance over `scale`.

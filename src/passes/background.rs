@@ -4,10 +4,12 @@ use crate::Result;
 use crate::environment::Environment;
 use crate::graph::{FrameGraph, ImageHandle};
 use crate::memo::Keyed;
+use crate::vector_math::half_floats;
 use crate::vulkan::{self, ComputePipeline, Device, ImageShape, Sampler, SamplerKind};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 use half::f16;
+use rayon::prelude::*;
 use std::sync::Arc;
 
 /// What the pass is made of: only where a background is asked for is the map itself on the device.
@@ -58,13 +60,13 @@ impl BackgroundMap {
     pub fn new(device: &Arc<Device>, environment: &Environment) -> Result<Self> {
         let remedy = "scale it down, or leave the background out (none)";
         check_map_size(device, environment, [environment.width, environment.height], remedy)?;
-        let texels = environment.texels.iter().map(|&[r, g, b]| [r, g, b, 1.0]);
+        let texels = environment.texels.par_iter().map(|&[r, g, b]| [r, g, b, 1.0]);
         let single = vk::Format::R32G32B32A32_SFLOAT;
         let (format, bytes) = if !in_half_floats(environment) && device.filters_linearly(single) {
             (single, bytemuck::cast_slice(&texels.collect::<Vec<[f32; 4]>>()).to_vec())
         } else {
-            let half = |value: f32| f16::from_f32(value.min(f16::MAX.to_f32()));
-            let texels: Vec<[f16; 4]> = texels.map(|texel| texel.map(half)).collect();
+            let bounded = |texel: [f32; 4]| texel.map(|value| value.min(f16::MAX.to_f32()));
+            let texels: Vec<[f16; 4]> = texels.map(|texel| half_floats(bounded(texel))).collect();
             (vk::Format::R16G16B16A16_SFLOAT, bytemuck::cast_slice(&texels).to_vec())
         };
         let (width, height) = (environment.width as u32, environment.height as u32);

@@ -11,6 +11,7 @@ use half::f16;
 use crate::brdf::made_table::GREATEST_TEXEL;
 use crate::brdf::{Model, Parameters};
 use crate::error::{Error, Result};
+use crate::vector_math::half_floats;
 
 /// Bins over theta_h (square-root spaced, 0 to 90 degrees).
 pub const THETA_H_BINS: usize = 90;
@@ -133,7 +134,7 @@ fn of_unit(scale: f32) -> Vec4 {
 }
 
 fn half_texel(texel: Vec4, scale: f32) -> [f16; 4] {
-    (texel / of_unit(scale)).to_array().map(f16::from_f32)
+    half_floats((texel / of_unit(scale)).to_array())
 }
 
 /// Tells which cells of one (theta_h, theta_d) have both light and view above the horizon at their centre.
