@@ -231,13 +231,13 @@ fn gather_rows(
     let mut cells = vec![Cell::default(); 6 * CELLS_SIZE * CELLS_SIZE];
     let edge = |row: usize| (std::f64::consts::PI * row as f64 / (times[1] * environment.height) as f64).cos();
     let place = |index: usize, times: usize| (index as f64 + 0.5) / times as f64 - 0.5;
-    let columns = || (0..times[0] * environment.width).map(|column| place(column, times[0]));
-    let directions = environment.directions(columns());
+    let columns: Vec<_> = (0..times[0] * environment.width).map(|column| place(column, times[0])).collect();
+    let directions = environment.directions(columns.iter().copied());
     for row in rows {
         observer.check()?;
         let solid_angle = std::f64::consts::TAU / (times[0] * environment.width) as f64 * (edge(row) - edge(row + 1));
         let row = place(row, times[1]);
-        for (column, direction) in columns().zip(directions.of_row(row)) {
+        for (&column, direction) in columns.iter().zip(directions.of_row(row)) {
             let light = (solid_angle * environment.radiance_at(column, row)).as_vec3();
             let (face, s, t) = face_of(direction);
             let index = |x: f64| ((x * CELLS_SIZE as f64) as usize).min(CELLS_SIZE - 1);

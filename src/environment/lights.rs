@@ -64,7 +64,7 @@ pub(super) fn with_lights(mut environment: Environment, lights: &[Light]) -> Env
     let cos_reaches: Vec<f64> =
         lights.iter().map(|light| (light.cos_reach().acos() + two_rows).min(PI).cos()).collect();
     let directions = environment.directions((0..environment.width).map(|column| column as f64));
-    let added = |(column, row): (f64, f64), centre: DVec3| {
+    let of_pixel = |(column, row): (f64, f64), centre: DVec3| {
         let near = lights.iter().zip(&cos_reaches).filter(|(light, reach)| centre.dot(light.centre) > **reach);
         let mut covered: Vec<_> = near.map(|(light, _)| (light, 0.0)).collect();
         if covered.is_empty() {
@@ -83,7 +83,7 @@ pub(super) fn with_lights(mut environment: Environment, lights: &[Light]) -> Env
     };
     let of_row = |row| {
         let centres = directions.of_row(row as f64).enumerate();
-        centres.map(move |(column, centre)| added((column as f64, row as f64), centre))
+        centres.map(move |(column, centre)| of_pixel((column as f64, row as f64), centre))
     };
     let added: Vec<DVec3> = (0..environment.height).into_par_iter().flat_map_iter(of_row).collect();
     for (texel, light) in Arc::make_mut(&mut environment.texels).iter_mut().zip(added) {

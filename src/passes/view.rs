@@ -82,7 +82,7 @@ impl View {
         DMat3::from_rotation_y(-self.rotation_deg.to_radians())
     }
 
-    /// Cosine and sine of the environment's rotation: the same as shaders have it.
+    /// Cosine and sine of the environment's rotation, from which shaders make the same.
     pub fn rotation(&self) -> [f32; 2] {
         let (sin, cos) = self.rotation_deg.to_radians().sin_cos();
         [cos as f32, sin as f32]

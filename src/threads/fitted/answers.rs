@@ -75,6 +75,7 @@ fn pairs() -> &'static [[Pair; POINTS + 1]] {
 }
 
 /// The answers of kernels of weight 1 to lights, each times the weight of the light; all lights of the first kernel first.
+#[derive(Clone)]
 pub struct Answers {
     /// The answers.
     pub value: Vec<f32>,

@@ -183,7 +183,8 @@ impl<'a> Fit<'a> {
         let slope = |k: usize, side: usize| -> f64 {
             let count = self.lights.count();
             let answers = &answers.by_level[side][k * count..(k + 1) * count];
-            let channels = (0..3).map(|c| kernels[k].weight[c] * product(&rest.of_sets[k % self.sets][c], answers));
+            let channels =
+                (0..3).map(|c| kernels[k].weight[c] * inner_product(&rest.of_sets[k % self.sets][c], answers));
             channels.sum::<f64>()
                 + self.prior.map_or(0.0, |(before, strength)| strength * (kernels[k].level - before[k].level))
         };
@@ -200,12 +201,15 @@ impl<'a> Fit<'a> {
         (0..kernels.len()).map(|k| bounds(k).map(|level| level.max(self.sharpest_level(k)))).collect()
     }
 
-    /// To `columns`, what the answers of each kernel differ by from those of the base, whose weight is what kernels leave of the albedo.
-    fn differences(&self, answers: &Answers, columns: &mut Vec<f32>) {
+    /// What the answers of each kernel differ by from those of the base, whose weight is what kernels leave of the albedo; with room for so many
+    /// `more` columns.
+    fn differences(&self, answers: &Answers, more: usize) -> Vec<f32> {
         let cosine = &self.lights.cosine;
+        let mut columns = Vec::with_capacity(answers.value.len() + more * cosine.len());
         for answers in answers.value.chunks(cosine.len()) {
             columns.extend(answers.iter().zip(cosine).map(|(answer, cosine)| answer - cosine));
         }
+        columns
     }
 
     /// The weighted design, a row a light: answers of each kernel less the cosine's, then their derivatives by two tangents and the level,
@@ -213,8 +217,7 @@ impl<'a> Fit<'a> {
     fn design(&self, kernels: &[Kernel], answers: &Answers, levels: &[[f64; 2]], rest: &Rest) -> Vec<f32> {
         let [lights_x, lights_y, lights_z] = &self.lights.direction;
         let count = self.lights.count();
-        let mut columns = Vec::with_capacity(count * (4 * kernels.len() + 3 * self.sets));
-        self.differences(answers, &mut columns);
+        let mut columns = self.differences(answers, 3 * (kernels.len() + self.sets));
         for (k, kernel) in kernels.iter().enumerate() {
             let of_kernel = k * count..(k + 1) * count;
             let (x, y) = kernel.direction.any_orthonormal_pair();
@@ -237,8 +240,7 @@ impl<'a> Fit<'a> {
         let mut rest = self.rest(kernels, &answers);
         let mut damping = LEAST_DAMPING;
         for _ in 0..WEIGHT_STEPS {
-            let mut columns = Vec::with_capacity(self.lights.count() * (kernels.len() + 3 * self.sets));
-            self.differences(&answers, &mut columns);
+            let mut columns = self.differences(&answers, 3 * self.sets);
             rest.of_sets.iter().flatten().for_each(|residuals| columns.extend_from_slice(residuals));
             let products = products(&columns, self.lights.count());
             let next = self.with_better_weights(kernels, &products, damping);
@@ -306,8 +308,7 @@ impl<'a> Fit<'a> {
     /// Which of `candidates` takes most of what `kernels` leave, if it is one of `set` and they stay as they are; none if none takes any.
     pub fn best_place(&self, kernels: &[Kernel], set: usize, candidates: &[Kernel]) -> Option<Kernel> {
         let rest = self.rest(kernels, &Answers::new(kernels, self.lights));
-        let mut columns = Vec::new();
-        self.differences(&Answers::new(candidates, self.lights), &mut columns);
+        let columns = self.differences(&Answers::new(candidates, self.lights), 0);
         let taken = |column: &[f32]| -> f32 {
             let product = |other: &[f32]| column.iter().zip(other).map(|(a, b)| a * b).sum::<f32>();
             rest.of_sets[set].iter().map(|rest| product(rest).min(0.0).powi(2)).sum::<f32>() / product(column)
@@ -325,7 +326,7 @@ impl<'a> Fit<'a> {
         let mut damping = FIRST_DAMPING;
         let mut tried = 0;
         let mut answers = Answers::new(kernels, self.lights);
-        let mut next_answers = Answers::new(kernels, self.lights);
+        let mut next_answers = answers.clone();
         let mut rest = self.rest(kernels, &answers);
         while tried < effort.steps {
             let levels = self.level_bounds(kernels, &answers, &rest);
@@ -419,11 +420,11 @@ impl<'a> Fit<'a> {
 }
 
 fn squares(channels: &[Vec<f32>; 3]) -> f64 {
-    channels.iter().map(|channel| product(channel, channel)).sum()
+    channels.iter().map(|channel| inner_product(channel, channel)).sum()
 }
 
 /// The sum over lights of the products of two numbers of each. Each lane has a sum of its own: one alone would wait for each addition before the next.
-fn product(a: &[f32], b: &[f32]) -> f64 {
+fn inner_product(a: &[f32], b: &[f32]) -> f64 {
     let mut sums = [0.0; LANES];
     for (a, b) in a.as_chunks::<LANES>().0.iter().zip(b.as_chunks::<LANES>().0) {
         (0..LANES).for_each(|j| sums[j] += f64::from(a[j]) * f64::from(b[j]));
