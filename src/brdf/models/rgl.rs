@@ -21,9 +21,8 @@
 //! only approximately: to some per cent at moderate angles, by factors up to 4 at 85 degrees.
 //!
 //! Channels of saturated colours are negative in places, since they are out of Rec. 709's gamut; these count as 0.
+use std::array;
 use std::f64::consts::{FRAC_1_PI, FRAC_2_PI};
-use std::iter::Sum;
-use std::ops::Mul;
 use std::sync::Arc;
 
 use glam::{DVec2, DVec3, Vec3, dvec2};
@@ -92,10 +91,26 @@ pub(crate) struct Warp {
     across_rows: Vec<f64>,
 }
 
+/// What the view alone decides.
+struct View<'a> {
+    tables: &'a RglTables,
+    /// See [`RglTables::to_measured_part`].
+    part: DVec3,
+    /// There.
+    w_o: DVec3,
+    /// The squares around it.
+    blend: Blend,
+    /// 4 sigma.
+    projected_area: f64,
+}
+
 impl Blend {
-    /// The mean of what is `at` each square.
-    fn mean<T: Mul<f64, Output = T> + Sum>(&self, at: impl Fn(usize) -> T) -> T {
-        self.squares[..self.count].iter().map(|&(square, weight)| at(square) * weight).sum()
+    /// The means of what is `at` each square.
+    fn mean<const N: usize>(&self, at: impl Fn(usize) -> [f64; N]) -> [f64; N] {
+        self.squares[..self.count].iter().fold([0.0; N], |sum, &(square, weight)| {
+            let values = at(square);
+            array::from_fn(|i| sum[i] + values[i] * weight)
+        })
     }
 }
 
@@ -134,10 +149,10 @@ impl Grid<Vec3> {
     /// Bilinear between nodes, linear between squares.
     fn at(&self, blend: &Blend, u: DVec2) -> DVec3 {
         let cell = self.cell(u);
-        blend.mean(|square| {
+        DVec3::from(blend.mean(|square| {
             let [a, b, c, d] = self.corners(square, &cell).map(Vec3::as_dvec3);
-            a.lerp(b, cell.inside.x).lerp(c.lerp(d, cell.inside.x), cell.inside.y)
-        })
+            a.lerp(b, cell.inside.x).lerp(c.lerp(d, cell.inside.x), cell.inside.y).into()
+        }))
     }
 }
 
@@ -169,18 +184,21 @@ impl Warp {
     fn invert(&self, blend: &Blend, u: DVec2) -> DVec2 {
         let [columns, rows] = self.density.size;
         let cell = self.density.cell(u);
-        let corner = |corner: usize| blend.mean(|square| f64::from(self.density.corners(square, &cell)[corner]));
-        let [low, high] = along_cell([corner(0), corner(1), corner(2), corner(3)], cell.inside.y);
+        let corners = blend.mean(|square| self.density.corners(square, &cell).map(f64::from));
+        let [low, high] = along_cell(corners, cell.inside.y);
 
-        let in_row = |node: usize| blend.mean(|square| self.along_rows[square * columns * rows + node]);
-        let before = lerp(in_row(cell.first), in_row(cell.first + columns), cell.inside.y);
-        let last = columns * (cell.row + 1) - 1;
-        let totals = [in_row(last), in_row(last + columns)];
-        let total = lerp(totals[0], totals[1], cell.inside.y);
+        // Of the two rows of the cell, up to it and in all; and of the rows before.
+        let [before, next_before, total, next_total, above] = blend.mean(|square| {
+            let row = &self.along_rows[square * columns * rows..];
+            let last = columns * (cell.row + 1) - 1;
+            let [before, total] = [cell.first, last].map(|node| [row[node], row[node + columns]]);
+            [before[0], before[1], total[0], total[1], self.across_rows[square * rows + cell.row]]
+        });
+        let before = lerp(before, next_before, cell.inside.y);
+        let y = above + integral_in_cell(total, next_total, cell.inside.y);
+        let total = lerp(total, next_total, cell.inside.y);
         // No normal is visible in a row without density, so any place in it is as good.
         let x = if total > 0.0 { (before + integral_in_cell(low, high, cell.inside.x)) / total } else { u.x };
-        let y = blend.mean(|square| self.across_rows[square * rows + cell.row])
-            + integral_in_cell(totals[0], totals[1], cell.inside.y);
         dvec2(x, y)
     }
 }
@@ -241,6 +259,16 @@ impl RglTables {
         }
     }
 
+    /// The view along `w_o`.
+    fn seen_from(&self, w_o: DVec3) -> View<'_> {
+        let part = self.to_measured_part(w_o);
+        let w_o = w_o * part;
+        let (theta_o, phi_o) = (theta(w_o), w_o.y.atan2(w_o.x));
+        let phi_a = if self.is_isotropic() { 0.0 } else { phi_o };
+        let projected_area = 4.0 * self.projected_area.at(in_square(theta_o, phi_a));
+        View { tables: self, part, w_o, blend: self.around(phi_o, theta_o), projected_area }
+    }
+
     /// The squares that were measured around an azimuth and an angle.
     fn around(&self, phi_a: f64, theta_a: f64) -> Blend {
         let mut blend = Blend { squares: [(0, 0.0); 4], count: 0 };
@@ -254,6 +282,34 @@ impl RglTables {
         }
         blend
     }
+}
+
+impl View<'_> {
+    fn evaluate(&self, w_i: DVec3) -> DVec3 {
+        let Self { tables, w_o, blend, .. } = self;
+        let w_i = w_i * self.part;
+        let h = (w_i + w_o).normalize();
+        let phi_h = match tables.is_isotropic() {
+            true => {
+                // Seen along the normal there is no plane of view, but values depend on its azimuth all the same, by what the measurement erred.
+                // It is the plane of x, where views have theirs that tables and threads are made for: so these go on evenly to the normal.
+                let plane = if w_o.truncate() == DVec2::ZERO { DVec2::X } else { w_o.truncate() };
+                plane.perp_dot(h.truncate()).atan2(plane.dot(h.truncate()))
+            }
+            false => h.y.atan2(h.x),
+        };
+        let u_h = in_square(theta(h), phi_h);
+        let mut value = tables.values.at(blend, tables.visible_normals.invert(blend, u_h)).max(DVec3::ZERO);
+        if tables.has_jacobian {
+            value *= tables.normals.at(u_h) / self.projected_area;
+        }
+        value / w_i.z.max(MIN_COS_THETA_I)
+    }
+}
+
+/// The point of the unit square that is a direction.
+fn in_square(theta: f64, phi: f64) -> DVec2 {
+    dvec2((theta * FRAC_2_PI).sqrt(), 0.5 + 0.5 * FRAC_1_PI * phi)
 }
 
 /// Those of `known` numbers, which ascend, that are next to `at`, and the weight of each; beyond the first and the last it is as there.
@@ -282,29 +338,12 @@ impl Model for Rgl {
     const HAS_PARAMETERS: bool = false;
 
     fn evaluate(&self, w_i: DVec3, w_o: DVec3) -> DVec3 {
-        let tables = &*self.tables;
-        let part = tables.to_measured_part(w_o);
-        let (w_i, w_o) = (w_i * part, w_o * part);
-        let h = (w_i + w_o).normalize();
-        let (theta_o, phi_o) = (theta(w_o), w_o.y.atan2(w_o.x));
-        let (phi_a, phi_h) = match tables.is_isotropic() {
-            true => {
-                // Seen along the normal there is no plane of view, but values depend on its azimuth all the same, by what the measurement erred.
-                // It is the plane of x, where views have theirs that tables and threads are made for: so these go on evenly to the normal.
-                let plane = if w_o.truncate() == DVec2::ZERO { DVec2::X } else { w_o.truncate() };
-                (0.0, plane.perp_dot(h.truncate()).atan2(plane.dot(h.truncate())))
-            }
-            false => (phi_o, h.y.atan2(h.x)),
-        };
-        let u = |theta: f64, phi: f64| dvec2((theta * FRAC_2_PI).sqrt(), 0.5 + 0.5 * FRAC_1_PI * phi);
-        let u_h = u(theta(h), phi_h);
+        self.tables.seen_from(w_o).evaluate(w_i)
+    }
 
-        let blend = tables.around(phi_o, theta_o);
-        let mut value = tables.values.at(&blend, tables.visible_normals.invert(&blend, u_h)).max(DVec3::ZERO);
-        if tables.has_jacobian {
-            value *= tables.normals.at(u_h) / (4.0 * tables.projected_area.at(u(theta_o, phi_a)));
-        }
-        value / w_i.z.max(MIN_COS_THETA_I)
+    fn evaluate_all(&self, w_i: &[DVec3], w_o: DVec3) -> Vec<DVec3> {
+        let view = self.tables.seen_from(w_o);
+        w_i.iter().map(|w_i| view.evaluate(*w_i)).collect()
     }
 
     fn is_reciprocal(&self) -> bool {

@@ -64,7 +64,7 @@ fn no_model_reflects_more_than_it_receives_but_by_the_known_excess() {
         .flat_map_iter(|(name, brdf)| {
             let most = KNOWN_EXCESS.iter().find(|(known, _)| name == known).map_or(1.0, |(_, most)| *most);
             [0.0, 30.0, 60.0, 75.0, 85.0, 89.0].into_iter().filter_map(move |theta_o_deg| {
-                let albedo = coarse_albedo(brdf, theta_o_deg, 0.0).max_element();
+                let albedo = brdf.albedo(f64::to_radians(theta_o_deg)).max_element();
                 (albedo.is_nan() || albedo > most + 1e-3).then(|| format!("{name} at {theta_o_deg}: {albedo:.4}"))
             })
         })
@@ -89,7 +89,7 @@ fn the_ends_of_ranges_reflect_more_than_they_receive_by_what_is_said() {
     ] {
         let brdf = samples::of_model(model, parameters);
         let angles = [50.0, 60.0, 70.0, 75.0, 80.0, 85.0, 87.0, 89.0, 89.5];
-        let albedos = angles.map(|theta_o_deg| coarse_albedo(&brdf, theta_o_deg, 0.0).max_element());
+        let albedos = angles.map(|theta_o_deg| brdf.albedo(f64::to_radians(theta_o_deg)).max_element());
         assert!(albedos.iter().all(|albedo| albedo.is_finite()), "{model}: {albedos:?}");
         let reached = albedos.into_iter().fold(0.0, f64::max);
         println!("{reached:.4}, said {most}, {model}: {parameters}");

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::*;
 use crate::brdf::base_files_of;
-use crate::brdf::tests::{coarse_albedo, direction, from_toml};
+use crate::brdf::tests::{direction, from_toml};
 use crate::brdf::{fresnel_dielectric, merl_bytes};
 
 fn read(text: &str) -> Result<Brdf> {
@@ -38,7 +38,7 @@ fn what_loses_nothing_reflects_all_light_under_a_clear_coat() {
         for (alpha, ior) in [(0.001, 1.0), (0.001, 1.5), (0.3, 1.5), (1.0, 1.5), (0.001, 2.5), (0.3, 2.5), (1.0, 2.5)] {
             let coated = under(base, alpha, ior);
             for theta_o_deg in VIEWS_DEG {
-                let albedo = coarse_albedo(&coated, theta_o_deg, 0.0).x;
+                let albedo = coated.albedo(f64::to_radians(theta_o_deg)).x;
                 assert!((0.98..1.001).contains(&albedo), "{base} {alpha} {ior} at {theta_o_deg}: {albedo}");
             }
         }
@@ -51,7 +51,7 @@ fn no_coat_makes_more_light_than_its_base_does() {
         let [bare, smooth, rough] = [(1.0, 1.0), (0.001, 1.5), (1.0, 2.5)].map(|(alpha, ior)| under(base, alpha, ior));
         for theta_o_deg in [0.0, 60.0, 85.0] {
             let [bare, smooth, rough] =
-                [&bare, &smooth, &rough].map(|brdf| coarse_albedo(brdf, theta_o_deg, 0.0).max_element());
+                [&bare, &smooth, &rough].map(|brdf| brdf.albedo(f64::to_radians(theta_o_deg)).max_element());
             assert!(smooth.max(rough) < bare.max(1.0) + 1e-3, "{base} at {theta_o_deg}: {bare} {smooth} {rough}");
         }
     }
@@ -64,7 +64,7 @@ fn a_base_that_makes_light_makes_no_more_of_it_under_a_coat() {
     for (alpha, ior) in [(0.001, 1.5), (1.0, 2.5)] {
         let coated = under(base, alpha, ior);
         for theta_o_deg in [0.0, 60.0, 85.0] {
-            let albedo = coarse_albedo(&coated, theta_o_deg, 0.0).x;
+            let albedo = coated.albedo(f64::to_radians(theta_o_deg)).x;
             assert!(albedo > 0.8 && albedo < bare, "{alpha} {ior} at {theta_o_deg}: {albedo}, without a coat {bare}");
         }
     }
@@ -77,7 +77,7 @@ fn brushed_metal_under_a_coat_makes_no_light_at_any_azimuth() {
         let base = format!("{{ model = 'conductor', {brushed}, rotation_deg = {rotation_deg} }}");
         let coated = under(&base, 0.05, 1.5);
         for theta_o_deg in [0.0, 60.0, 85.0] {
-            let albedo = coarse_albedo(&coated, theta_o_deg, 0.0).x;
+            let albedo = coated.albedo(f64::to_radians(theta_o_deg)).x;
             // Facets lose some light at each return.
             assert!((0.7..1.001).contains(&albedo), "{rotation_deg} at {theta_o_deg}: {albedo}");
         }
