@@ -19,9 +19,6 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// A picture is still moving for so long after the last motion: a scroll wheel has no release.
-const SETTLING: Duration = Duration::from_millis(150);
-
 /// Where there is no memory for a geometry cache of this size, there is none for pictures.
 const LEAST_SIDE: u32 = 64;
 
@@ -74,30 +71,9 @@ impl Viewer {
         self.handle(&Input::Set(Change::Size(area.width.max(1), area.height.max(1))));
     }
 
-    /// When a frame is due though nothing happens: none if nothing is.
-    pub fn next_frame(&self) -> Option<Instant> {
-        if self.turntable {
-            return Some(Instant::now());
-        }
-        let moved = self.last_motion.max(self.drafted);
-        moved.map(|last| last + SETTLING)
-    }
-
-    /// Whether the picture moves, and may be coarse. What `is_held` is being dragged.
-    pub(super) fn is_moving(&mut self, is_held: bool) -> bool {
-        for last in [&mut self.last_motion, &mut self.drafted] {
-            last.take_if(|last| last.elapsed() >= SETTLING);
-        }
-        is_held || self.last_motion.is_some() || self.drafted.is_some() || self.turntable
-    }
-
     /// Turns the turntable to where it is now.
-    pub(super) fn turn(&mut self) {
-        if !self.turntable {
-            return;
-        }
-        let now = Instant::now();
-        let seconds = self.last_turn.replace(now).map_or(0.0, |last| (now - last).as_secs_f64());
+    fn turn(&mut self) {
+        let Some(seconds) = self.motion.turned_s() else { return };
         if let Err(error) = self.move_camera(|orbit| orbit.turntable(seconds)) {
             self.tell_error(&error);
         }
@@ -120,7 +96,7 @@ impl Viewer {
         self.turn();
         let loaded = self.loaded.clone();
         let is_draft = loaded.as_ref().is_some_and(Loaded::is_draft);
-        let is_moving = self.is_moving(is_held) && !screenshot;
+        let is_moving = self.motion.is_moving(is_held) && !screenshot;
         let view = match &loaded {
             Some(loaded) => {
                 // The window scales it.
@@ -203,8 +179,8 @@ impl Viewer {
         files::check_writable(path)?;
         files::check_not_read([path], &self.session.wanted().files())?;
         let (path, scene) = (path.to_owned(), self.session.wanted().clone());
-        self.to_save.push(UnsavedPicture { path, scene, key: self.wanted });
-        self.save_finished(self.is_loading() || self.request_after_frame);
+        self.to_save.push(UnsavedPicture { path, scene, key: self.making.wanted });
+        self.save_finished(self.is_loading() || self.has_new_draft());
         if let Some(UnsavedPicture { path, .. }) = self.to_save.last() {
             self.tell(format!("{} is saved when its threads are finished", path.display()));
         }
@@ -218,7 +194,7 @@ impl Viewer {
             let UnsavedPicture { path, scene, key } = &unsaved;
             let result = match &loaded {
                 Some(loaded) if key.is_some() && loaded.key == *key => self.save_as(path, scene, loaded),
-                _ if is_coming && *key == self.wanted => {
+                _ if is_coming && *key == self.making.wanted => {
                     self.to_save.push(unsaved);
                     continue;
                 }

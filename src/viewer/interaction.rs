@@ -7,16 +7,16 @@ use super::history::History;
 use super::input::{DragAction, Dropped, Input, change_of_dropped};
 use super::keyboard;
 use super::latency::{Latency, Record};
-use super::latest_job::LatestJob;
-use super::loaded::{Loaded, Made};
+use super::loaded::Loaded;
+use super::making::Making;
 use super::measured::Measured;
+use super::motion::Motion;
 use super::orbit::{Orbit, environment_turn_deg};
 use super::plots::Plotter;
 use super::session::{Edit, Session};
 use crate::files;
 use crate::memo::{Key, Memo};
 use crate::passes::Area;
-use crate::pipeline::DeviceScene;
 use crate::prepare::{Prepared, view_of};
 use crate::scene::{Background, Scene, within};
 use crate::vulkan::Device;
@@ -42,7 +42,7 @@ pub(super) struct UnsavedPicture {
     pub(super) path: PathBuf,
     /// What was wanted when that was asked for.
     pub(super) scene: Scene,
-    /// What it is made of: [`Viewer::wanted`].
+    /// What it is made of: [`Making::wanted`].
     pub(super) key: Option<Key>,
 }
 
@@ -60,8 +60,8 @@ pub struct Viewer {
     pub failures: Vec<String>,
     /// What frames have shown of themselves.
     pub measured: Measured,
-    /// Whether the camera turns by itself.
-    pub turntable: bool,
+    /// What moves the picture.
+    pub motion: Motion,
     /// What the picture is compared with.
     pub comparer: Comparer,
     /// Plots of the material.
@@ -69,19 +69,7 @@ pub struct Viewer {
     /// Where the cursor is in the window, in pixels; none while it is elsewhere.
     pub cursor: Option<[f64; 2]>,
     pub(super) loaded: Option<Loaded>,
-    pub(super) loading: LatestJob<Made>,
-    /// Makes what drafts need before there is one.
-    pub(super) getting_ready: LatestJob<DeviceScene>,
-    /// Keeps that for them.
-    pub(super) ready: Option<DeviceScene>,
-    /// What is wanted is made of this; none where a file cannot be read.
-    pub(super) wanted: Option<Key>,
-    /// What was asked for last.
-    pub(super) requested: Option<Key>,
-    /// Since when a draft is being made of what was asked for last; none if it is there, or there is none.
-    pub(super) drafting_since: Option<Instant>,
-    /// Whether more may be wanted than the draft that the next frame shows. It is asked for then: making it now would hold that frame up.
-    pub(super) request_after_frame: bool,
+    pub(super) making: Making,
     /// Pictures that are to be saved when their threads are finished.
     pub(super) to_save: Vec<UnsavedPicture>,
     /// How long inputs wait to be seen.
@@ -96,10 +84,6 @@ pub struct Viewer {
     pub(super) longest_side: u32,
     /// Whether a frame has run the shader that shades what is loaded.
     pub(super) is_compiled: bool,
-    pub(super) last_motion: Option<Instant>,
-    /// When the draft that is shown came; none once that stands still.
-    pub(super) drafted: Option<Instant>,
-    pub(super) last_turn: Option<Instant>,
     #[cfg(feature = "hot-reload")]
     pub(super) shaders: super::shader_watch::ShaderWatch,
     pub(super) device: Arc<Device>,
@@ -110,7 +94,7 @@ impl Viewer {
     /// A viewer of `scene`, which begins to load. `wake` is called when there is something new to be drawn.
     pub fn new(scene: Scene, device: &Arc<Device>, memo: Memo, wake: impl Fn() + Send + Sync + 'static) -> Self {
         let wake = Arc::new(wake);
-        let (wake_too, wake_for_plots, wake_when_ready) = (wake.clone(), wake.clone(), wake.clone());
+        let (wake_when_made, wake_for_plots) = (wake.clone(), wake.clone());
         #[cfg(feature = "hot-reload")]
         let wake_for_shaders = wake.clone();
         let area = Area { left: 0, top: 0, width: scene.image.width, height: scene.image.height };
@@ -121,18 +105,12 @@ impl Viewer {
             notice: None,
             failures: Vec::new(),
             measured: Measured::default(),
-            turntable: false,
+            motion: Motion::default(),
             loaded: None,
-            comparer: Comparer::new(move || wake_too()),
+            comparer: Comparer::new(move || wake()),
             plotter: Plotter::new(move || wake_for_plots()),
             cursor: None,
-            loading: LatestJob::new("loading", move || wake()),
-            getting_ready: LatestJob::new("getting ready", move || wake_when_ready()),
-            ready: None,
-            wanted: None,
-            requested: None,
-            drafting_since: None,
-            request_after_frame: false,
+            making: Making::new(&wake_when_made),
             to_save: Vec::new(),
             latency: Latency::keeping(100),
             changes: 0,
@@ -141,9 +119,6 @@ impl Viewer {
             dynamic_resolution: DynamicResolution::default(),
             longest_side: device.limits().max_image_dimension2_d,
             is_compiled: false,
-            last_motion: None,
-            drafted: None,
-            last_turn: None,
             #[cfg(feature = "hot-reload")]
             shaders: super::shader_watch::ShaderWatch::new(move || wake_for_shaders()),
             device: device.clone(),
@@ -183,7 +158,7 @@ impl Viewer {
                     DragAction::Orbit => self.move_camera(|orbit| orbit.turn(by, rows)),
                     DragAction::Pan => self.move_camera(|orbit| orbit.pan(by, rows)),
                     DragAction::TurnEnvironment => {
-                        self.last_motion = Some(Instant::now());
+                        self.motion.moved();
                         let turned = self.session.wanted().environment.rotation_deg + environment_turn_deg(by.x, rows);
                         self.change(&Change::Rotation(turned.rem_euclid(360.0)))
                     }
@@ -251,8 +226,7 @@ impl Viewer {
             }
             "home" => self.change(&Change::Camera(None)),
             "t" => {
-                self.turntable = !self.turntable;
-                self.last_turn = None;
+                self.motion.toggle_turntable();
                 Ok(())
             }
             "b" => {
@@ -313,7 +287,7 @@ impl Viewer {
         let view = view_of(self.session.shown(), loaded.sphere)?;
         let mut orbit = Orbit::new(&view.camera, loaded.sphere);
         act(&mut orbit);
-        self.last_motion = Some(Instant::now());
+        self.motion.moved();
         self.change(&Change::Camera(Some(orbit.camera())))
     }
 

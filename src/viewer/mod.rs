@@ -7,6 +7,7 @@
 //! | what can be changed of a scene | [`change`] | pure |
 //! | the scene that is asked for, and the one that is seen | [`session`] | pure |
 //! | undo and redo | [`history`] | pure |
+//! | what moves the picture | [`motion`] | pure |
 //! | how coarse a moving picture is | [`dynamic_resolution`] | pure |
 //! | loading and making in the background | [`latest_job`] | threads |
 //! | another picture of the same view, and the difference | [`comparison`] | |
@@ -38,6 +39,7 @@ pub mod latest_job;
 pub mod loaded;
 mod making;
 pub mod measured;
+pub mod motion;
 pub mod orbit;
 mod panel;
 pub mod plots;

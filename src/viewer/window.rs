@@ -297,7 +297,7 @@ impl Open {
         // A window without area is drawn when it has one.
         if !size.contains(&0) {
             match &drawn {
-                Some(_) => self.viewer.next_frame().into_iter().for_each(|next| self.due_at(next)),
+                Some(_) => self.viewer.motion.next_frame().into_iter().for_each(|next| self.due_at(next)),
                 None => self.due_at(Instant::now() + RETRY),
             }
         }
@@ -341,7 +341,7 @@ impl Open {
         let Some(input) = self.script.replay.front().cloned() else { return Ok(false) };
         let waits = match &input {
             // A turntable always has a next frame.
-            Input::Wait => self.viewer.is_busy() || (self.due.is_some() && !self.viewer.turntable),
+            Input::Wait => self.viewer.is_busy() || (self.due.is_some() && !self.viewer.motion.turntable),
             // What comes next is not to change it.
             Input::SavePicture(_) => self.viewer.is_loading(),
             _ => false,

@@ -3,6 +3,7 @@ use std::path::{Path, PathBuf};
 
 use glam::{DVec3, Vec3};
 
+use crate::brdf::merl_bytes_of_stored;
 use crate::environment::{Environment, RepairCounts};
 use crate::error::{Error, Result};
 use crate::scene::{
@@ -47,12 +48,7 @@ impl Case {
     /// A measured table of these values, by angle of the half vector, difference angle and azimuth, in bins.
     fn table(folder: &Path, name: &str, value: impl Fn([usize; 3]) -> f64 + 'static) -> Self {
         let path = folder.join("table.binary");
-        let bytes = move || {
-            let plane: Vec<_> =
-                (0..90 * 90 * 180).map(|cell| value([cell / 180 / 90, cell / 180 % 90, cell % 180])).collect();
-            let header = [90_i32, 90, 180].into_iter().flat_map(i32::to_le_bytes);
-            header.chain((0..3).flat_map(|_| plane.iter().flat_map(|value| value.to_le_bytes()))).collect()
-        };
+        let bytes = move || merl_bytes_of_stored(|cell| [value(cell); 3]);
         let case = Self::scene(name, |scene| scene.use_material("m", MaterialSource::File(path.clone())));
         Self { file: Some((path, Box::new(bytes))), is_slow: true, ..case }
     }

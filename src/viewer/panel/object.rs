@@ -37,7 +37,7 @@ impl State {
                 if reset.clicked() {
                     inputs.push(Input::Key("home".to_owned()));
                 }
-                let turn = ui.selectable_label(viewer.turntable, "turntable");
+                let turn = ui.selectable_label(viewer.motion.turntable, "turntable");
                 if turn.on_hover_text("Turns the camera around the objects, once in 20 s: T").clicked() {
                     inputs.push(Input::Key("t".to_owned()));
                 }
