@@ -22,7 +22,7 @@ use crate::threads::{ThreadKind, ThreadSettings};
 
 /// Steps of the first row, which starts from cells, and of the others.
 const FIRST: Effort = Effort { steps: 300, least_gain: 1e-5 };
-const NEXT: Effort = Effort { steps: 40, least_gain: 3e-3 };
+const NEXT: Effort = Effort { steps: 40, least_gain: 1e-2 };
 
 /// All rows have the same lights where these are not placed by the slice: threads follow the BRDF, not the lights.
 const LIGHTS_SEED: usize = 0;

@@ -21,12 +21,12 @@ pub struct Effort {
     pub least_gain: f64,
 }
 
-/// The damping of the first step of a row, and by how much it changes where a step is good and where it is not: the usual ones. Beyond the most
-/// steps are so short that none is good.
-const FIRST_DAMPING: f32 = 1e-3;
-const DAMPING_FALLS: f32 = 0.2;
-const DAMPING_RISES: f32 = 5.0;
+/// The damping of the first step. Beyond the most, steps are so short that none is good.
+const FIRST_DAMPING: f32 = 1e-2;
 const MOST_DAMPING: f32 = 1e6;
+/// By how much it rises after the first step that is not good, and twice as much after each other one in a row: as in (2.21), see
+/// [`change_of_damping`].
+const FIRST_RISE: f32 = 2.0;
 /// Less would be lost in the rounding of the products.
 const LEAST_DAMPING: f32 = 1e-6;
 
@@ -36,6 +36,14 @@ const LEAST_DIAGONAL: f32 = 1e-12;
 
 /// Steps to the best weights: the first is exact but for weights that would be negative and for what rounding makes of kernels that are alike.
 const WEIGHT_STEPS: usize = 4;
+
+/// A step of a fit.
+struct Step {
+    /// Where it leads.
+    kernels: Vec<Kernel>,
+    /// By how much the cost falls if answers are linear, and no bound is met.
+    promised: f64,
+}
 
 /// What kernels leave.
 struct Rest {
@@ -324,6 +332,8 @@ impl<'a> Fit<'a> {
     /// Cancelled by `observer` (noticed within a step: a tenth of a second for the most threads that there can be).
     pub fn solve(&self, kernels: &mut Vec<Kernel>, effort: Effort, observer: &dyn Observer) -> Result<()> {
         let mut damping = FIRST_DAMPING;
+        // By how much it rises where a step is not good.
+        let mut rise = FIRST_RISE;
         let mut tried = 0;
         let mut answers = Answers::new(kernels, self.lights);
         let mut next_answers = answers.clone();
@@ -336,16 +346,19 @@ impl<'a> Fit<'a> {
             loop {
                 observer.check()?;
                 tried += 1;
-                let next = step(kernels, &levels, &hessian, &gradient, damping);
+                let Step { kernels: next, promised } = step(kernels, &levels, &hessian, &gradient, damping);
                 next_answers.replace(&next, self.lights);
                 let next_rest = self.rest(&next, &next_answers);
                 if next_rest.cost < rest.cost {
+                    let kept = ((rest.cost - next_rest.cost) / promised) as f32;
                     (*kernels, rest) = (next, next_rest);
                     swap(&mut answers, &mut next_answers);
-                    damping = (DAMPING_FALLS * damping).max(LEAST_DAMPING);
+                    damping = (damping * change_of_damping(kept)).max(LEAST_DAMPING);
+                    rise = FIRST_RISE;
                     break;
                 }
-                damping *= DAMPING_RISES;
+                damping *= rise;
+                rise *= 2.0;
                 if tried >= effort.steps || damping > MOST_DAMPING {
                     return Ok(());
                 }
@@ -442,8 +455,16 @@ fn products(columns: &[f32], length: usize) -> Mat<f32> {
     products
 }
 
+/// By how much the damping changes after a good step, by which part of what was promised it has kept: Madsen, Nielsen and Tingleff, "Methods for
+/// Non-Linear Least Squares Problems" (2004), equation (2.21). It falls to a third where a step keeps all, stays where it keeps half, and doubles where
+/// it keeps next to nothing.
+fn change_of_damping(kept: f32) -> f32 {
+    // Rounding may leave a promise below zero.
+    (1.0 - (2.0 * kept.max(0.0) - 1.0).powi(3)).max(1.0 / 3.0)
+}
+
 /// The step of damped normal equations (F24), within bounds: a weight at zero that would fall stays there, and levels are bounded by `levels`.
-fn step(kernels: &[Kernel], levels: &[[f64; 2]], hessian: &Mat<f32>, gradient: &[f32], damping: f32) -> Vec<Kernel> {
+fn step(kernels: &[Kernel], levels: &[[f64; 2]], hessian: &Mat<f32>, gradient: &[f32], damping: f32) -> Step {
     let m = kernels.len();
     let mut matrix = hessian.clone();
     let mut right = Mat::from_fn(6 * m, 1, |i, _| -gradient[i]);
@@ -460,9 +481,11 @@ fn step(kernels: &[Kernel], levels: &[[f64; 2]], hessian: &Mat<f32>, gradient: &
         // Kernels without weight have no gradient in direction and level: they stay where they are.
         1e-10 * largest / (scale_rad(kernels[k].level) as f32).powi(2)
     };
+    let damped = |i: usize| {
+        damping * hessian[(i, i)] + if i < 3 * m { LEAST_DIAGONAL * largest } else { floor((i - 3 * m) / 3) }
+    };
     for i in 0..6 * m {
-        matrix[(i, i)] +=
-            damping * hessian[(i, i)] + if i < 3 * m { LEAST_DIAGONAL * largest } else { floor((i - 3 * m) / 3) };
+        matrix[(i, i)] += damped(i);
         if frozen(i) {
             (0..i).for_each(|j| matrix[(i, j)] = 0.0);
             matrix.col_as_slice_mut(i)[i..].fill(0.0);
@@ -470,10 +493,13 @@ fn step(kernels: &[Kernel], levels: &[[f64; 2]], hessian: &Mat<f32>, gradient: &
             right[(i, 0)] = 0.0;
         }
     }
-    let Ok(factor) = Llt::new(matrix.as_ref(), Side::Lower) else { return kernels.to_vec() };
+    let Ok(factor) = Llt::new(matrix.as_ref(), Side::Lower) else {
+        return Step { kernels: kernels.to_vec(), promised: 0.0 };
+    };
     let change = factor.solve(&right);
     let change = |i: usize| f64::from(change[(i, 0)]);
-    kernels
+    let promised = (0..6 * m).map(|i| change(i) * (f64::from(damped(i)) * change(i) + f64::from(right[(i, 0)]))).sum();
+    let kernels = kernels
         .iter()
         .enumerate()
         .map(|(k, kernel)| {
@@ -490,5 +516,6 @@ fn step(kernels: &[Kernel], levels: &[[f64; 2]], hessian: &Mat<f32>, gradient: &
                 weight: (kernel.weight + weight).max(DVec3::ZERO),
             }
         })
-        .collect()
+        .collect();
+    Step { kernels, promised }
 }
