@@ -179,7 +179,7 @@ impl Viewer {
         files::check_writable(path)?;
         files::check_not_read([path], &self.session.wanted().files())?;
         let (path, scene) = (path.to_owned(), self.session.wanted().clone());
-        self.to_save.push(UnsavedPicture { path, scene, key: self.making.wanted });
+        self.to_save.push(UnsavedPicture { path, scene, key: self.requests.wanted });
         self.save_finished(self.is_loading() || self.has_new_draft());
         if let Some(UnsavedPicture { path, .. }) = self.to_save.last() {
             self.tell(format!("{} is saved when its threads are finished", path.display()));
@@ -194,7 +194,7 @@ impl Viewer {
             let UnsavedPicture { path, scene, key } = &unsaved;
             let result = match &loaded {
                 Some(loaded) if key.is_some() && loaded.key == *key => self.save_as(path, scene, loaded),
-                _ if is_coming && *key == self.making.wanted => {
+                _ if is_coming && *key == self.requests.wanted => {
                     self.to_save.push(unsaved);
                     continue;
                 }

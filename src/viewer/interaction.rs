@@ -8,11 +8,11 @@ use super::input::{DragAction, Dropped, Input, change_of_dropped};
 use super::keyboard;
 use super::latency::{Latency, Record};
 use super::loaded::Loaded;
-use super::making::Making;
 use super::measured::Measured;
 use super::motion::Motion;
 use super::orbit::{Orbit, environment_turn_deg};
 use super::plots::Plotter;
+use super::requests::Requests;
 use super::session::{Edit, Session};
 use crate::files;
 use crate::memo::{Key, Memo};
@@ -42,7 +42,7 @@ pub(super) struct UnsavedPicture {
     pub(super) path: PathBuf,
     /// What was wanted when that was asked for.
     pub(super) scene: Scene,
-    /// What it is made of: [`Making::wanted`].
+    /// What it is made of: [`Requests::wanted`].
     pub(super) key: Option<Key>,
 }
 
@@ -69,7 +69,7 @@ pub struct Viewer {
     /// Where the cursor is in the window, in pixels; none while it is elsewhere.
     pub cursor: Option<[f64; 2]>,
     pub(super) loaded: Option<Loaded>,
-    pub(super) making: Making,
+    pub(super) requests: Requests,
     /// Pictures that are to be saved when their threads are finished.
     pub(super) to_save: Vec<UnsavedPicture>,
     /// How long inputs wait to be seen.
@@ -110,7 +110,7 @@ impl Viewer {
             comparer: Comparer::new(move || wake()),
             plotter: Plotter::new(move || wake_for_plots()),
             cursor: None,
-            making: Making::new(&wake_when_made),
+            requests: Requests::new(&wake_when_made),
             to_save: Vec::new(),
             latency: Latency::keeping(100),
             changes: 0,

@@ -1,56 +1,22 @@
 //! What the session asks for, made in the background: by drafts first where a parameter is dragged.
 use super::change::Change;
 use super::interaction::Viewer;
-use super::latest_job::{LatestJob, Progress, Task};
+use super::latest_job::{Progress, Task};
 use super::loaded::{Loaded, Made};
 use super::session::Edit;
-use crate::memo::{Key, Round};
+use crate::memo::Round;
 use crate::pipeline::{DeviceScene, Wanted};
 use crate::prepare::{Prepared, can_draft, key_of, may_be_drafted, prepare, prepare_draft};
 #[cfg(feature = "hot-reload")]
 use crate::progress::Observer;
 use crate::steps::{LoadEnvironment, LoadMaterial, LoadMesh};
 use crate::{Error, Result};
-use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// Frames wait for a draft so long at most.
 const DRAFT_PATIENCE: Duration = Duration::from_millis(100);
 /// Threads are finished when nobody has asked for others for so long: what is dragged moves more often.
 const BEFORE_FINISHING: Duration = Duration::from_millis(100);
-
-/// What is being made.
-pub(super) struct Making {
-    loading: LatestJob<Made>,
-    /// Makes what drafts need before there is one.
-    getting_ready: LatestJob<DeviceScene>,
-    /// Keeps that for them.
-    ready: Option<DeviceScene>,
-    /// What is wanted is made of this; none where a file cannot be read.
-    pub(super) wanted: Option<Key>,
-    /// What was asked for last.
-    requested: Option<Key>,
-    /// Since when a draft is being made of what was asked for last; none if it is there, or there is none.
-    drafting_since: Option<Instant>,
-    /// Whether more may be wanted than the draft that the next frame shows. It is asked for then: making it now would hold that frame up.
-    request_after_frame: bool,
-}
-
-impl Making {
-    /// Nothing is being made yet. `wake` is called when there is something new to be drawn.
-    pub(super) fn new(wake: &Arc<impl Fn() + Send + Sync + 'static>) -> Self {
-        let [wake_when_loaded, wake_when_ready] = [wake.clone(), wake.clone()];
-        Self {
-            loading: LatestJob::new("loading", move || wake_when_loaded()),
-            getting_ready: LatestJob::new("getting ready", move || wake_when_ready()),
-            ready: None,
-            wanted: None,
-            requested: None,
-            drafting_since: None,
-            request_after_frame: false,
-        }
-    }
-}
 
 /// Whether all files and names that `edit` brings in can be loaded.
 fn can_be_loaded(edit: &Edit, round: &Round) -> bool {
@@ -73,34 +39,34 @@ fn can_be_loaded(edit: &Edit, round: &Round) -> bool {
 impl Viewer {
     /// How far the loading of what is wanted is.
     pub fn progress(&self) -> Option<Progress> {
-        self.making.loading.progress()
+        self.requests.loading.progress()
     }
 
     /// Whether something is being loaded or made that frames wait for.
     pub fn is_loading(&self) -> bool {
-        self.making.loading.is_busy()
+        self.requests.loading.is_busy()
     }
 
     /// Until when frames wait for the draft that is being made, if one is: where a slider is and what it asks for are shown together.
     pub fn draft_awaited_until(&self) -> Option<Instant> {
-        self.making.drafting_since.map(|since| since + DRAFT_PATIENCE)
+        self.requests.drafting_since.map(|since| since + DRAFT_PATIENCE)
     }
 
     /// A frame was drawn of what was loaded: what was wanted meanwhile is asked for.
     pub fn frame_was_drawn(&mut self) {
-        if std::mem::take(&mut self.making.request_after_frame) {
+        if std::mem::take(&mut self.requests.request_after_frame) {
             self.request();
         }
     }
 
     /// Whether the next frame shows a draft that no frame has shown yet.
     pub fn has_new_draft(&self) -> bool {
-        self.making.request_after_frame
+        self.requests.request_after_frame
     }
 
     /// Whether anything is made in the background.
     pub fn is_busy(&self) -> bool {
-        self.is_loading() || self.making.getting_ready.is_busy() || self.comparer.is_busy() || self.plotter.is_busy()
+        self.is_loading() || self.requests.getting_ready.is_busy() || self.comparer.is_busy() || self.plotter.is_busy()
     }
 
     /// Asks for what is wanted, if that is another than what was asked for last: for a draft of it first, where that can be.
@@ -108,8 +74,8 @@ impl Viewer {
         let scene = self.session.wanted().clone();
         // Where a file cannot be read there is no key, and asking for it tells why.
         let key = key_of(&scene, &self.memo).ok();
-        self.making.wanted = key;
-        if key.is_some() && self.making.requested == key {
+        self.requests.wanted = key;
+        if key.is_some() && self.requests.requested == key {
             // Files that were read for their key alone are not asked for.
             self.memo.let_go_of_files();
             if self.is_wanted(self.loaded.as_ref()) {
@@ -119,12 +85,12 @@ impl Viewer {
         }
         let before = self.loaded.as_ref().map(|loaded| loaded.prepared.clone());
         let before = before.filter(|before| can_draft(&scene, before));
-        if before.is_some() && (self.making.drafting_since.is_some() || self.making.request_after_frame) {
+        if before.is_some() && (self.requests.drafting_since.is_some() || self.requests.request_after_frame) {
             // The draft that is being made is shown first: else one that moves would never be seen.
             return;
         }
-        (self.making.requested, self.making.drafting_since) = (key, before.is_some().then(Instant::now));
-        self.making.getting_ready.cancel();
+        (self.requests.requested, self.requests.drafting_since) = (key, before.is_some().then(Instant::now));
+        self.requests.getting_ready.cancel();
         let (device, memo) = (self.device.clone(), self.memo.clone());
         let (longest_side, change) = (self.longest_side, self.changes);
         self.load(move |task| {
@@ -143,13 +109,13 @@ impl Viewer {
 
     /// Whether frames of what is `loaded` are of what is wanted.
     pub(super) fn is_wanted(&self, loaded: Option<&Loaded>) -> bool {
-        loaded.is_some_and(|loaded| loaded.key.is_some() && loaded.key == self.making.wanted)
+        loaded.is_some_and(|loaded| loaded.key.is_some() && loaded.key == self.requests.wanted)
     }
 
     /// Has `make` done in the background. Where that fails, so is finding out which edits are at fault: it may read large files again.
     fn load(&self, make: impl FnOnce(&Task<Made>) -> Result<Loaded> + Send + 'static) {
         let (memo, mut edits) = (self.memo.clone(), self.session.pending());
-        self.making.loading.request(move |task| {
+        self.requests.loading.request(move |task| {
             Ok(make(task).map_err(|error| {
                 // One that is alone is taken back whatever is at fault.
                 if edits.len() > 1 {
@@ -166,7 +132,7 @@ impl Viewer {
     pub(super) fn reload_shaders(&mut self) {
         let scene = self.session.wanted().clone();
         let (key, change) = (key_of(&scene, &self.memo).ok(), self.changes);
-        (self.making.requested, self.making.drafting_since) = (key, None);
+        (self.requests.requested, self.requests.drafting_since) = (key, None);
         let (device, memo, longest_side) = (self.device.clone(), self.memo.clone(), self.longest_side);
         self.load(move |task| {
             Observer::begin(task, "shaders");
@@ -179,14 +145,14 @@ impl Viewer {
     /// Begins to make what drafts of what is `loaded` look up and are shaded by, if there can be any: else the first one of a drag would wait
     /// for it.
     fn get_ready_for_drafts(&mut self, loaded: &Loaded) {
-        self.making.ready = None;
+        self.requests.ready = None;
         if !may_be_drafted(&loaded.prepared) {
             return;
         }
         let view = loaded.prepared.view.clone().fit(self.longest_side);
         let draft = Prepared { is_draft: true, view, ..(*loaded.prepared).clone() };
         let (device, memo) = (self.device.clone(), self.memo.clone());
-        self.making.getting_ready.request(move |task| {
+        self.requests.getting_ready.request(move |task| {
             let device_scene = DeviceScene::new(&device, &draft, &memo.round(task))?;
             // Drivers may compile a shader where it first runs, and for the sizes that it meets.
             device_scene.render(Wanted::default(), 1)?;
@@ -203,17 +169,17 @@ impl Viewer {
         if self.shaders.take() {
             self.reload_shaders();
         }
-        if let Some(ready) = self.making.getting_ready.take() {
+        if let Some(ready) = self.requests.getting_ready.take() {
             // Where it cannot be made, drafts will tell.
-            self.making.ready = ready.ok();
+            self.requests.ready = ready.ok();
         }
         let mut is_new = self.comparer.take().unwrap_or_else(|error| {
             self.tell_error(&error);
             true
         });
-        while let Some(result) = self.making.loading.take() {
+        while let Some(result) = self.requests.loading.take() {
             is_new = true;
-            let was_drafting = self.making.drafting_since.take().is_some();
+            let was_drafting = self.requests.drafting_since.take().is_some();
             match result.unwrap_or_else(|error| Err((error, Vec::new()))) {
                 Ok(loaded) => {
                     // What was wanted since may be the same, from files of other names.
@@ -225,7 +191,7 @@ impl Viewer {
                     let before = self.loaded.replace(loaded.clone());
                     self.is_compiled &=
                         before.is_some_and(|before| before.device_scene.shades_as(&loaded.device_scene));
-                    self.making.request_after_frame |= was_drafting;
+                    self.requests.request_after_frame |= was_drafting;
                     self.motion.loaded(loaded.is_draft());
                     if !loaded.is_draft() {
                         self.get_ready_for_drafts(&loaded);
@@ -268,7 +234,7 @@ impl Viewer {
         }
         // A draft is still to be finished.
         let finished = self.loaded.as_ref().filter(|loaded| !loaded.is_draft());
-        self.making.requested = finished.and_then(|loaded| loaded.key);
+        self.requests.requested = finished.and_then(|loaded| loaded.key);
         self.request();
     }
 }
@@ -276,8 +242,7 @@ impl Viewer {
 impl Drop for Viewer {
     fn drop(&mut self) {
         // All work is told to end before the first is waited for.
-        self.making.loading.close();
-        self.making.getting_ready.close();
+        self.requests.close();
         self.comparer.close();
         self.plotter.close();
     }
@@ -339,7 +304,7 @@ mod tests {
         viewer.change(&Change::Material(MaterialSource::File(material))).unwrap();
         let start = Instant::now();
         let made = loop {
-            if let Some(made) = viewer.making.loading.take() {
+            if let Some(made) = viewer.requests.loading.take() {
                 break made.unwrap();
             }
             assert!(start.elapsed() < Duration::from_secs(60), "it has not failed");

@@ -16,6 +16,7 @@
 //! | plots of the material | [`plots`] | threads |
 //! | what frames have shown of themselves | [`measured`] | pure |
 //! | how long inputs wait to be seen | [`latency`] | pure |
+//! | what was asked for and is being made | `requests` | threads |
 //! | what inputs do | [`interaction`] | |
 //! | what is made for them | `making` | |
 //! | the frames that follow | `drawing` | |
@@ -45,6 +46,7 @@ mod panel;
 pub mod plots;
 mod pointer;
 pub mod presenter;
+mod requests;
 pub mod session;
 #[cfg(feature = "hot-reload")]
 mod shader_watch;

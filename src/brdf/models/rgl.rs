@@ -100,7 +100,7 @@ struct View<'a> {
     w_o: DVec3,
     /// The squares around it.
     blend: Blend,
-    /// 4 sigma.
+    /// sigma.
     projected_area: f64,
 }
 
@@ -188,10 +188,10 @@ impl Warp {
         let [low, high] = along_cell(corners, cell.inside.y);
 
         // Of the two rows of the cell, up to it and in all; and of the rows before.
+        let last = columns * (cell.row + 1) - 1;
         let [before, next_before, total, next_total, above] = blend.mean(|square| {
-            let row = &self.along_rows[square * columns * rows..];
-            let last = columns * (cell.row + 1) - 1;
-            let [before, total] = [cell.first, last].map(|node| [row[node], row[node + columns]]);
+            let sums = &self.along_rows[square * columns * rows..];
+            let [before, total] = [cell.first, last].map(|node| [sums[node], sums[node + columns]]);
             [before[0], before[1], total[0], total[1], self.across_rows[square * rows + cell.row]]
         });
         let before = lerp(before, next_before, cell.inside.y);
@@ -265,7 +265,7 @@ impl RglTables {
         let w_o = w_o * part;
         let (theta_o, phi_o) = (theta(w_o), w_o.y.atan2(w_o.x));
         let phi_a = if self.is_isotropic() { 0.0 } else { phi_o };
-        let projected_area = 4.0 * self.projected_area.at(in_square(theta_o, phi_a));
+        let projected_area = self.projected_area.at(in_square(theta_o, phi_a));
         View { tables: self, part, w_o, blend: self.around(phi_o, theta_o), projected_area }
     }
 
@@ -301,7 +301,7 @@ impl View<'_> {
         let u_h = in_square(theta(h), phi_h);
         let mut value = tables.values.at(blend, tables.visible_normals.invert(blend, u_h)).max(DVec3::ZERO);
         if tables.has_jacobian {
-            value *= tables.normals.at(u_h) / self.projected_area;
+            value *= tables.normals.at(u_h) / (4.0 * self.projected_area);
         }
         value / w_i.z.max(MIN_COS_THETA_I)
     }
