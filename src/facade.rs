@@ -100,6 +100,7 @@ impl Renderer {
         let round = self.memo.round(observer);
         let prepared = prepare(scene, &round)?;
         let rendering = if prepared.method == Method::Reference {
+            self.last = None;
             reference(&prepared, &self.device, &ReferenceSettings::default(), &round)?.rendering(&prepared)
         } else {
             let on_device = DeviceScene::new(&self.device, &prepared, &round)?;

@@ -29,7 +29,7 @@ pub mod passes;
 pub mod picture;
 #[path = "pipeline.rs"]
 pub mod pipeline;
-#[path = "prepare.rs"]
+#[path = "prepare/mod.rs"]
 pub mod prepare;
 #[path = "progress.rs"]
 pub mod progress;

@@ -2,7 +2,7 @@
 use crate::Result;
 use crate::graph::{BufferHandle, Executable, FrameGraph, ImageHandle};
 use crate::light::finest_level;
-use crate::memo::{Held, Round};
+use crate::memo::{Held, Keyed, Round};
 use crate::passes::*;
 use crate::prepare::{NamedMesh, Prepared};
 use crate::progress::Observer;
@@ -13,7 +13,7 @@ use crate::steps::{
     CheckDevice, CompileCompute, CompileGeometryCache, KeyedMaterial, UploadBackground, UploadIrradiance, UploadLight,
     UploadMaterials, UploadMesh, UploadShaders, light, pipelines,
 };
-use crate::vulkan::{Device, Frames, PassTime, compiled};
+use crate::vulkan::{ComputePipeline, Device, Frames, PassTime, Shader, compiled};
 use std::sync::Arc;
 
 /// Which results of a frame are wanted; what none of them needs is not computed.
@@ -102,20 +102,8 @@ impl DeviceScene {
         let irradiance = light.blurred.as_ref().map(|light| round.ask(&UploadIrradiance { device, light, way_around }));
         let irradiance = irradiance.transpose()?;
         let light = round.ask(&UploadLight { device, method, environment, light: &light, way_around })?;
-        let background_shader =
-            if prepared.show_environment { &compiled::BACKGROUND } else { &compiled::CLEAR_UNCOVERED };
-        let around = [
-            (&compiled::CLASSIFY, classify_constants(prepared, &shaders)),
-            (background_shader, vec![]),
-            (&compiled::TONE_MAP, vec![]),
-        ];
-        let of_classes = shaders.constants_of_classes().map(|constants| (shader, constants));
-        // Compiling takes long: so all are asked for at once, and are compiled on several cores.
-        let all: Vec<_> = around.into_iter().chain(of_classes).collect();
-        let all: Vec<_> = all.iter().map(|(shader, constants)| CompileCompute { device, shader, constants }).collect();
-        let mut pipelines = round.ask_all(&all)?.into_iter();
-        let mut next = || pipelines.next().expect("as many as were asked for");
-        let [classify, background, tone_map] = [next(), next(), next()];
+        let Pipelines { classify, background, tone_map, shade } =
+            ask_pipelines(device, prepared, shader, &shaders, round)?;
         let background = match prepared.show_environment {
             true => Background::Environment {
                 pipeline: background,
@@ -133,7 +121,7 @@ impl DeviceScene {
                 shader_count: shaders.constants.len() as u32,
                 shader_of_mixed: shaders.of_mixed,
             },
-            shade: Shade { pipelines: pipelines.collect(), materials, light, irradiance, sampling, method },
+            shade: Shade { pipelines: shade, materials, light, irradiance, sampling, method },
             background,
             tone_map: ToneMap { pipeline: tone_map },
             way_around,
@@ -161,7 +149,7 @@ impl DeviceScene {
     /// Renders the frame `repeat` times and reads back what is `wanted`.
     ///
     /// # Errors
-    /// Whatever Vulkan refuses.
+    /// A view that is larger than the device can do; whatever Vulkan refuses.
     pub fn render(&self, wanted: Wanted, repeat: u32) -> Result<Rendering> {
         self.render_watched(wanted, repeat, &())
     }
@@ -171,6 +159,9 @@ impl DeviceScene {
     /// # Errors
     /// As there; [`Error::Cancelled`](crate::Error::Cancelled).
     pub fn render_watched(&self, wanted: Wanted, repeat: u32, observer: &dyn Observer) -> Result<Rendering> {
+        let View { width, height, .. } = self.view;
+        check_cache_size(&self.device, self.view.cache_size())?;
+        check_lists(&self.device, [width, height], self.classify.shader_count as usize)?;
         let mut graph = FrameGraph::new();
         let region = match wanted.geometry {
             true => Region::whole(&self.view, self.classify.tile_px()),
@@ -180,7 +171,6 @@ impl DeviceScene {
         let mut readbacks = Readbacks::new(&self.device, graph);
         let counters = readbacks.buffer("counters", frame.counters, size_of::<Counters>() as u64)?;
         let lookups = readbacks.buffer("lookups", frame.lookups, size_of::<u64>() as u64)?;
-        let View { width, height, .. } = self.view;
         let radiance = readbacks.image("radiance", frame.radiance, [width, height], 16, wanted.radiance)?;
         let display = readbacks.image("display", frame.display, [width, height], 4, wanted.display)?;
         let geometry = readbacks.image("geometry", frame.geometry, self.view.cache_size(), 8, wanted.geometry)?;
@@ -213,6 +203,38 @@ impl DeviceScene {
             way_around: self.way_around,
         })
     }
+}
+
+/// What computes a frame.
+struct Pipelines {
+    classify: Keyed<ComputePipeline>,
+    background: Keyed<ComputePipeline>,
+    tone_map: Keyed<ComputePipeline>,
+    /// For each class of pixels.
+    shade: Vec<Keyed<ComputePipeline>>,
+}
+
+/// Compiling takes long: so all are asked for at once, and are compiled on several cores.
+fn ask_pipelines(
+    device: &Arc<Device>,
+    prepared: &Prepared,
+    shade: &'static Shader,
+    shaders: &ShadersOfMaterials,
+    round: &Round,
+) -> Result<Pipelines> {
+    let background = if prepared.show_environment { &compiled::BACKGROUND } else { &compiled::CLEAR_UNCOVERED };
+    let around = [
+        (&compiled::CLASSIFY, classify_constants(prepared, shaders)),
+        (background, vec![]),
+        (&compiled::TONE_MAP, vec![]),
+    ];
+    let of_classes = shaders.constants_of_classes().map(|constants| (shade, constants));
+    let all: Vec<_> = around.into_iter().chain(of_classes).collect();
+    let all: Vec<_> = all.iter().map(|(shader, constants)| CompileCompute { device, shader, constants }).collect();
+    let mut asked = round.ask_all(&all)?;
+    let shade = asked.split_off(3);
+    let [classify, background, tone_map] = asked.try_into().unwrap_or_else(|_| unreachable!("three were split off"));
+    Ok(Pipelines { classify, background, tone_map, shade })
 }
 
 /// The pass that draws the objects of `prepared`, where the geometry cache of its view is within what `device` can do.

@@ -17,6 +17,7 @@ use crate::files::{FileKind, read, toml_problem};
 
 mod base;
 mod builtin;
+mod cosines;
 mod files;
 mod lobe;
 mod made_table;
@@ -217,8 +218,7 @@ impl Brdf {
     /// points.
     pub fn albedo_from(&self, theta_o: f64, phi_o: f64) -> DVec3 {
         // A ring crosses an ellipse within its ratio in radians. GGX then leaves an error of 2 e^(-ratio phi_steps).
-        let narrowness = if self.is_isotropic() { 1.0 } else { LobeShape::of(self).narrowness };
-        let least_phi_steps = (8.0 / narrowness).ceil() as usize;
+        let least_phi_steps = (8.0 / lobe::narrowness(self)).ceil() as usize;
         let in_steps = |halvings: u32| {
             let [theta_steps, phi_steps] = ALBEDO_STEPS.map(|steps| steps << halvings);
             self.albedo_in_steps(theta_o, phi_o, [theta_steps, phi_steps.max(least_phi_steps)])

@@ -1,9 +1,9 @@
 //! `threadlight render`: a picture of a scene.
 use super::progress::TerminalProgress;
 use super::rendered::{ReferenceStats, Rendered, Stats};
-use super::scene_flags::{MachineFlags, SceneFlags};
+use super::scene_flags::{MachineFlags, SceneFlags, one_of};
 use super::{json, none_of, number, print, say};
-use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::builder::TypedValueParser;
 use clap::value_parser;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -171,5 +171,5 @@ impl Render {
 
 /// `cpu` or `gpu`.
 pub fn processor() -> impl TypedValueParser<Value = Processor> {
-    PossibleValuesParser::new(["cpu", "gpu"]).map(|name| if name == "gpu" { Processor::Gpu } else { Processor::Cpu })
+    one_of([("cpu", Processor::Cpu), ("gpu", Processor::Gpu)])
 }

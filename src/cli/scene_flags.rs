@@ -174,14 +174,22 @@ fn methods(is_taken: fn(Method) -> bool) -> impl TypedValueParser<Value = Method
     PossibleValuesParser::new(names).try_map(|name| Method::from_name(&name))
 }
 
+/// The value of one of these names.
+pub fn one_of<T: Clone + Send + Sync + 'static, const N: usize>(
+    values: [(&'static str, T); N],
+) -> impl TypedValueParser<Value = T> {
+    PossibleValuesParser::new(values.each_ref().map(|(name, _)| *name)).map(move |name| {
+        let (_, value) = values.iter().find(|(known, _)| *known == name).expect("the parser takes no other name");
+        value.clone()
+    })
+}
+
 /// `per-pixel` or `fixed`.
 fn pattern() -> impl TypedValueParser<Value = Pattern> {
-    PossibleValuesParser::new(Pattern::ALL.map(Pattern::name))
-        .map(|name| if name == Pattern::Fixed.name() { Pattern::Fixed } else { Pattern::PerPixel })
+    one_of(Pattern::ALL.map(|pattern| (pattern.name(), pattern)))
 }
 
 /// `environment` or `none`.
 fn background() -> impl TypedValueParser<Value = Background> {
-    PossibleValuesParser::new(["environment", "none"])
-        .map(|name| if name == "none" { Background::None } else { Background::Environment })
+    one_of([("environment", Background::Environment), ("none", Background::None)])
 }

@@ -1,7 +1,7 @@
 //! `threadlight view`: a window to look at a scene and change it.
-use super::scene_flags::{MachineFlags, SceneFlags, takes_methods};
+use super::scene_flags::{MachineFlags, SceneFlags, one_of, takes_methods};
 use super::{cache_folder, json, none_of, signals};
-use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::builder::TypedValueParser;
 use clap::value_parser;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -112,6 +112,5 @@ impl ViewArguments {
 
 /// The name of a present mode.
 fn present_modes() -> impl TypedValueParser<Value = PresentMode> {
-    PossibleValuesParser::new(PresentMode::ALL.iter().map(|mode| mode.name()))
-        .map(|name| PresentMode::ALL.into_iter().find(|mode| mode.name() == name).unwrap_or_default())
+    one_of(PresentMode::ALL.map(|mode| (mode.name(), mode)))
 }

@@ -137,8 +137,7 @@ fn differences(place: &mut Place, device: &Arc<Device>) -> Result<Vec<(Rounding,
             Rounding::HalfLight => shade(&twin()?.with_half_light(), prepared, &geometry),
             Rounding::Normals => shade(&twin()?, prepared, &moved_normals(&geometry)),
             Rounding::Threads | Rounding::Order => {
-                let change = if rounding == Rounding::Threads { move_threads } else { reverse_threads };
-                let Some(changed) = with_threads(prepared, change) else { return Ok(None) };
+                let Some(changed) = with_threads(prepared, rounding) else { return Ok(None) };
                 shade(&CpuShader::new(&changed, &round)?, prepared, &geometry)
             }
             Rounding::Device => of_device.clone(),
@@ -184,18 +183,22 @@ fn moved_normals(geometry: &[[u32; 2]]) -> Vec<[u32; 2]> {
     geometry.iter().enumerate().map(texel).collect()
 }
 
-/// `prepared`, whose one material has threads that were changed; none if they are no kernels.
-fn with_threads(prepared: &Prepared, change: fn(&[PackedKernel], usize) -> Vec<PackedKernel>) -> Option<Prepared> {
+/// `prepared`, whose one material has threads that are rounded, or in another order; none if they are no kernels.
+fn with_threads(prepared: &Prepared, rounding: Rounding) -> Option<Prepared> {
     let mut prepared = prepared.clone();
-    let mut table = prepared.materials[0].threads.as_deref()?.fitted()?.clone();
-    let changed =
-        |table: &FittedTable| table.kernels.chunks(table.count).flat_map(|row| change(row, table.sets)).collect();
-    table.kernels = changed(&table);
+    let threads = prepared.materials[0].threads.as_mut()?;
+    let change = if rounding == Rounding::Threads { move_threads } else { reverse_threads };
+    let of_table = |table: &FittedTable| -> Vec<_> {
+        table.kernels.chunks(table.count).flat_map(|row| change(row, table.sets)).collect()
+    };
+    let mut changed = (**threads).clone();
+    let (Threads::Fitted(table) | Threads::Gaussian(table)) = &mut changed else { return None };
+    table.kernels = of_table(table);
     if let Some(table) = &mut table.of_subpixels {
-        table.kernels = changed(table);
+        table.kernels = of_table(table);
     }
-    let key = Key::builder("changed threads").key(prepared.materials[0].threads.as_ref()?.key).build();
-    prepared.materials[0].threads = Some(Keyed::new(key, Threads::Fitted(table)));
+    let key = Key::builder("changed threads").text(&rounding.name()).key(threads.key).build();
+    *threads = Keyed::new(key, changed);
     Some(prepared)
 }
 

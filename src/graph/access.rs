@@ -99,10 +99,3 @@ impl Mode {
         }
     }
 }
-
-/// Whether images of this format are depth attachments rather than colour attachments.
-pub fn is_depth(format: vk::Format) -> bool {
-    use vk::Format as F;
-    let combined = matches!(format, F::D16_UNORM_S8_UINT | F::D24_UNORM_S8_UINT | F::D32_SFLOAT_S8_UINT);
-    combined || matches!(format, F::D16_UNORM | F::X8_D24_UNORM_PACK32 | F::D32_SFLOAT)
-}

@@ -39,7 +39,7 @@ mod text;
 mod validate;
 mod work;
 
-pub use access::{Access, AccessInfo, Mode, is_depth};
+pub use access::{Access, AccessInfo, Mode};
 pub use compute::ComputePass;
 pub use declare::{Graph, PassBuilder};
 pub use error::GraphError;

@@ -1,8 +1,9 @@
 //! Validate: everything that makes a graph meaningless is an error that names the pass and the resource.
-use super::access::{Access, Mode, is_depth};
+use super::access::{Access, Mode};
 use super::declare::{Graph, Pass, Resource, Use};
 use super::error::GraphError;
 use super::resource::{Handle, ResourceKind};
+use crate::vulkan::is_depth;
 use std::collections::{HashMap, HashSet};
 
 /// Checks all passes, also those that will be culled: whether a graph is wrong does not depend on what is asked of it.

@@ -32,10 +32,28 @@ pub const MAX_SHADERS: usize = 16;
 
 /// How many of them a picture of this size in pixels may have where shaders see buffers of so many bytes: the lists of all classes are in one.
 pub fn most_shaders(size_px: [u32; 2], max_buffer_bytes: u32) -> usize {
-    let [columns, rows] = size_px.map(|side| u64::from(side.next_multiple_of(TILE_SIDE)));
-    // Interior and edge pixels of each shader have room for all parts of all tiles.
-    let bytes_a_shader = 2 * PART_BYTES * (columns * rows / u64::from(PART_PIXELS));
-    (u64::from(max_buffer_bytes) / bytes_a_shader.max(1)).clamp(1, MAX_SHADERS as u64) as usize
+    (u64::from(max_buffer_bytes) / part_list_bytes(size_px, 1).max(1)).clamp(1, MAX_SHADERS as u64) as usize
+}
+
+/// Bytes of the longest list of a picture of this size in pixels, by so many shaders.
+pub(super) fn longest_list_bytes(size_px: [u32; 2], shaders: usize) -> u64 {
+    pixel_list_bytes(size_px).max(part_list_bytes(size_px, shaders))
+}
+
+/// Pixels of whole tiles.
+fn tiled_pixels(size_px: [u32; 2]) -> u64 {
+    let [columns, rows] = size_px.map(|side| u64::from(side).next_multiple_of(TILE_SIDE.into()));
+    columns * rows
+}
+
+/// Each pixel is listed once.
+fn pixel_list_bytes(size_px: [u32; 2]) -> u64 {
+    4 * tiled_pixels(size_px)
+}
+
+/// Interior and edge pixels of each shader have room for all parts of all tiles.
+fn part_list_bytes(size_px: [u32; 2], shaders: usize) -> u64 {
+    2 * shaders as u64 * PART_BYTES * (tiled_pixels(size_px) / u64::from(PART_PIXELS))
 }
 
 /// What the pass counts: `Counted` in glsl/tiles.glsl. Its buffer goes on with the tiles of each class: interior and edge pixels of each shader.
@@ -185,18 +203,15 @@ pub fn classify<'a>(
     region: Region,
     view: &View,
 ) -> Tiles {
-    let (width, height) = (view.width, view.height);
-    let [columns, rows] = region.tile_px;
-    let tile_count = u64::from(width.div_ceil(columns)) * u64::from(height.div_ceil(rows));
-    let tile_pixels = u64::from(columns * rows);
+    let size_px = [view.width, view.height];
+    let shaders = classify.shader_count as usize;
     // Kept: as long as nothing moves, other light and other materials that let as many pixels share a sum are shaded by the same lists.
-    let class_count = 2 * classify.shader_count as usize;
-    let mut counters = graph.kept_buffer("counters", BufferDesc { size_bytes: Counters::arguments_of(class_count) });
+    let mut kept = |name, size_bytes| graph.kept_buffer(name, BufferDesc { size_bytes });
+    let mut counters = kept("counters", Counters::arguments_of(2 * shaders));
+    let mut parts = kept("part_list", part_list_bytes(size_px, shaders));
+    let mut pixels = kept("pixel_list", pixel_list_bytes(size_px));
+    let mut coverage = kept("coverage", tiled_pixels(size_px) / 4);
     graph.clear_buffer("clear_counters", &mut counters);
-    let part_count = class_count as u64 * tile_pixels.div_ceil(u64::from(PART_PIXELS)) * tile_count;
-    let mut parts = graph.kept_buffer("part_list", BufferDesc { size_bytes: PART_BYTES * part_count });
-    let mut pixels = graph.kept_buffer("pixel_list", BufferDesc { size_bytes: 4 * tile_pixels * tile_count });
-    let mut coverage = graph.kept_buffer("coverage", BufferDesc { size_bytes: tile_pixels * tile_count / 4 });
     graph
         .compute(CLASSIFY_PASS, &classify.pipeline)
         .read("geometry", geometry)
@@ -207,7 +222,7 @@ pub fn classify<'a>(
         .write("Coverage", &mut coverage)
         .push(&Push {
             camera: view.camera_rays(),
-            size_px: [width, height],
+            size_px,
             first_tile: region.first_tile,
             smooth_variance: classify.smooth_variance,
             cos_smooth: SMOOTH_DEG.to_radians().cos(),
@@ -226,5 +241,8 @@ mod tests {
         // As lavapipe has it.
         let most = |size_px| most_shaders(size_px, 128 << 20);
         assert_eq!([[640, 480], [3840, 2160], [4096, 4096], [8192, 4096]].map(most), [16, 16, 8, 4]);
+        // No list is longer than a buffer, but for pictures of more pixels than can be listed at all.
+        let longest = |size_px| longest_list_bytes(size_px, most(size_px));
+        assert_eq!([[4096, 4096], [8192, 4096], [5793, 5792]].map(longest), [128 << 20, 128 << 20, 4 * 5800 * 5792]);
     }
 }

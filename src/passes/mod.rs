@@ -1,4 +1,5 @@
-//! The passes of a frame: a function each, handles in and handles out, in the order in which they run.
+//! The passes of a frame and of what is made before it: a function each, handles in and handles out. The order of those of a frame is
+//! in `pipeline::declare`.
 //!
 //! What a pass needs besides its handles (pipeline, meshes, tables) is made once, in a struct beside the function.
 
@@ -35,8 +36,8 @@ pub use geometry_cache::{DeviceMesh, GeometryCache, PlacedMesh, PlacedTangent, g
 pub(crate) use geometry_cache::{GEOMETRY_STATE, geometry_shaders};
 pub use light::{DeviceIrradiance, DeviceLight, check_aliases};
 pub use materials::{DeviceMaterials, ShadedMaterial};
-pub(crate) use picture_size::check_cache_size;
 pub use picture_size::check_picture;
+pub(crate) use picture_size::{check_cache_size, check_lists};
 #[cfg(feature = "viewer")]
 pub use present::{Area, present};
 pub use readback::{Readbacks, texels};

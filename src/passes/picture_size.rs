@@ -1,4 +1,5 @@
 //! How large a picture can be on a device.
+use super::classify::longest_list_bytes;
 use crate::method::Method;
 use crate::scene::{ImageSettings, Scene};
 use crate::vulkan::Device;
@@ -7,16 +8,27 @@ use crate::{Error, Result};
 /// Whether `device` can render a picture as large as that of `scene`, which need not be prepared yet.
 ///
 /// # Errors
-/// More sub-pixels along a side than images of `device` can have, or more pixels than its shaders can list at 4 bytes each.
+/// More sub-pixels along a side than images of `device` can have, or more pixels than its shaders can list.
 pub fn check_picture(device: &Device, Scene { image, shading, .. }: &Scene) -> Result<()> {
     let &ImageSettings { width, height, subpixels, .. } = image;
     check_cache_size(device, [width, height].map(|side| side.saturating_mul(subpixels)))?;
-    let most = device.limits().max_storage_buffer_range / 4;
     // The reference draws the geometry cache alone.
-    if u64::from(width) * u64::from(height) <= most.into() || shading.method == Method::Reference {
+    if shading.method == Method::Reference {
         return Ok(());
     }
-    let problem = format!("is {width} x {height}, and shaders of this device list at most {most} pixels");
+    check_lists(device, [width, height], 1)
+}
+
+/// An error for a picture of so many columns and rows by so many shaders, if its lists are longer than what shaders of `device` see in a buffer.
+pub(crate) fn check_lists(device: &Device, size_px: [u32; 2], shaders: usize) -> Result<()> {
+    let most = u64::from(device.limits().max_storage_buffer_range);
+    let bytes = longest_list_bytes(size_px, shaders);
+    if bytes <= most {
+        return Ok(());
+    }
+    let [width, height] = size_px;
+    let problem =
+        format!("is {width} x {height}: its pixels take {bytes} bytes to list, this device's shaders see {most}");
     Err(Error::input("image size", problem, "use a smaller size"))
 }
 

@@ -3,15 +3,15 @@
 //! It starts from the texels of the geometry cache, so that the two can be compared pixel by pixel. BRDFs are evaluated
 //! in double precision; everything else follows the shader line by line.
 use crate::Result;
-use crate::brdf::{Brdf, MAX_THETA_O_DEG, MaterialRecord};
+use crate::brdf::{MAX_THETA_O_DEG, MaterialRecord};
 use crate::environment::{Alias, FractionBits, LightMap, SourceRecord};
 use crate::geometry_texel::GeometryTexel;
 use crate::light::{Light, bases};
-use crate::memo::{Keyed, Round};
+use crate::memo::Round;
 use crate::method::{Lookups, Method, Pattern};
 use crate::passes::{SMOOTH_DEG, SmoothVariance, View};
 use crate::prepare::{Prepared, PreparedMaterial};
-use crate::steps::{FitSplitSum, Tabulate, TabulateSlices, light};
+use crate::steps::{LookedUp, light};
 use crate::tangent::any_tangent;
 use crate::threads::fitted::{place_of_sum, sums_of_pixel};
 use crate::threads::{FittedTable, SliceTable, SplitSum, Threads};
@@ -162,14 +162,10 @@ pub struct CpuShader<'a> {
     /// The environment as it is, or for fitted threads with its sources marked.
     map: Option<LightMap>,
     aliases: Vec<Alias>,
-    /// One for each material, for methods that draw by them.
-    slices: Vec<Keyed<SliceTable>>,
-    /// One for each material, for the method that looks them up.
-    split_sums: Vec<Keyed<SplitSum>>,
-    /// One for each material.
+    /// Of each material.
+    looked_up: Vec<LookedUp>,
+    /// Of each material.
     records: Vec<MaterialRecord>,
-    /// The table of each material that shaders look up in one.
-    tables: Vec<Option<Brdf>>,
     /// The small bright sources of the environment.
     sources: Vec<SourceRecord>,
     /// Those of lookups in cube maps.
@@ -191,28 +187,20 @@ impl<'a> CpuShader<'a> {
             Lookups { map: true, .. } => Some(LightMap::new(environment)),
             _ => None,
         };
-        let where_needed = |needs_it: bool| materials.iter().filter(move |_| needs_it);
-        let slices = where_needed(lookups.slices).map(|material| round.ask(&TabulateSlices(&material.brdf)));
-        let table = |material: &PreparedMaterial| match evaluates_brdf && material.brdf.has_table() {
-            false => Ok(None),
-            true => Ok(Some((*round.ask(&Tabulate(&material.brdf))?).clone())),
-        };
+        let looked_up = materials.iter().map(|of| LookedUp::ask(round, *method, &of.brdf, evaluates_brdf));
         let (_, base_maps) = bases(materials.iter().map(|material| material.threads.as_deref()));
         let record = |(material, base_map): (&PreparedMaterial, usize)| {
             let record =
                 MaterialRecord { base_map: base_map as u32, ..MaterialRecord::new(&material.brdf, &material.lobe) };
             material.threads.as_deref().map_or(record, |threads| threads.in_record(record, &material.lobe))
         };
-        let split_sums = where_needed(lookups.split_sum).map(|material| round.ask(&FitSplitSum(&material.brdf)));
         Ok(Self {
             prepared,
             light,
             aliases: map.as_ref().filter(|_| lookups.aliases).map(LightMap::aliases).unwrap_or_default(),
             map,
-            slices: slices.collect::<Result<_>>()?,
-            split_sums: split_sums.collect::<Result<_>>()?,
+            looked_up: looked_up.collect::<Result<_>>()?,
             records: materials.iter().zip(base_maps).map(record).collect(),
-            tables: materials.iter().map(table).collect::<Result<_>>()?,
             sources: environment.small_sources().records(1.0),
             fractions: FractionBits::ALL,
         })
@@ -361,7 +349,7 @@ impl Point<'_> {
 
     /// Twin of `brdf_at`.
     fn brdf(&self, w_i: Vec3, w_o: Vec3) -> Vec3 {
-        let brdf = self.twin.tables[self.material].as_ref().unwrap_or(&self.material().brdf);
+        let brdf = self.looked_up().table.as_ref().unwrap_or(&self.material().brdf);
         let [w_i, w_o] = [w_i, w_o].map(|w| turned(w, self.surface.phi_o));
         brdf.evaluate(w_i.as_dvec3(), w_o.as_dvec3()).as_vec3()
     }
@@ -403,12 +391,16 @@ impl Point<'_> {
         self.twin.map.as_ref().expect("the method declares the map")
     }
 
+    fn looked_up(&self) -> &LookedUp {
+        &self.twin.looked_up[self.material]
+    }
+
     fn split_sum(&self) -> &SplitSum {
-        &self.twin.split_sums[self.material]
+        self.looked_up().split_sum.as_ref().expect("the method looks split sums up")
     }
 
     fn slices(&self) -> &SliceTable {
-        &self.twin.slices[self.material]
+        self.looked_up().slices.as_ref().expect("the method looks CDFs up")
     }
 }
 

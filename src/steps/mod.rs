@@ -4,6 +4,7 @@ mod compile;
 mod filter;
 mod fit;
 mod load;
+mod looked_up;
 mod upload;
 
 pub use check::CheckDevice;
@@ -11,6 +12,7 @@ pub use compile::{CompileCompute, CompileGeometryCache, pipelines};
 pub use filter::{Blur, BoxFilter, blurred_light, light};
 pub use fit::{DraftThreads, FitSplitSum, FitThreads};
 pub use load::{FindLobe, LoadBrushedMesh, LoadEnvironment, LoadMaterial, LoadMesh, Tabulate, TabulateSlices};
+pub use looked_up::LookedUp;
 pub use upload::{
     KeyedMaterial, UploadBackground, UploadIrradiance, UploadLight, UploadMaterials, UploadMesh, UploadShaders,
 };

@@ -1,7 +1,7 @@
 //! Uploads to the device what passes read.
 use super::compile::on;
-use super::fit::FitSplitSum;
-use super::load::{FindLobe, Tabulate, TabulateSlices};
+use super::load::FindLobe;
+use super::looked_up::LookedUp;
 use crate::Result;
 use crate::brdf::Brdf;
 use crate::environment::Environment;
@@ -63,17 +63,6 @@ pub struct UploadMaterials<'a> {
     pub finest_level: Option<f32>,
 }
 
-impl UploadMaterials<'_> {
-    /// What is asked for of each material, where it is needed.
-    fn of_each<T>(
-        &self,
-        needs_it: impl Fn(&Brdf) -> bool,
-        ask: impl Fn(&Keyed<Brdf>) -> Result<Keyed<T>>,
-    ) -> Result<Vec<Option<Keyed<T>>>> {
-        self.materials.iter().map(|material| needs_it(material.brdf).then(|| ask(material.brdf)).transpose()).collect()
-    }
-}
-
 impl Step for UploadMaterials<'_> {
     type Output = DeviceMaterials;
     const NAME: &'static str = "upload of materials";
@@ -97,21 +86,19 @@ impl Step for UploadMaterials<'_> {
     }
 
     fn make(&self, round: &Round) -> Result<DeviceMaterials> {
-        let lookups = self.method.lookups();
-        let tables = self.of_each(|brdf| self.evaluates_brdf && brdf.has_table(), |brdf| round.ask(&Tabulate(brdf)))?;
-        let slices = self.of_each(|_| lookups.slices, |brdf| round.ask(&TabulateSlices(brdf)))?;
-        let split_sums = self.of_each(|_| lookups.split_sum, |brdf| round.ask(&FitSplitSum(brdf)))?;
-        let lobes =
-            self.materials.iter().map(|material| round.ask(&FindLobe(material.brdf))).collect::<Result<Vec<_>>>()?;
+        let brdfs = || self.materials.iter().map(|material| material.brdf);
+        let lobes = brdfs().map(|brdf| round.ask(&FindLobe(brdf))).collect::<Result<Vec<_>>>()?;
+        let looked_up = brdfs().map(|brdf| LookedUp::ask(round, self.method, brdf, self.evaluates_brdf));
+        let looked_up = looked_up.collect::<Result<Vec<_>>>()?;
         let (_, base_maps) = bases(self.materials.iter().map(|material| material.threads.map(|threads| &**threads)));
         let materials = self.materials.iter().enumerate().map(|(i, KeyedMaterial { brdf, threads })| ShadedMaterial {
             brdf,
             lobe: &lobes[i],
             threads: threads.map(|threads| &**threads),
             base_map: base_maps[i],
-            table: tables[i].as_deref(),
-            slices: slices[i].as_deref(),
-            split_sum: split_sums[i].as_deref(),
+            table: looked_up[i].table.as_deref(),
+            slices: looked_up[i].slices.as_deref(),
+            split_sum: looked_up[i].split_sum.as_deref(),
         });
         DeviceMaterials::new(self.device, self.method, materials, self.evaluates_brdf, self.finest_level)
     }

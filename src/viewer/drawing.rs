@@ -7,7 +7,7 @@ use super::latency::{Answer, Latency, Record, Stats};
 use super::loaded::Loaded;
 use super::presenter::{Drawn, Extras, Presenter, ShownPicture};
 use crate::files;
-use crate::passes::{Area, SHADE_PASS, View, check_cache_size};
+use crate::passes::{Area, SHADE_PASS, View};
 use crate::picture::Format;
 use crate::pipeline::Wanted;
 use crate::prepare::view_of;
@@ -215,7 +215,6 @@ impl Viewer {
         let format = Format::of(path)?;
         let mut device_scene = (*loaded.device_scene).clone();
         device_scene.view = view_of(scene, loaded.sphere)?;
-        check_cache_size(&self.device, device_scene.view.cache_size())?;
         let wanted = Wanted { radiance: format == Format::Exr, display: format == Format::Png, geometry: false };
         let rendering = device_scene.render(wanted, 1)?;
         let header = rendering.exr_header(&loaded.prepared, &self.device.description().name);

@@ -58,8 +58,7 @@ pub struct PictureCost {
 impl PictureCost {
     /// That of a picture of this size in a frame of these passes; none where the device cannot tell.
     fn of(size: [u32; 2], passes: &[PassTime]) -> Option<Self> {
-        let is_of_window = |pass: &&PassTime| ["clear_window", "present", "ui"].contains(&pass.name.as_str());
-        let of_picture = passes.iter().filter(|pass| !is_of_window(pass) && !pass.is_readback());
+        let of_picture = passes.iter().filter(|pass| !pass.is_of_window() && !pass.is_readback());
         let ms: f64 = of_picture.map(|pass| pass.gpu_ms).sum();
         let shades = passes.iter().any(|pass| pass.name == SHADE_PASS);
         shades.then(|| Self { size, time: Duration::from_secs_f64(ms * 1e-3) })

@@ -20,6 +20,13 @@ pub enum ImageKind {
     Cubes(u32),
 }
 
+/// Whether images of this format are depth attachments rather than colour attachments.
+pub fn is_depth(format: vk::Format) -> bool {
+    use vk::Format as F;
+    let combined = matches!(format, F::D16_UNORM_S8_UINT | F::D24_UNORM_S8_UINT | F::D32_SFLOAT_S8_UINT);
+    combined || matches!(format, F::D16_UNORM | F::X8_D24_UNORM_PACK32 | F::D32_SFLOAT)
+}
+
 /// Size, format and kind of an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ImageShape {
@@ -72,12 +79,7 @@ impl ImageShape {
 
     /// Colour or depth.
     pub(super) fn aspect(&self) -> vk::ImageAspectFlags {
-        match self.format {
-            vk::Format::D16_UNORM | vk::Format::D32_SFLOAT | vk::Format::X8_D24_UNORM_PACK32 => {
-                vk::ImageAspectFlags::DEPTH
-            }
-            _ => vk::ImageAspectFlags::COLOR,
-        }
+        if is_depth(self.format) { vk::ImageAspectFlags::DEPTH } else { vk::ImageAspectFlags::COLOR }
     }
 
     /// All levels and layers.

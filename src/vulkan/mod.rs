@@ -57,7 +57,7 @@ pub use commands::{Bound, Commands};
 pub use device::{Device, Semaphores};
 pub use error::VulkanError;
 pub use frames::{Frames, PassTime};
-pub use image::{Image, ImageKind, ImageShape, Sampler, SamplerKind};
+pub use image::{Image, ImageKind, ImageShape, Sampler, SamplerKind, is_depth};
 pub use instance::{Instance, Messages};
 pub use memory::{Buffer, BufferUse, Memory};
 pub use physical_device::{DeviceDescription, DeviceKind, describe_devices};

@@ -280,12 +280,10 @@ impl Swapchain {
         // One more than the least, so that drawing does not wait for the window system to give one back.
         let most = if capabilities.max_image_count == 0 { u32::MAX } else { capabilities.max_image_count };
         let old = self.current.take();
-        let opaque = vk::CompositeAlphaFlagsKHR::OPAQUE;
-        let composite = if capabilities.supported_composite_alpha.contains(opaque) {
-            opaque
-        } else {
-            vk::CompositeAlphaFlagsKHR::INHERIT
-        };
+        let (opaque, supported) = (vk::CompositeAlphaFlagsKHR::OPAQUE, capabilities.supported_composite_alpha);
+        // Every surface supports one; windows are drawn opaque, so any shows the same.
+        let lowest = vk::CompositeAlphaFlagsKHR::from_raw(supported.as_raw() & supported.as_raw().wrapping_neg());
+        let composite = if supported.contains(opaque) { opaque } else { lowest };
         let info = vk::SwapchainCreateInfoKHR::default()
             .surface(self.surface.raw)
             .min_image_count((capabilities.min_image_count + 1).min(most))

@@ -1,6 +1,7 @@
 //! Random frames, valid by construction.
 use ash::vk;
 use threadlight::low_level::graph::*;
+use threadlight::low_level::vulkan::is_depth;
 
 /// A small linear congruential generator (Knuth's MMIX constants): the same frames on every machine.
 pub struct Random(u64);

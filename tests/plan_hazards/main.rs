@@ -10,6 +10,7 @@ use ash::vk;
 use frame::Frame;
 use machine::{Machine, WRITES, bits};
 use threadlight::low_level::graph::*;
+use threadlight::low_level::vulkan::is_depth;
 
 fn memory(info: &ResourceInfo) -> MemoryRequirement {
     let (size_bytes, alignment) = match info.kind {

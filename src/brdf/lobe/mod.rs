@@ -47,8 +47,8 @@ fn lobe_radius_along(brdf: &Brdf, theta_o: f64, azimuth: DVec2) -> f64 {
     })
 }
 
-/// What shading goes by of a lobe, seen along the normal. Finding it takes 0.5 ms, of some models more:
-/// [`FindLobe`](crate::steps::FindLobe) does so once.
+/// What shading goes by of a lobe, seen along the normal. Finding it takes 0.5 ms, of some models more, so
+/// [`FindLobe`](crate::steps::FindLobe) does so once for all that shades. A fit, which takes longer by far, finds it for itself.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LobeShape {
     /// [`Brdf::is_isotropic`].
@@ -111,6 +111,11 @@ impl LobeShape {
 
 /// Narrower lobes may be a cusp of little energy, as many measured tables have it, on the lobe itself.
 const WIDEST_CUSP_RAD: f64 = 0.004;
+
+/// [`LobeShape::narrowness`] alone.
+pub(super) fn narrowness(brdf: &Brdf) -> f64 {
+    if brdf.is_isotropic() { 1.0 } else { lobe_axes(brdf).0 }
+}
 
 /// Narrowness and long axis of an anisotropic lobe: exact for an ellipse, 1 / width^2 = A + B cos(2 (azimuth - that of the narrow axis)).
 fn lobe_axes(brdf: &Brdf) -> (f64, DVec2) {

@@ -16,6 +16,7 @@ use std::sync::{Arc, OnceLock};
 
 use glam::{DVec2, DVec3};
 
+use crate::brdf::cosines::{at_cosine, mean_under_even_light};
 use crate::brdf::microfacet::metals::index_of_refraction;
 use crate::brdf::microfacet::{Distribution, fresnel_conductor};
 use crate::brdf::{Model, Parameters, Roughness, Spacing, hash_numbers};
@@ -55,30 +56,14 @@ impl MultiscatterConductor {
             let cosine = |i: f64| (i / (COUNT - 1) as f64).powi(2);
             let table: Vec<f64> =
                 (0..COUNT).map(|i| 1.0 - albedo(self.alpha, cosine(i as f64).max(1e-4)).min(1.0)).collect();
-            // 2 c dc with c = t^2, by the midpoint rule.
-            let mean = |f: &dyn Fn(f64) -> DVec3| {
-                let term = |i: usize| {
-                    let t = (i as f64 + 0.5) / COUNT as f64;
-                    f(t * t) * (4.0 * t * t * t)
-                };
-                (0..COUNT).map(term).sum::<DVec3>() / COUNT as f64
-            };
-            let loss = mean(&|cos| DVec3::splat(interpolate(&table, cos))).x;
-            let reflectance = mean(&|cos| fresnel_conductor(cos, self.eta, self.k));
+            let loss: f64 = mean_under_even_light(COUNT, |cos| at_cosine(&table, cos));
+            let reflectance = mean_under_even_light(COUNT, |cos| fresnel_conductor(cos, self.eta, self.k));
             let tint = reflectance * reflectance * (1.0 - loss) / (1.0 - reflectance * loss);
             // A mirror loses nothing, and needs nothing back.
             let factor = if loss > 1e-9 { tint * (FRAC_1_PI / loss) } else { DVec3::ZERO };
             Loss { table, factor }
         })
     }
-}
-
-/// The table's value at a cosine.
-fn interpolate(table: &[f64], cos_theta: f64) -> f64 {
-    let position = cos_theta.clamp(0.0, 1.0).sqrt() * (table.len() - 1) as f64;
-    let first = (position as usize).min(table.len() - 2);
-    let part = position - first as f64;
-    table[first] + (table[first + 1] - table[first]) * part
 }
 
 /// E: the albedo of GGX facets that reflect all light, seen at `cos_theta`.
@@ -114,7 +99,7 @@ impl Model for MultiscatterConductor {
         let once = fresnel_conductor(w_o.dot(h), self.eta, self.k)
             * Distribution::Ggx.torrance_sparrow(w_i, w_o, h, Roughness::isotropic(self.alpha));
         let Loss { table, factor } = self.loss();
-        once + *factor * (interpolate(table, w_i.z) * interpolate(table, w_o.z))
+        once + *factor * (at_cosine(table, w_i.z) * at_cosine(table, w_o.z))
     }
 
     fn from_parameters(parameters: &mut Parameters) -> Result<Self> {

@@ -3,6 +3,7 @@ use std::f64::consts::FRAC_1_PI;
 
 use glam::{DVec3, Vec4};
 
+use crate::brdf::cosines::mean_under_even_light;
 use crate::brdf::microfacet::{Distribution, fresnel_dielectric};
 use crate::brdf::{Model, Parameters, Roughness, Spacing, hash_numbers};
 use crate::error::Result;
@@ -36,13 +37,8 @@ impl Plastic {
 
 /// Reflectance of the smooth interface under diffuse light: the integral of F(c) 2 c dc over the cosine c.
 fn mean_fresnel(ior: f64) -> f64 {
-    // Midpoint rule, crowded towards c = 0 (c = t^2) where F is steep; converged to better than 1e-6.
-    const STEPS: usize = 512;
-    let term = |i: usize| {
-        let t = (i as f64 + 0.5) / STEPS as f64;
-        fresnel_dielectric(t * t, ior) * 4.0 * t * t * t
-    };
-    (0..STEPS).map(term).sum::<f64>() / STEPS as f64
+    // Converged to better than 1e-6.
+    mean_under_even_light(512, |cos| fresnel_dielectric(cos, ior))
 }
 
 impl Model for Plastic {

@@ -1,6 +1,7 @@
 //! A dielectric coat: what it reflects, how light is bent into it, and what it lets through and absorbs.
 use glam::{DVec2, DVec3, dvec3};
 
+use crate::brdf::cosines::at_cosine;
 use crate::brdf::microfacet::{Distribution, fresnel_dielectric};
 use crate::brdf::{Parameters, Roughness, Spacing, hash_numbers};
 use crate::error::Result;
@@ -127,15 +128,4 @@ impl Interface {
     pub fn transmittance(&self, cos_outside: f64) -> f64 {
         1.0 - at_cosine(&self.reflectance, cos_outside)
     }
-}
-
-/// The value at a cosine, linear between those at (i / (n - 1))^2.
-pub(super) fn at_cosine<T>(table: &[T], cos_theta: f64) -> T
-where
-    T: Copy + std::ops::Add<Output = T> + std::ops::Mul<f64, Output = T>,
-{
-    let position = cos_theta.clamp(0.0, 1.0).sqrt() * (table.len() - 1) as f64;
-    let first = (position as usize).min(table.len() - 2);
-    let part = position - first as f64;
-    table[first] * (1.0 - part) + table[first + 1] * part
 }

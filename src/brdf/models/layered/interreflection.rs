@@ -13,11 +13,14 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use glam::{DVec2, DVec3, dvec3};
 
-use super::coat::{Coat, Interface, at_cosine};
+use super::coat::{Coat, Interface};
+use crate::brdf::cosines::{at_cosine, mean_under_even_light};
 use crate::brdf::{Brdf, Lambert, half_vector_width, lobe_radius};
 
 /// Angles to the normal of light that comes from outside, at cosines (i / (n - 1))^2 there.
 const OPEN: usize = 40;
+/// Steps of means over the hemisphere.
+const STEPS: usize = 512;
 /// Angles of light that is reflected totally.
 const TRAPPED: usize = 20;
 /// Light this near to the mirror direction counts as such: enough for some hundred points of the lattice.
@@ -62,17 +65,12 @@ impl Interreflection {
     /// What a diffuse base sends up forgets where it came from. With r the share of it that the coat sends back, all that leaves is 1 / (1 -
     /// reflectance r) times what leaves at once, and evenly as that does (Saunderson 1942).
     fn over_diffuse(reflectance: DVec3, coat: &Coat, interface: &Interface) -> Self {
-        const STEPS: usize = 512;
-        let mean = |of: &dyn Fn(f64) -> DVec3| -> DVec3 {
-            (0..STEPS).map(|i| of((i as f64 + 0.5) / STEPS as f64)).sum::<DVec3>() / STEPS as f64
-        };
         let left = |cos_inside: f64| coat.left_after(cos_inside) * coat.left_after(cos_inside);
         // The integral of 2 cos dcos: within over what is reflected totally, and over the cosines c = t^2 outside, by 2 c dc / n^2, where T is known.
         let critical = coat.critical_cos();
-        let trapped = mean(&|t| left(critical * t) * (2.0 * critical * critical * t));
-        let open = mean(&|t| {
-            left(coat.cos_inside(t * t))
-                * ((1.0 - interface.transmittance(t * t)) * 4.0 * t * t * t / (coat.ior * coat.ior))
+        let trapped = mean_under_even_light(STEPS, |cos| left(critical * cos) * (critical * critical));
+        let open = mean_under_even_light(STEPS, |cos| {
+            left(coat.cos_inside(cos)) * ((1.0 - interface.transmittance(cos)) / (coat.ior * coat.ior))
         });
         let back = reflectance * (trapped + open);
         let factor = (back / (DVec3::ONE - back)).map(f64::sqrt);
@@ -100,7 +98,7 @@ impl Interreflection {
         };
         let (lobe, mut haze): (Vec<_>, Vec<_>) = (0..OPEN).map(both).unzip();
         // What leaves evenly from theta_i is to be haze(theta_i) of the light outside: haze(theta_i) haze(theta_o) over this.
-        let mean = mean_over_hemisphere(&haze) * (PI / (coat.ior * coat.ior));
+        let mean = mean_under_even_light(STEPS, |cos| at_cosine(&haze, cos)) * (PI / (coat.ior * coat.ior));
         let scale = mean.map(|mean| if mean > 0.0 { mean.sqrt().recip() } else { 0.0 });
         haze.iter_mut().for_each(|haze| *haze *= scale);
         Self { lobe, haze }
@@ -119,16 +117,6 @@ fn each_on_own_threads<T: Send>(count: usize, f: &(dyn Fn(usize) -> T + Sync)) -
         };
         workers.into_iter().flat_map(join).collect()
     })
-}
-
-/// The integral of a table over 2 c dc, by the midpoint rule over sqrt(c).
-fn mean_over_hemisphere(table: &[DVec3]) -> DVec3 {
-    const STEPS: usize = 512;
-    let term = |i: usize| {
-        let t = (i as f64 + 0.5) / STEPS as f64;
-        at_cosine(table, t * t) * (4.0 * t * t * t / STEPS as f64)
-    };
-    (0..STEPS).map(term).sum()
 }
 
 /// Angles to the normal within the coat: `OPEN` from which light leaves, and those of light that is trapped before them.

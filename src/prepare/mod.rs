@@ -2,16 +2,20 @@
 use crate::brdf::{Brdf, LobeShape};
 use crate::environment::Environment;
 use crate::geometry_texel::MAX_MATERIALS;
-use crate::memo::{Key, Keyed, Memo, Round, Step};
+use crate::memo::{Key, Keyed, Round};
 use crate::method::{Method, Sampling, Variant};
 use crate::passes::{PlacedMesh, PlacedTangent, SmoothVariance, View};
 use crate::scene::{BoundingSphere, Camera, MaterialSource, Mesh, MeshSource, Scene, TangentRule};
-use crate::steps::{DraftThreads, FindLobe, FitThreads, LoadBrushedMesh, LoadEnvironment, LoadMaterial, LoadMesh};
-use crate::threads::azimuths::azimuth_count;
+use crate::steps::{FindLobe, FitThreads, LoadBrushedMesh, LoadEnvironment, LoadMaterial, LoadMesh};
 use crate::threads::{ShadedLobe, ThreadSettings, Threads};
 use crate::{Error, Result};
 use glam::DAffine3;
-use std::cell::Cell;
+
+mod draft;
+mod key;
+
+pub use draft::{can_draft, may_be_drafted, prepare_draft};
+pub use key::key_of;
 
 /// A scene with all its files read and its threads made. Cheap to clone.
 #[derive(Clone)]
@@ -143,70 +147,6 @@ pub fn prepare(scene: &Scene, round: &Round) -> Result<Prepared> {
     prepare_by(scene, round, &ask)
 }
 
-/// Whether threads of `scene` can be drafted from those of `before`: fitted ones, as many, of models whose parameters were changed.
-pub fn can_draft(scene: &Scene, before: &Prepared) -> bool {
-    let method = scene.shading.method;
-    fn source<'s>(scene: &'s Scene, name: &str) -> Option<&'s MaterialSource> {
-        scene.material(name).map(|material| &material.source)
-    }
-    let was_edited = |name: &str| match source(scene, name) {
-        Some(MaterialSource::Model { .. }) => before.materials.iter().any(|material| material.name == name),
-        other => other == source(&before.scene, name),
-    };
-    method == Method::Fitted
-        && before.method == method
-        && before.sampling.count == scene.shading.count()
-        && before.view.subpixels == scene.image.subpixels
-        && scene.used_materials().into_iter().all(was_edited)
-}
-
-/// Whether parameters of `prepared` can be changed such that threads are drafted: [`can_draft`].
-pub fn may_be_drafted(prepared: &Prepared) -> bool {
-    let with_parameters = Brdf::models_with_parameters();
-    prepared.method == Method::Fitted
-        && prepared.materials.iter().any(|material| with_parameters.contains(&material.brdf.model()))
-}
-
-/// As [`prepare`], but threads that are not known yet are drafted from those of `before`; none where that cannot be ([`can_draft`]) or
-/// nothing has to be.
-///
-/// # Errors
-/// Those of [`prepare`].
-pub fn prepare_draft(scene: &Scene, before: &Prepared, round: &Round) -> Result<Option<Prepared>> {
-    if !can_draft(scene, before) {
-        return Ok(None);
-    }
-    let is_draft = Cell::new(false);
-    let subpixels = scene.image.subpixels;
-    let ask = |method, material: &PreparedMaterial, sampling| {
-        let PreparedMaterial { name, brdf, lobe, .. } = material;
-        let Some(settings) = thread_settings(method, lobe, sampling, subpixels) else { return Ok(None) };
-        if let Some(finished) = round.known(&FitThreads { brdf, settings })? {
-            return Ok(Some(finished));
-        }
-        let is_shown = |shown: &&PreparedMaterial| shown.name == *name && shown.brdf.model() == brdf.model();
-        let mut shown = before.materials.iter().filter(is_shown);
-        let has_same_azimuths = |threads: &Threads| {
-            let azimuths = threads.fitted().map_or(1, |table| table.azimuths);
-            // Finding those of an anisotropic BRDF takes a millisecond.
-            if lobe.is_isotropic { azimuths == 1 } else { azimuths == azimuth_count(brdf) }
-        };
-        let drafted = shown.find_map(|shown| Some((shown, shown.threads.as_ref()?)));
-        let Some((shown, threads)) = drafted.filter(|(_, threads)| has_same_azimuths(threads)) else {
-            return ask_threads(round, method, material, sampling, subpixels);
-        };
-        is_draft.set(true);
-        // While another material is edited, this one's draft serves on.
-        let serves_on = shown.brdf.key == brdf.key;
-        if serves_on {
-            return Ok(Some(threads.clone()));
-        }
-        round.ask(&DraftThreads { brdf, before: threads }).map(Some)
-    };
-    let prepared = prepare_by(scene, round, &ask)?;
-    Ok(is_draft.get().then_some(Prepared { is_draft: true, ..prepared }))
-}
-
 /// Gives the threads of a material that has none yet.
 type AskThreads<'a> = dyn Fn(Method, &PreparedMaterial, Sampling) -> Result<Option<Keyed<Threads>>> + 'a;
 
@@ -251,32 +191,6 @@ fn prepare_by(scene: &Scene, round: &Round, ask_threads: &AskThreads) -> Result<
     };
     prepared.place_tangents(round)?;
     Ok(prepared)
-}
-
-/// The key of all that `scene` on a device is made of: of all but what frames are given anew ([`Scene::with_frame_settings_of`]).
-///
-/// # Errors
-/// A file that cannot be read, a model that there is not.
-pub fn key_of(scene: &Scene, memo: &Memo) -> Result<Key> {
-    let method = scene.shading.method;
-    let count = scene.shading.count();
-    let image = &scene.image;
-    let shows_environment = !image.has_alpha();
-    let variant = Variant::new(method, scene.shading.pattern);
-    let mut key = Key::builder(&variant.name()).number(count).number(scene.shading.seed);
-    key = key.number(image.subpixels).number(u64::from(shows_environment));
-    key = key.key(LoadEnvironment(&scene.environment.source).key(memo)?);
-    let used_materials = scene.used_materials();
-    for object in &scene.objects {
-        let material = used_materials.iter().position(|known| *known == object.material).unwrap_or_default();
-        key = key.key(LoadMesh(&object.mesh).key(memo)?).number(material as u64);
-        key = key.bytes(bytemuck::bytes_of(&object.transform())).text(&format!("{:?}", object.tangent));
-    }
-    for name in used_materials {
-        let Some(material) = scene.material(name) else { continue };
-        key = key.key(LoadMaterial(&material.source).key(memo)?);
-    }
-    Ok(key.build())
 }
 
 /// The meshes of `scene`, each once, with their names; and its objects.
