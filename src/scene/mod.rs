@@ -23,6 +23,7 @@ mod parameter;
 mod polygon;
 mod tangent_rule;
 mod texture_tangents;
+mod winding;
 
 pub use bounding_sphere::BoundingSphere;
 pub use camera::Camera;

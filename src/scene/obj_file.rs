@@ -9,6 +9,7 @@ use glam::{DVec3, Vec2, Vec3};
 
 use super::Mesh;
 use super::polygon::triangles_of;
+use super::winding::against_neighbours;
 use crate::error::{Error, Result};
 use crate::files::FileFormat;
 use crate::progress::Observer;
@@ -49,7 +50,7 @@ fn parse_textured(path: &Path, bytes: &[u8], observer: &dyn Observer) -> Result<
 /// Reads all triangles and polygons as one mesh; objects, groups, materials and lines are ignored, and so are texture coordinates if they are
 /// not wanted. Polygons become triangles. Where a normal is missing, zero or not finite, the mean normal of the faces that share position and
 /// smoothing group takes its place, weighted by their angles there; of a sheet that has every face twice, once
-/// reversed, those of one side. Degenerate triangles are dropped.
+/// reversed, those of one side. Faces that are wound against their neighbours count as turned. Degenerate triangles are dropped.
 fn parse_parts(path: &Path, bytes: &[u8], is_textured: bool, observer: &dyn Observer) -> Result<TexturedMesh> {
     if [[0xff, 0xfe], [0xfe, 0xff]].iter().any(|mark| bytes.starts_with(mark)) {
         return Err(Error::in_file(path, "is text in UTF-16", "save it as UTF-8"));
@@ -122,7 +123,7 @@ impl Obj {
         is_textured: bool,
         observer: &dyn Observer,
     ) -> Result<TexturedMesh> {
-        let (textured, dropped) = clean(self, observer)?;
+        let Cleaned { textured, dropped, turned } = clean(self, observer)?;
         let mesh = &textured.mesh;
         if mesh.indices.is_empty() {
             return Err(Error::input(name, "has no triangle with an area", "give a mesh with faces"));
@@ -130,6 +131,9 @@ impl Obj {
         // What is read for its tangents was read without them before.
         if dropped > 0 && !is_textured {
             tracing::warn!("{name}: dropped {dropped} degenerate triangles");
+        }
+        if turned > 0 && !is_textured {
+            tracing::warn!("{name}: {turned} triangles are wound against their neighbours; their normals are turned");
         }
         tracing::debug!("{name}: {} triangles, {} vertices", mesh.indices.len() / 3, mesh.positions.len());
         Ok(textured)
@@ -270,6 +274,8 @@ struct MeanNormal {
     /// The same with each normal turned to the side of those before.
     front: DVec3,
     weight: f64,
+    /// Whether one was on the other side.
+    has_both_sides: bool,
 }
 
 impl MeanNormal {
@@ -279,7 +285,9 @@ impl MeanNormal {
     fn add(&mut self, weight: f64, normal: DVec3) {
         let normal = weight * normal;
         self.sum += normal;
-        self.front += if normal.dot(self.front) < 0.0 { -normal } else { normal };
+        let is_behind = normal.dot(self.front) < 0.0;
+        self.has_both_sides |= is_behind;
+        self.front += if is_behind { -normal } else { normal };
         self.weight += weight;
     }
 
@@ -293,22 +301,63 @@ impl MeanNormal {
     }
 }
 
-/// Joins corners with the same position, normal and texture coordinates into vertices; gives also the number of dropped triangles.
-fn clean(Obj { mesh: obj, smoothing_groups }: &Obj, observer: &dyn Observer) -> Result<(TexturedMesh, usize)> {
+/// What is left of an OBJ.
+struct Cleaned {
+    textured: TexturedMesh,
+    /// How many triangles were degenerate.
+    dropped: usize,
+    /// How many were wound against their neighbours, where that matters.
+    turned: usize,
+}
+
+/// A triangle of an OBJ.
+struct Triangle {
+    /// The places of its corners in the indices of the OBJ.
+    corners: [usize; 3],
+    positions: [u32; 3],
+    /// Unit.
+    normal: DVec3,
+    area: f64,
+    group: SmoothingGroup,
+}
+
+/// The mean normals of `triangles` at each position, group by group.
+fn mean_normals(triangles: &[Triangle], positions: &[Vec3]) -> HashMap<(u32, SmoothingGroup), MeanNormal> {
+    let mut mean_normals = HashMap::<_, MeanNormal>::new();
+    for triangle in triangles {
+        let [a, b, c] = triangle.positions.map(|position| positions[position as usize].as_dvec3());
+        for (position, [at, next, before]) in triangle.positions.into_iter().zip([[a, b, c], [b, c, a], [c, a, b]]) {
+            let angle = (next - at).angle_between(before - at);
+            mean_normals.entry((position, triangle.group)).or_default().add(angle, triangle.normal);
+        }
+    }
+    mean_normals
+}
+
+/// Turns the normals of `triangles` that are wound against their neighbours; gives their number.
+fn turn_alike(triangles: &mut [Triangle]) -> usize {
+    let corners: Vec<_> = triangles.iter().map(|triangle| triangle.positions).collect();
+    let areas: Vec<_> = triangles.iter().map(|triangle| triangle.area).collect();
+    let against = against_neighbours(&corners, &areas);
+    let against = triangles.iter_mut().zip(against).filter(|(_, is_against)| *is_against);
+    against.map(|(triangle, _)| triangle.normal = -triangle.normal).count()
+}
+
+/// Joins corners with the same position, normal and texture coordinates into vertices.
+fn clean(Obj { mesh: obj, smoothing_groups }: &Obj, observer: &dyn Observer) -> Result<Cleaned> {
     let (positions, normals) = (vectors(&obj.positions), vectors(&obj.normals));
     // Normals that are none count as missing.
     let normal_at = |index: u32| {
         let normal = normals[index as usize].as_dvec3();
         (normal.is_finite() && normal.length_squared() > 0.0).then(|| normal.normalize())
     };
-    let mut mean_normals = HashMap::<_, MeanNormal>::new();
     let (mut kept, mut dropped) = (Vec::new(), 0);
     for (index, (face, corners)) in triangles(obj, &positions).into_iter().enumerate() {
         if index.is_multiple_of(BETWEEN_CHECKS) {
             observer.check()?;
         }
-        let triangle = corners.map(|corner| obj.indices[corner]);
-        let [a, b, c] = triangle.map(|position| positions[position as usize].as_dvec3());
+        let at = corners.map(|corner| obj.indices[corner]);
+        let [a, b, c] = at.map(|position| positions[position as usize].as_dvec3());
         let area = (b - a).cross(c - a);
         let longest = (b - a).length_squared().max((c - a).length_squared()).max((c - b).length_squared());
         // A height of a millionth of the length is rounding of single precision, and the normal is noise.
@@ -316,25 +365,29 @@ fn clean(Obj { mesh: obj, smoothing_groups }: &Obj, observer: &dyn Observer) -> 
             dropped += 1;
             continue;
         }
-        let (face_normal, group) = (area.normalize(), smoothing_groups[face]);
-        for (&position, [at, next, before]) in triangle.iter().zip([[a, b, c], [b, c, a], [c, a, b]]) {
-            let angle = (next - at).angle_between(before - at);
-            mean_normals.entry((position, group)).or_default().add(angle, face_normal);
-        }
-        kept.push((corners, triangle, face_normal, group));
+        let group = smoothing_groups[face];
+        kept.push(Triangle { corners, positions: at, normal: area.normalize(), area: area.length(), group });
+    }
+    let lacks_normals = obj.normal_indices.iter().any(|&index| normal_at(index).is_none());
+    let mut means = if lacks_normals { mean_normals(&kept, &positions) } else { HashMap::new() };
+    // Where all faces of a position are on one side, none is wound against another.
+    let mut turned = 0;
+    if means.values().any(|mean| mean.has_both_sides) {
+        turned = turn_alike(&mut kept);
+        means = mean_normals(&kept, &positions);
     }
     let mut vertices = HashMap::new();
     let (mut mesh, mut uvs) = (Mesh::default(), Vec::new());
-    for (index, (corners, triangle, face_normal, group)) in kept.into_iter().enumerate() {
+    for (index, Triangle { corners, positions: at, normal: face_normal, group, .. }) in kept.into_iter().enumerate() {
         if index.is_multiple_of(BETWEEN_CHECKS) {
             observer.check()?;
         }
-        for (corner, position) in corners.into_iter().zip(triangle) {
+        for (corner, position) in corners.into_iter().zip(at) {
             let index = obj.normal_indices[corner];
             let (normal, direction) = match normal_at(index) {
                 Some(direction) => (Ok(index), direction),
                 None => {
-                    let (direction, is_back) = mean_normals[&(position, group)].of_face(face_normal);
+                    let (direction, is_back) = means[&(position, group)].of_face(face_normal);
                     (Err((group, is_back)), direction)
                 }
             };
@@ -348,7 +401,7 @@ fn clean(Obj { mesh: obj, smoothing_groups }: &Obj, observer: &dyn Observer) -> 
             mesh.indices.push(index);
         }
     }
-    Ok((TexturedMesh { mesh, uvs }, dropped))
+    Ok(Cleaned { textured: TexturedMesh { mesh, uvs }, dropped, turned })
 }
 
 /// The triangles that the faces of `obj` consist of: the index of the face, and the places of their corners in the indices of `obj`. Faces of
@@ -443,6 +496,37 @@ mod tests {
     }
 
     #[test]
+    fn faces_that_are_wound_against_their_neighbours_are_shaded_as_all_others() {
+        let columns = 6;
+        let corner = |i: u32| {
+            let (x, y) = (f64::from(i % columns), f64::from(i / columns));
+            format!("v {x} {y} {}\n", (0.7 * x).sin() + (0.9 * y).cos())
+        };
+        let corners: String = (0..columns * columns).map(corner).collect();
+        let firsts: Vec<_> = (0..columns * (columns - 1)).filter(|first| first % columns + 1 < columns).collect();
+        let faces = |is_turned: fn(u32) -> bool| -> String {
+            let face = |&first: &u32| {
+                let mut face = [1, 2, columns + 2, columns + 1].map(|corner| first + corner);
+                if is_turned(first) {
+                    face.reverse();
+                }
+                format!("f {}\n", face.map(|corner| corner.to_string()).join(" "))
+            };
+            firsts.iter().map(face).collect()
+        };
+        let normals = |faces: String| -> Vec<(Vec3, Vec3)> {
+            let mesh = parse(Path::new("a.obj"), (corners.clone() + &faces).as_bytes(), &()).unwrap();
+            let mut all: Vec<_> = mesh.positions.into_iter().zip(mesh.normals).collect();
+            all.sort_by(|(a, _), (b, _)| a.to_array().map(|x| (x * 8.0) as i64).cmp(&b.to_array().map(|x| (x * 8.0) as i64)));
+            all
+        };
+        let alike = normals(faces(|_| false));
+        let mixed = normals(faces(|first| first % 3 == 1));
+        assert_eq!((alike.len(), mixed.len()), ((columns * columns) as usize, (columns * columns) as usize));
+        assert!(alike.iter().zip(&mixed).all(|((_, a), (_, b))| a.dot(*b) > 1.0 - 1e-6));
+    }
+
+    #[test]
     fn a_sheet_with_both_sides_is_as_smooth_as_one_with_its_front_alone() {
         let at = |x: u32, y: u32| x + 9 * y + 1;
         let mut corners = String::new();
@@ -534,9 +618,9 @@ mod tests {
         for _ in 0..20_000 {
             let mut text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1/1 2/2 3/3".to_owned();
             (0..8).for_each(|_| text.extend([" ", next()]));
-            let textured = read_obj(&text, true, &()).map(|obj| clean(&obj, &()).unwrap().0);
+            let textured = read_obj(&text, true, &()).map(|obj| clean(&obj, &()).unwrap().textured);
             let Ok(obj) = read_obj(&text, false, &()) else { continue };
-            let (TexturedMesh { mesh, .. }, _) = clean(&obj, &()).unwrap();
+            let mesh = clean(&obj, &()).unwrap().textured.mesh;
             meshes += 1;
             // Wrong indices of texture coordinates are errors where these are wanted.
             if let Ok(textured) = textured {
@@ -550,7 +634,7 @@ mod tests {
                 brushed_meshes += usize::from(!brushed.tangents.is_empty());
             }
             assert!(mesh.positions.iter().all(|position| position.is_finite()), "{text}");
-            assert!(mesh.normals.len() == mesh.positions.len() && mesh.indices.len() % 3 == 0, "{text}");
+            assert!(mesh.normals.len() == mesh.positions.len() && mesh.indices.len().is_multiple_of(3), "{text}");
             assert!(mesh.normals.iter().all(|normal| normal.is_normalized()), "{text}");
             assert!(mesh.indices.iter().all(|&index| (index as usize) < mesh.positions.len()), "{text}");
         }

@@ -2,6 +2,7 @@
 use crate::cli::render::processor;
 use crate::cli::scene_flags::{DeviceFlags, parse_size};
 use crate::cli::{json, nameable, number, print, stem};
+use clap::builder::NonEmptyStringValueParser;
 use clap::parser::ValueSource;
 use clap::{ArgMatches, Args, Command, FromArgMatches, value_parser};
 use std::path::{Path, PathBuf};
@@ -25,17 +26,17 @@ use threadlight::{Error, Result};
 /// What to measure. Where a flag is left out, the command says what is taken: see [`Defaults`].
 #[derive(clap::Args)]
 pub struct CasesArguments {
-    #[arg(long, help = nameable::materials(), value_name = "LIST", value_delimiter = ',')]
+    #[arg(long, help = nameable::materials(), value_name = "LIST", value_delimiter = ',', value_parser = NonEmptyStringValueParser::new())]
     materials: Vec<String>,
-    #[arg(long, help = nameable::environment("Environments, each"), value_name = "LIST", value_delimiter = ',', default_value = "studio")]
+    #[arg(long, help = nameable::environment("Environments, each"), value_name = "LIST", value_delimiter = ',', value_parser = NonEmptyStringValueParser::new(), default_value = "studio")]
     environments: Vec<String>,
     /// Shading methods; `filtered_fixed` and `importance_fixed` are those at one set of points for all pixels.
-    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = NonEmptyStringValueParser::new())]
     methods: Vec<String>,
     /// Numbers of threads, or of samples of the other estimators, each 1 to 10000; a method is measured with those that it can have.
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = value_parser!(u32).range(1..=i64::from(MAX_SAMPLES)))]
     counts: Vec<u32>,
-    #[arg(long, help = nameable::scenes("Scenes, each a mesh"), value_name = "LIST", value_delimiter = ',', default_value = "sphere")]
+    #[arg(long, help = nameable::scenes("Scenes, each a mesh"), value_name = "LIST", value_delimiter = ',', value_parser = NonEmptyStringValueParser::new(), default_value = "sphere")]
     scene: Vec<String>,
     /// Size of the pictures in pixels, each side 11 to 16384.
     #[arg(long, value_name = "WxH", value_parser = parse_size, allow_hyphen_values = true)]
@@ -308,7 +309,11 @@ impl OutputArguments {
     /// Says before the work begins what cannot be written.
     pub fn check(&self, read: &[PathBuf]) -> Result<()> {
         self.json.check(read)?;
-        self.plot.as_deref().map_or(Ok(()), check_folder)
+        let Some(folder) = &self.plot else { return Ok(()) };
+        check_folder(folder)?;
+        // A file of the name of a folder that is still to be made would keep that from being made.
+        let to_make = (!folder.exists()).then(|| folder.components().collect());
+        files::check_all_writable(self.json.json.iter().chain(&to_make))
     }
 }
 
@@ -392,5 +397,12 @@ mod tests {
             assert!(error.contains(name.split('/').next().unwrap()), "{error}");
         }
         assert!(!path("new").exists());
+        let to = |json: &str, plot: &str| OutputArguments {
+            json: JsonArgument { json: Some(path(json)) },
+            plot: Some(path(plot)),
+        };
+        to("a.json", "new/").check(&[]).unwrap();
+        let error = to("new", "new/").check(&[]).unwrap_err().to_string();
+        assert!(error.contains("is to be written twice"), "{error}");
     }
 }

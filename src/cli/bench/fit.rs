@@ -2,6 +2,7 @@
 use super::arguments::{JsonArgument, files_of_materials, named_materials, once};
 use crate::cli::nameable;
 use crate::cli::progress::TerminalProgress;
+use clap::builder::NonEmptyStringValueParser;
 use clap::value_parser;
 use threadlight::low_level::evaluate::fit::{self, Fits};
 use threadlight::low_level::memo::Memo;
@@ -27,7 +28,7 @@ The JSON is a list of rows with these fields, in this order:
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES, allow_negative_numbers = true)]
 pub struct BenchFit {
-    #[arg(long, help = nameable::materials(), value_name = "LIST", value_delimiter = ',', default_value = "gold")]
+    #[arg(long, help = nameable::materials(), value_name = "LIST", value_delimiter = ',', value_parser = NonEmptyStringValueParser::new(), default_value = "gold")]
     materials: Vec<String>,
     /// Numbers of threads, each 1 to 128.
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "16,64", value_parser = value_parser!(u32).range(1..=MAX_COUNT as i64))]

@@ -3,6 +3,7 @@ use super::arguments::{
     CasesArguments, Defaults, OutputArguments, QUICK_TOLERANCE, TruthArguments, files_of_materials, named_materials,
 };
 use crate::cli::progress::TerminalProgress;
+use clap::builder::NonEmptyStringValueParser;
 use clap::value_parser;
 use std::path::Path;
 use threadlight::low_level::brdf::Brdf;
@@ -44,7 +45,7 @@ pub struct BenchGallery {
     #[command(flatten)]
     cases: CasesArguments,
     /// Materials to compare methods on, named as those of --materials.
-    #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "gold")]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = NonEmptyStringValueParser::new(), default_value = "gold")]
     compare: Vec<String>,
     /// Draw all materials, and compare no methods.
     #[arg(long, conflicts_with_all = ["compare", "reference_tolerance", "reference_on", "json"])]

@@ -3,6 +3,7 @@ use super::arguments::{JsonArgument, files_of_materials, named_environments, nam
 use crate::cli::nameable;
 use crate::cli::progress::TerminalProgress;
 use crate::cli::scene_flags::{DeviceFlags, parse_size};
+use clap::builder::NonEmptyStringValueParser;
 use clap::value_parser;
 use std::path::PathBuf;
 use threadlight::low_level::brdf::Brdf;
@@ -31,9 +32,9 @@ The JSON is a list of rows with these fields, in this order:
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES, allow_negative_numbers = true)]
 pub struct BenchTogether {
-    #[arg(long, help = nameable::materials(), value_name = "LIST", value_delimiter = ',')]
+    #[arg(long, help = nameable::materials(), value_name = "LIST", value_delimiter = ',', value_parser = NonEmptyStringValueParser::new())]
     materials: Vec<String>,
-    #[arg(long, help = nameable::environment("Environments, each"), value_name = "LIST", value_delimiter = ',', default_value = "studio")]
+    #[arg(long, help = nameable::environment("Environments, each"), value_name = "LIST", value_delimiter = ',', value_parser = NonEmptyStringValueParser::new(), default_value = "studio")]
     environments: Vec<String>,
     /// Fitted threads of each material, 1 to 128.
     #[arg(long, value_name = "N", default_value_t = 16, value_parser = value_parser!(u32).range(1..=MAX_COUNT as i64))]
