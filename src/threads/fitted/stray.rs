@@ -7,7 +7,7 @@ use std::f64::consts::TAU;
 use glam::DVec3;
 
 use super::kernel::{FINEST_WIDTH_RAD, Kernel, TOLD_RAD, scale_rad, variance_of_level};
-use super::lights::{DIM_RESPONSE, NARROWEST_RAD, points_of_narrowest};
+use super::lights::{NARROWEST_RAD, points_of_narrowest};
 use super::solve::{Effort, Fit};
 use crate::brdf::luminance;
 use crate::error::Result;
@@ -16,6 +16,9 @@ use crate::progress::Observer;
 /// A kernel strays if it gives the narrowest light in its direction so many times what the BRDF gives it. Within a lobe none gives much more
 /// than all do together.
 const MOST_OVER: f64 = 3.0;
+
+/// What the BRDF gives counts as more by this part of the mean radiance: where it gives next to nothing, ghosts are as dim.
+const LEAST_RESPONSE: f64 = 0.1;
 
 /// How often a row is fitted again: others may stray then.
 const ROUNDS: usize = 8;
@@ -60,7 +63,7 @@ pub fn strays(kernels: &[Kernel], sets: usize, unit: f64, f_cos: &FCos) -> Vec<u
         let peak = 1.0 / (TAU * (kernel_variance + NARROWEST_RAD.powi(2)));
         // A set that stands alone has as many times the weights.
         let given = sets as f64 * unit * luminance(kernel.weight) * peak;
-        let is_over = |f_cos: DVec3| given > MOST_OVER * (luminance(f_cos) + DIM_RESPONSE * unit);
+        let is_over = |f_cos: DVec3| given > MOST_OVER * (luminance(f_cos) + LEAST_RESPONSE * unit);
         // What is in a lobe that is narrower than the light may be beside its peak.
         is_over(f_cos(kernel.direction)) && {
             let points = points_of_narrowest(kernel.direction);
