@@ -33,11 +33,11 @@ pub fn may_be_drafted(prepared: &Prepared) -> bool {
         && prepared.materials.iter().any(|material| with_parameters.contains(&material.brdf.model()))
 }
 
-/// As [`prepare`], but threads that are not known yet are drafted from those of `before`; none where that cannot be ([`can_draft`]) or
+/// As [`prepare`](super::prepare), but threads that are not known yet are drafted from those of `before`; none where that cannot be ([`can_draft`]) or
 /// nothing has to be.
 ///
 /// # Errors
-/// Those of [`prepare`].
+/// Those of [`prepare`](super::prepare).
 pub fn prepare_draft(scene: &Scene, before: &Prepared, round: &Round) -> Result<Option<Prepared>> {
     if !can_draft(scene, before) {
         return Ok(None);

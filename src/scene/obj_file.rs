@@ -517,7 +517,9 @@ mod tests {
         let normals = |faces: String| -> Vec<(Vec3, Vec3)> {
             let mesh = parse(Path::new("a.obj"), (corners.clone() + &faces).as_bytes(), &()).unwrap();
             let mut all: Vec<_> = mesh.positions.into_iter().zip(mesh.normals).collect();
-            all.sort_by(|(a, _), (b, _)| a.to_array().map(|x| (x * 8.0) as i64).cmp(&b.to_array().map(|x| (x * 8.0) as i64)));
+            all.sort_by(|(a, _), (b, _)| {
+                a.to_array().map(|x| (x * 8.0) as i64).cmp(&b.to_array().map(|x| (x * 8.0) as i64))
+            });
             all
         };
         let alike = normals(faces(|_| false));
