@@ -374,7 +374,9 @@ fn clean(Obj { mesh: obj, smoothing_groups }: &Obj, observer: &dyn Observer) -> 
     let mut turned = 0;
     if means.values().any(|mean| mean.has_both_sides) {
         turned = turn_alike(&mut kept);
-        means = mean_normals(&kept, &positions);
+        if turned > 0 {
+            means = mean_normals(&kept, &positions);
+        }
     }
     let mut vertices = HashMap::new();
     let (mut mesh, mut uvs) = (Mesh::default(), Vec::new());

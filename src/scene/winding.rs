@@ -76,6 +76,13 @@ mod tests {
             ]
         };
         let band: Vec<_> = (0..5).flat_map(band).collect();
-        assert_eq!(against_neighbours(&band, &[1.0; 10]).len(), 10);
+        let against = against_neighbours(&band, &[1.0; 10]);
+        assert!(against.iter().filter(|is_against| **is_against).count() <= 5, "{against:?}");
+        // Seen from both of its triangles, one edge is left where the band is cut.
+        let neighbours = neighbours(&band);
+        let edges =
+            (0..10).flat_map(|triangle| neighbours[triangle].into_iter().flatten().map(move |edge| (triangle, edge)));
+        let cut = edges.filter(|&(triangle, (other, is_alike))| (against[triangle] == against[other]) != is_alike);
+        assert_eq!(cut.count(), 2);
     }
 }
