@@ -10,7 +10,9 @@ use crate::pipeline::{DeviceScene, Wanted};
 use crate::prepare::{prepare, threads_of};
 use crate::progress::Observer;
 use crate::rendering::Rendering;
-use crate::scene::{CustomMesh, EnvironmentSource, ImageSettings, MaterialSource, MeshSource, Scene, mesh};
+use crate::scene::{
+    Background, Camera, CustomMesh, EnvironmentSource, ImageSettings, MaterialSource, MeshSource, Scene, mesh,
+};
 use crate::threads::{ThreadSettings, Threads};
 use crate::vulkan::{Device, Instance};
 use std::path::{Path, PathBuf};
@@ -196,6 +198,17 @@ impl Scene {
     /// The same with an image of this size, in pixels.
     pub fn with_size(mut self, width: u32, height: u32) -> Self {
         (self.image.width, self.image.height) = (width, height);
+        self
+    }
+
+    /// The same seen by this camera; without one, by a camera that frames all objects.
+    pub fn with_camera(self, camera: Camera) -> Self {
+        Self { camera: Some(camera), ..self }
+    }
+
+    /// The same before this background.
+    pub fn with_background(mut self, background: Background) -> Self {
+        self.image.background = background;
         self
     }
 

@@ -47,9 +47,12 @@ pub use brdf::{Brdf, Custom, CustomBrdf};
 pub use environment::{CustomEnvironment, Environment};
 pub use error::{Error, Result};
 pub use facade::{Picture, Renderer};
-pub use method::Method;
+pub use method::{Method, Pattern};
 pub use progress::Observer;
-pub use scene::{CustomMesh, Scene};
+pub use scene::{
+    Background, Camera, CustomMesh, EnvironmentSettings, EnvironmentSource, ImageSettings, MaterialSettings,
+    MaterialSource, MeshSource, ObjectSettings, Scene, ShadingSettings, Source, TangentRule,
+};
 pub use threads::Threads;
 
 /// The crate of vectors in what is public, in the version that it is of.

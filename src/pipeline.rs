@@ -141,6 +141,12 @@ impl DeviceScene {
         self.geometry_cache.region(view, self.classify.tile_px())
     }
 
+    /// An error for a `view` that is larger than the device can do with the shaders that the scene has.
+    pub(crate) fn check_size(&self, view: &View) -> Result<()> {
+        check_cache_size(&self.device, view.cache_size())?;
+        check_lists(&self.device, [view.width, view.height], self.classify.shader_count as usize)
+    }
+
     /// Starts the random numbers of later frames from `seed`: other noise, for methods that have any.
     pub fn reseed(&mut self, seed: u64) {
         self.shade.sampling.seed = seed;
@@ -159,9 +165,7 @@ impl DeviceScene {
     /// # Errors
     /// As there; [`Error::Cancelled`](crate::Error::Cancelled).
     pub fn render_watched(&self, wanted: Wanted, repeat: u32, observer: &dyn Observer) -> Result<Rendering> {
-        let View { width, height, .. } = self.view;
-        check_cache_size(&self.device, self.view.cache_size())?;
-        check_lists(&self.device, [width, height], self.classify.shader_count as usize)?;
+        self.check_size(&self.view)?;
         let mut graph = FrameGraph::new();
         let region = match wanted.geometry {
             true => Region::whole(&self.view, self.classify.tile_px()),
@@ -171,9 +175,9 @@ impl DeviceScene {
         let mut readbacks = Readbacks::new(&self.device, graph);
         let counters = readbacks.buffer("counters", frame.counters, size_of::<Counters>() as u64)?;
         let lookups = readbacks.buffer("lookups", frame.lookups, size_of::<u64>() as u64)?;
-        let radiance = readbacks.image("radiance", frame.radiance, [width, height], 16, wanted.radiance)?;
-        let display = readbacks.image("display", frame.display, [width, height], 4, wanted.display)?;
-        let geometry = readbacks.image("geometry", frame.geometry, self.view.cache_size(), 8, wanted.geometry)?;
+        let radiance = readbacks.image("radiance", frame.radiance, wanted.radiance)?;
+        let display = readbacks.image("display", frame.display, wanted.display)?;
+        let geometry = readbacks.image("geometry", frame.geometry, wanted.geometry)?;
         let Readbacks { graph, imports, .. } = readbacks;
         let executable = Executable::new(&self.device, graph, &imports)?;
 
@@ -257,7 +261,7 @@ pub fn render_geometry(device: &Arc<Device>, prepared: &Prepared, round: &Round)
     let mut graph = FrameGraph::new();
     let geometry = geometry_cache(&mut graph, &pass, Region::whole(&prepared.view, [1, 1]), &prepared.view);
     let mut readbacks = Readbacks::new(device, graph);
-    let target = readbacks.image("geometry", geometry, prepared.view.cache_size(), 8, true)?;
+    let target = readbacks.image("geometry", geometry, true)?;
     readbacks.run("geometry")?;
     Ok(texels(target.as_deref()))
 }

@@ -1,15 +1,15 @@
 //! Long work: how it says how far it is, and how it is told to stop.
 
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
 
 use crate::error::{Error, Result};
 
-/// Watches long work.
+/// Watches long work. It may be called on any thread.
 pub trait Observer: Sync {
     /// What is being made from now on, in a word or two; its parts are counted from 0.
     fn begin(&self, _what: &str) {}
 
-    /// `done` of `total` parts are finished.
+    /// `done` of `total` parts are finished: after `begin` never fewer than before.
     fn progress(&self, done: usize, total: usize);
 
     /// Whether the work is to end with [`Error::Cancelled`].
@@ -35,7 +35,7 @@ impl Observer for () {
 /// Counts the parts of long work for its observer; they may end on any thread.
 pub(crate) struct Parts<'a> {
     observer: &'a dyn Observer,
-    done: AtomicUsize,
+    done: Mutex<usize>,
     total: usize,
 }
 
@@ -43,7 +43,7 @@ impl<'a> Parts<'a> {
     /// Tells `observer` that none of `total` is done.
     pub fn new(total: usize, observer: &'a dyn Observer) -> Self {
         observer.progress(0, total);
-        Self { observer, done: AtomicUsize::new(0), total }
+        Self { observer, done: Mutex::new(0), total }
     }
 
     /// One more is done.
@@ -51,7 +51,12 @@ impl<'a> Parts<'a> {
     /// # Errors
     /// [`Error::Cancelled`].
     pub fn advance(&self) -> Result<()> {
-        self.observer.progress(self.done.fetch_add(1, Ordering::Relaxed) + 1, self.total);
+        {
+            // Held while it is told: else of two that end at once the later one might be told first.
+            let mut done = self.done.lock().unwrap_or_else(PoisonError::into_inner);
+            *done += 1;
+            self.observer.progress(*done, self.total);
+        }
         self.observer.check()
     }
 }

@@ -59,9 +59,10 @@ fn scene(
 fn small_environment(folder: &Path, name: &str) -> EnvironmentSource {
     let full = Environment::builtin(name).unwrap();
     let (width, height) = (128, 64);
-    let step = full.width / width;
+    let [columns, _] = full.size();
+    let step = columns / width;
     let texel = |i: usize| {
-        let [r, g, b] = full.texels[i / width * step * full.width + i % width * step];
+        let [r, g, b] = full.texels()[i / width * step * columns + i % width * step];
         [r, g, b, 1.0]
     };
     let texels: Vec<_> = (0..width * height).map(texel).collect();

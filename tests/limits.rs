@@ -110,7 +110,10 @@ fn errors_are_those_of_the_chapter_on_limits() {
         "model = 'principled'\nbase_colour = 0\nmetallic = 0\nroughness = 0.5\nsheen = 1\nsheen_roughness = 0.1";
     let aluminium = metal("Al", "alpha_x = 0.02\nalpha_y = 0.3");
     let line = || map(MAP, |direction| if direction.y.abs() < 0.01 { 25.0 } else { 0.1 });
-    let studio = || EnvironmentSource::Builtin("studio".to_owned());
+    // By OpenPBR as long as 0.07 x 0.7.
+    let brushed = "model = 'principled'\nbase_colour = [0.9, 0.4, 0.2]\nmetallic = 1\nroughness = 0.7\nanisotropy = 0.9\n\
+                   anisotropy_convention = 'openpbr'\nsheen = [0.5, 0.5, 0.9]\nsheen_roughness = 0.3";
+    let [studio, many_lamps] = ["studio", "lamps-70"].map(|name| move || EnvironmentSource::Builtin(name.to_owned()));
     println!("{:34}{:>8}{:>8}{:>7}", "case", "threads", "RMS", "most");
     let measure =
         |name, material: &str, light, scene, bounds: &[_]| measure(&gpu, name, material, light, scene, bounds);
@@ -130,6 +133,8 @@ fn errors_are_those_of_the_chapter_on_limits() {
     measure("window and 1/300 of it, gold", &gold, window(1.0, 20.0, 30.0, 0.1), ball(), &few_and_many(0.02, 0.006));
     measure("window, sheen", sheen, window(1.0, 20.0, 1.0, 0.0), ball(), &[(16, 0.06), (48, 0.01)]);
     measure("studio, long lobe", &aluminium, studio(), ball(), &few_and_many(0.03, 0.01));
+    measure("70 lamps, long lobe", &aluminium, many_lamps(), ball(), &few_and_many(0.1, 0.05));
+    measure("studio, sheen over a long lobe", brushed, studio(), ball(), &few_and_many(0.06, 0.02));
     measure("studio, cube of porcelain", &porcelain, studio(), cube(), &few_and_many(0.04, 0.04));
     gpu.finish();
 }

@@ -40,7 +40,7 @@ impl CustomEnvironment {
             return Err(Error::input(name, problem, "give one for each column of each row"));
         }
         if count as u64 > MAX_PIXELS {
-            return Err(Error::input(name, format!("has {count} pixels, more than 2^28"), "make it smaller"));
+            return Err(Error::input(name, format!("has {count} pixels, more than {MAX_PIXELS}"), "make it smaller"));
         }
         Environment::of_pixels(name, width, height, pixels).map(|environment| Self(Arc::new(environment)))
     }

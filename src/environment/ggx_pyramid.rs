@@ -23,6 +23,11 @@ fn rings(level: usize) -> usize {
     8 + 4 * level
 }
 
+/// Texels along the edge of a face of each level, where level 0 has `face_size`; none of a level that is less than a texel.
+pub(super) fn sizes(face_size: usize) -> Vec<usize> {
+    (0..LEVELS).map(|level| face_size >> level).filter(|size| *size > 0).collect()
+}
+
 /// The level of that pyramid whose lobe has this roughness.
 pub fn level_of_alpha(roughness_alpha: f32) -> f32 {
     (roughness_alpha / FINEST_ALPHA as f32).log2().clamp(0.0, (LEVELS - 1) as f32)
@@ -35,8 +40,7 @@ pub fn level_of_alpha(roughness_alpha: f32) -> f32 {
 /// Cancelled by `observer`.
 pub fn ggx_pyramid(source: &Pyramid, observer: &dyn Observer) -> Result<Pyramid> {
     let face_size = (2 * source.face_size).clamp(FEWEST_TEXELS, MOST_TEXELS);
-    let level = |level: usize| {
-        let size = face_size >> level;
+    let level = |(level, size): (usize, usize)| {
         let taps = ggx_lobe(FINEST_ALPHA * (1 << level) as f64, rings(level));
         let total: f64 = taps.iter().map(|tap| tap.weight).sum();
         let texel = |index: usize| {
@@ -62,7 +66,7 @@ pub fn ggx_pyramid(source: &Pyramid, observer: &dyn Observer) -> Result<Pyramid>
             (0..6 * size * size).into_par_iter().step_by(size).map(row_of_texels).collect::<Result<_>>()?;
         Ok(rows.concat())
     };
-    Ok(Pyramid { face_size, levels: (0..LEVELS).map(level).collect::<Result<_>>()? })
+    Ok(Pyramid { face_size, levels: sizes(face_size).into_iter().enumerate().map(level).collect::<Result<_>>()? })
 }
 
 #[cfg(test)]

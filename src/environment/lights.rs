@@ -1,7 +1,6 @@
 //! Lights of the built-in environments that are as small as pixels or have edges: each pixel gets the share of its solid angle that they
 //! cover.
 use std::f64::consts::{PI, TAU};
-use std::sync::Arc;
 
 use glam::{DVec3, dvec3};
 use rayon::prelude::*;
@@ -57,7 +56,7 @@ impl Light {
 }
 
 /// Adds lights to an environment.
-pub(super) fn with_lights(mut environment: Environment, lights: &[Light]) -> Environment {
+pub(super) fn with_lights(environment: &Environment, lights: &[Light]) -> Environment {
     const SUBPIXELS: usize = 16;
     // Pixels whose centre is farther than that from what a light covers hold nothing of it.
     let two_rows = TAU / environment.height as f64;
@@ -86,10 +85,8 @@ pub(super) fn with_lights(mut environment: Environment, lights: &[Light]) -> Env
         centres.map(move |(column, centre)| of_pixel((column as f64, row as f64), centre))
     };
     let added: Vec<DVec3> = (0..environment.height).into_par_iter().flat_map_iter(of_row).collect();
-    for (texel, light) in Arc::make_mut(&mut environment.texels).iter_mut().zip(added) {
-        *texel = (to_dvec3(texel) + light).as_vec3().to_array();
-    }
-    environment
+    let lit = environment.texels.iter().zip(added).map(|(texel, light)| to_dvec3(texel) + light);
+    environment.with_texels(lit.map(|radiance| radiance.as_vec3().to_array()).collect())
 }
 
 /// So many windows and bulbs of all sizes and colours, all around: what cuts most light out as sources, and leaves the rest of it to kernels.
@@ -133,7 +130,7 @@ mod tests {
         for centre in [DVec3::X, DVec3::Y, DVec3::new(0.3, -0.8, 0.5).normalize()] {
             let black = Environment::new("black".into(), 256, 128, vec![[0.0; 3]; 256 * 128], RepairCounts::default());
             let light = Light::window(centre, [x, y], dvec3(1.0, 2.0, 3.0));
-            let shed = with_lights(black, &[light]).mean_radiance() * 4.0 * PI / solid_angle_sr;
+            let shed = with_lights(&black, &[light]).mean_radiance() * 4.0 * PI / solid_angle_sr;
             // 16 x 16 samples a pixel of an edge.
             assert!((shed / dvec3(1.0, 2.0, 3.0) - 1.0).abs().max_element() < 4e-3, "{centre}: {shed}");
         }

@@ -37,7 +37,7 @@ impl Environment {
         if repaired != RepairCounts::default() {
             let RepairCounts { nan, infinite, negative } = repaired;
             tracing::warn!(
-                "{name}: repaired pixels: {nan} NaN, {infinite} infinite or above 1e30, {negative} negative"
+                "{name}: repaired pixels: {nan} NaN, {infinite} infinite or above {MOST_RADIANCE:e}, {negative} negative"
             );
         }
         Self::new(name, width, height, texels, repaired)

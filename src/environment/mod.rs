@@ -17,8 +17,8 @@ mod load;
 pub mod moments_file;
 mod procedural;
 pub mod pyramid;
+pub mod pyramid_file;
 pub mod sources;
-pub mod vmf_file;
 mod vmf_pyramid;
 
 pub use custom::CustomEnvironment;
@@ -58,11 +58,12 @@ pub struct Environment {
     /// The built-in's name, or the file's or a program's as it was given.
     pub name: String,
     /// Columns, at least 1.
-    pub width: usize,
+    pub(crate) width: usize,
     /// Rows, at least 1.
-    pub height: usize,
-    /// Radiance at the pixel centres, row by row from the top; finite and not negative.
-    pub texels: Arc<Vec<[f32; 3]>>,
+    pub(crate) height: usize,
+    /// Radiance at the pixel centres, row by row from the top; finite and not negative. Others are those of another environment:
+    /// [`Self::with_texels`].
+    pub(crate) texels: Arc<Vec<[f32; 3]>>,
     /// What had to be repaired when it was read.
     pub repaired: RepairCounts,
     /// Made when first asked for.
@@ -96,6 +97,23 @@ impl Environment {
     ) -> Self {
         let texels = Arc::new(texels);
         Self { name, width, height, texels, repaired, small_sources: OnceLock::new(), fingerprint: OnceLock::new() }
+    }
+
+    /// Columns and rows, each at least 1.
+    pub fn size(&self) -> [usize; 2] {
+        [self.width, self.height]
+    }
+
+    /// Radiance at the pixel centres, row by row from the top; finite and not negative.
+    pub fn texels(&self) -> &[[f32; 3]] {
+        &self.texels
+    }
+
+    /// The same picture with other `texels`, as many, which are taken as they are.
+    #[must_use]
+    pub fn with_texels(&self, texels: Vec<[f32; 3]>) -> Self {
+        let Self { ref name, width, height, repaired, .. } = *self;
+        Self::new(name.clone(), width, height, texels, repaired)
     }
 
     /// Digest of its size and pixels: of equal ones are only equal environments, but for their names.

@@ -1,6 +1,5 @@
 //! The built-in environments: a soft sky, the same with a small sun, a studio with area lights, halls of many lamps, and the white
 //! furnace.
-use std::sync::Arc;
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -29,10 +28,10 @@ impl Environment {
     /// a dark room), `lamps-10`, `lamps-70` and `lamps-500` (so many windows and bulbs around a dark hall) or `white` (radiance 1
     /// everywhere: the furnace).
     pub fn builtin(name: &str) -> Result<Self> {
-        let lamps = |count| with_lights(procedural(name, SIZE, hall), &windows_and_bulbs(count));
+        let lamps = |count| with_lights(&procedural(name, SIZE, hall), &windows_and_bulbs(count));
         match name {
             "sky" => Ok(procedural(name, SIZE, sky)),
-            "sun" => Ok(with_lights(procedural(name, SIZE, sky), &[sun()])),
+            "sun" => Ok(with_lights(&procedural(name, SIZE, sky), &[sun()])),
             "studio" => Ok(procedural(name, SIZE, studio)),
             "lamps-10" => Ok(lamps(10)),
             "lamps-70" => Ok(lamps(70)),
@@ -49,12 +48,10 @@ impl Environment {
 
 /// The picture of a function of direction, sampled at the pixel centres: functions here are smooth over a pixel.
 fn procedural(name: &str, (width, height): (usize, usize), radiance: impl Fn(DVec3) -> DVec3 + Sync) -> Environment {
-    let mut environment = Environment::new(name.into(), width, height, Vec::new(), RepairCounts::default());
+    let environment = Environment::new(name.into(), width, height, Vec::new(), RepairCounts::default());
     let directions = environment.directions((0..width).map(|column| column as f64));
     let of_row = |row| directions.of_row(row as f64).map(|direction| radiance(direction).as_vec3().to_array());
-    let texels = (0..height).into_par_iter().flat_map_iter(of_row).collect();
-    environment.texels = Arc::new(texels);
-    environment
+    environment.with_texels((0..height).into_par_iter().flat_map_iter(of_row).collect())
 }
 
 /// Blue above, pale at the horizon, warm round the sun's place; matt ground below.

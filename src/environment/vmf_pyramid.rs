@@ -58,6 +58,12 @@ pub struct BlurStep {
 }
 
 impl VmfPyramid {
+    /// Texels along the edge of a face of each level, where level 0 has `finest`.
+    pub(super) fn sizes(finest: usize) -> Vec<usize> {
+        let levels = Self::steps(finest).into_iter().filter(|step| step.kernel != BlurKernel::Mean);
+        levels.map(|step| step.size).collect()
+    }
+
     /// How its maps are made for faces of `finest` texels: levels (kernel [`BlurKernel::Vmf`]) from fine to coarse, and means of 2 x 2
     /// texels of them.
     ///

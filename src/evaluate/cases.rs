@@ -30,6 +30,7 @@ pub struct Estimator {
 
 /// A part of the combinations of materials and environments, for jobs that share a sweep: as text `2/8`, the second of eight.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(try_from = "PartOfParts")]
 pub struct Shard {
     /// Which part this is, from 1.
     number: usize,
@@ -53,8 +54,23 @@ impl Shard {
 
     /// Which of `length` things are in this part. Neighbours stay together, as the threads of a material are made once for all environments.
     pub(super) fn of(self, length: usize) -> Range<usize> {
-        let end = |number: usize| number * length / self.count;
+        let end = |number: usize| (number as u128 * length as u128 / self.count as u128) as usize;
         end(self.number - 1)..end(self.number)
+    }
+}
+
+/// A [`Shard`] as a file has it, which there may be none of.
+#[derive(Deserialize)]
+struct PartOfParts {
+    number: usize,
+    count: usize,
+}
+
+impl TryFrom<PartOfParts> for Shard {
+    type Error = String;
+
+    fn try_from(PartOfParts { number, count }: PartOfParts) -> Result<Self, Self::Error> {
+        Self::new(number, count).ok_or_else(|| format!("there is no part {number} of {count}"))
     }
 }
 

@@ -35,6 +35,14 @@ pub fn merged<'a>(files: impl IntoIterator<Item = (&'a Path, Vec<Row>)>) -> Resu
                 return Err(Error::in_file(path, problem, "give each part of a sweep once"));
             }
             if let Some((shard, combinations)) = row.shard.zip(row.combinations) {
+                if shard.count > combinations {
+                    let problem = format!("has part {shard} of a sweep of {combinations} combinations");
+                    return Err(Error::in_file(
+                        path,
+                        problem,
+                        "give a file that `threadlight bench error --json` wrote",
+                    ));
+                }
                 let of = (method.clone(), *threads, scene.clone(), shard.count, combinations);
                 parts.entry(of).or_default().push(shard);
             }
@@ -95,6 +103,8 @@ mod tests {
         assert!(error.contains("lack 1 of the 2 of 3/3 of paper with 4 on s"), "{error}");
         let rest = ["2/3", "3/3"].map(|shard| of_five(&part(shard, shard)));
         assert!(merge([&interrupted[..], &rest].concat()).unwrap().iter().all(|row| row.combinations.is_none()));
+        let error = merge(vec![Row { combinations: Some(1), ..part("gold", "1/99999999999999999") }]).unwrap_err();
+        assert!(error.to_string().contains("part 1/99999999999999999 of a sweep of 1 comb"), "{error}");
         // Another method may have been shared by others.
         let of_two = |shard: &str| Row { method: "fitted".into(), ..part("gold", shard) };
         assert!(merge([&all[..], &[of_two("1/2")]].concat()).is_err());

@@ -152,6 +152,9 @@ impl<'a> ComputePass<'_, 'a> {
         arguments: BufferHandle,
         dispatches: impl IntoIterator<Item = (&'a ComputePipeline, u64, P)>,
     ) {
+        if !matches!(&self.push, Push::Known(bytes) if bytes.is_empty()) {
+            self.refuse("push constants", "each dispatch has its own");
+        }
         self.pass.read(arguments, Access::Indirect);
         let dispatch = |(pipeline, offset, push): (&'a ComputePipeline, u64, P)| {
             self.pass.depends_on(&offset);

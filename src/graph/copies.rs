@@ -22,7 +22,7 @@ impl FrameGraph<'_> {
         *image = cleared;
     }
 
-    /// Copies all of `source` into `target`.
+    /// Copies `source` into `target`: its start, if that is shorter.
     pub fn copy_buffer(&mut self, name: &str, source: BufferHandle, target: &mut BufferHandle) {
         let mut pass = self.pass(name);
         let written = pass.read(source, Access::TransferRead).write(*target, Access::TransferWrite);

@@ -117,6 +117,14 @@ impl<W> Graph<W> {
         self.resource(name, ResourceKind::Image(desc), Some(Import { before, after })).into()
     }
 
+    /// What the image of this handle is; none if it is of another graph.
+    pub fn image_desc(&self, handle: ImageHandle) -> Option<ImageDesc> {
+        match self.resources.get(Handle::from(handle).resource)?.kind {
+            ResourceKind::Image(desc) => Some(desc),
+            ResourceKind::Buffer(_) => None,
+        }
+    }
+
     /// A buffer that someone else owns and keeps: see [`Graph::import_image`].
     pub fn import_buffer(
         &mut self,

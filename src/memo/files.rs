@@ -21,8 +21,10 @@ impl Files {
         }
         let bytes = read(path)?;
         let key = Key::of_bytes(&bytes);
-        self.lock().insert(path.to_owned(), (key, Some(bytes)));
-        Ok(key)
+        // Another thread may have read it meanwhile: whoever was first says what it is until it is forgotten.
+        let mut known = self.lock();
+        let (key, _) = known.entry(path.to_owned()).or_insert((key, Some(bytes)));
+        Ok(*key)
     }
 
     /// The contents that [`Self::key`] names.

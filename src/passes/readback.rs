@@ -1,6 +1,8 @@
 //! Copies what the CPU wants to see into memory that it can read.
 use crate::Result;
-use crate::graph::{Access, BufferDesc, BufferHandle, DeviceResource, Executable, FrameGraph, Handle, ImageHandle};
+use crate::graph::{
+    Access, BufferDesc, BufferHandle, DeviceResource, Executable, FrameGraph, Handle, ImageDesc, ImageHandle,
+};
 use crate::vulkan::{self, BufferUse, Device, Frames, PassTime};
 use ash::vk;
 use std::sync::Arc;
@@ -72,20 +74,15 @@ impl<'a, 'd> Readbacks<'a, 'd> {
     ///
     /// # Errors
     /// No memory left.
-    pub fn image(
-        &mut self,
-        name: &str,
-        source: ImageHandle,
-        [width, height]: [u32; 2],
-        texel_bytes: u64,
-        wanted: bool,
-    ) -> Result<Option<Arc<vulkan::Buffer>>> {
+    pub fn image(&mut self, name: &str, source: ImageHandle, wanted: bool) -> Result<Option<Arc<vulkan::Buffer>>> {
         if !wanted {
             return Ok(None);
         }
+        let shape = |desc: ImageDesc| vulkan::ImageShape::plane(desc.format, desc.width, desc.height);
+        // What is not copied, executing the graph tells.
+        let bytes = self.graph.image_desc(source).and_then(|desc| shape(desc).level_bytes(0)).unwrap_or(1);
         let pass = format!("{PREFIX}{name}");
-        let (mut handle, target) =
-            self.target(&format!("{pass}_target"), texel_bytes * u64::from(width) * u64::from(height))?;
+        let (mut handle, target) = self.target(&format!("{pass}_target"), bytes)?;
         self.graph.copy_image(&pass, source, &mut handle);
         self.graph.output(handle);
         Ok(Some(target))

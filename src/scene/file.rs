@@ -1,6 +1,6 @@
 //! The scene file: TOML to and from [`Scene`], with errors that name file, line and key.
 use std::collections::HashSet;
-use std::ops::RangeBounds;
+use std::ops::{RangeBounds, RangeInclusive};
 use std::path::{Path, PathBuf};
 
 use serde::de::{Deserializer, Error as _};
@@ -350,7 +350,7 @@ where
 }
 
 /// An integer in `range`: read as wide as TOML has them, so that -1 and 10^12 get the same message as 0.
-fn integer<'de, D: Deserializer<'de>>(deserializer: D, range: std::ops::RangeInclusive<u32>) -> Result<u32, D::Error> {
+fn integer<'de, D: Deserializer<'de>>(deserializer: D, range: RangeInclusive<u32>) -> Result<u32, D::Error> {
     let (low, high) = (i64::from(*range.start()), i64::from(*range.end()));
     checked(deserializer, low..=high, &format!("{low} to {high}")).map(|value| value as u32)
 }
@@ -389,14 +389,23 @@ fn finite<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
     checked(deserializer, f64::MIN..=f64::MAX, "finite")
 }
 
+/// `value` in single precision, unless that cannot hold it: read so, what it is would be lost.
+fn single(value: f64) -> Result<f32, String> {
+    let single = value as f32;
+    if single.is_finite() { Ok(single) } else { Err(format!("{value:?} must be finite, from -3.4e38 to 3.4e38")) }
+}
+
 fn scale<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f32, D::Error> {
-    let scale = checked(deserializer, f32::MIN..=f32::MAX, "finite")?;
+    let scale = single(f64::deserialize(deserializer)?).map_err(D::Error::custom)?;
     if scale == 0.0 { Err(D::Error::custom("0 must not be the scale")) } else { Ok(scale) }
 }
 
 /// A rule of tangents: of its table there is one key.
 fn tangent<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<TangentRule>, D::Error> {
     let rule = toml::Value::deserialize(deserializer)?;
+    if !(rule.is_str() || rule.is_table()) {
+        return Err(D::Error::custom("give \"uv\", { around = [x, y, z] } or { along = [x, y, z] }"));
+    }
     if rule.as_table().is_some_and(|table| table.len() != 1) {
         return Err(D::Error::custom("give `around` or `along`"));
     }
@@ -404,12 +413,9 @@ fn tangent<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<TangentR
 }
 
 fn finite_vector<'de, D: Deserializer<'de>>(deserializer: D) -> Result<[f32; 3], D::Error> {
-    let vector: [f32; 3] = three_numbers(deserializer)?;
-    if vector.iter().all(|value| value.is_finite()) {
-        Ok(vector)
-    } else {
-        Err(D::Error::custom(format!("{vector:?} must be three finite numbers")))
-    }
+    let [x, y, z] = three_numbers::<f64, [_; 3], D>(deserializer)?;
+    let single = |value| single(value).map_err(D::Error::custom);
+    Ok([single(x)?, single(y)?, single(z)?])
 }
 
 /// What [`Scene::to_toml`] writes.

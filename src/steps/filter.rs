@@ -1,7 +1,7 @@
 //! Filters environments: what the methods look up of them, in memory.
 use crate::Result;
 use crate::brdf::BaseProfile;
-use crate::environment::{Environment, LightMoments, Pyramid, VmfPyramid, ggx_pyramid, moments_file, vmf_file};
+use crate::environment::{Environment, LightMoments, Pyramid, VmfPyramid, ggx_pyramid, moments_file, pyramid_file};
 use crate::light::{BlurredLight, KernelNeeds, Light, PrefilteredLight, bases};
 use crate::memo::{Key, Keyed, Memo, Round, Step, Stored};
 use crate::method::Method;
@@ -9,6 +9,7 @@ use crate::passes::vmf_pyramid;
 use crate::steps::pipelines;
 use crate::threads::ShadedLobe;
 use crate::vulkan::{Device, DeviceKind};
+use std::path::Path;
 use std::sync::Arc;
 
 /// The box-filtered pyramid of an environment.
@@ -88,12 +89,18 @@ impl Step for GgxFilter<'_> {
     const NAME: &'static str = "environment";
 
     fn key(&self, _: &Memo) -> Result<Key> {
-        Ok(Key::builder("ggx").key(self.0.key).build())
+        Ok(Key::builder("ggx").key(self.0.key).number(pyramid_file::GGX.version()).build())
     }
 
     fn make(&self, round: &Round) -> Result<Pyramid> {
         let source = round.ask(&BoxFilter { environment: self.0, face_size: None })?;
         ggx_pyramid(&source, round.observer())
+    }
+
+    fn stored(&self) -> Option<Stored<'_, Pyramid>> {
+        let read = |path: &Path| pyramid_file::GGX.read(path);
+        let write = |path: &Path, pyramid: &Pyramid| pyramid_file::GGX.write(path, pyramid);
+        Some(Stored { extension: "pyramid", read: Box::new(read), write: Box::new(write) })
     }
 }
 
@@ -136,7 +143,7 @@ impl Step for Blur<'_> {
         // They round differently, each in its way.
         let made_by = self.gpu().map_or(Vec::new(), |device| device.driver_id());
         let of = Key::builder("blur").key(self.environment.key).number(self.face_size() as u64);
-        Ok(of.number(vmf_file::FORMAT_VERSION).bytes(&made_by).build())
+        Ok(of.number(pyramid_file::VMF.version()).bytes(&made_by).build())
     }
 
     fn make(&self, round: &Round) -> Result<VmfPyramid> {
@@ -149,7 +156,9 @@ impl Step for Blur<'_> {
     }
 
     fn stored(&self) -> Option<Stored<'_, VmfPyramid>> {
-        Some(Stored { extension: "pyramid", read: Box::new(vmf_file::read), write: Box::new(vmf_file::write) })
+        let read = |path: &Path| Ok(VmfPyramid { levels: pyramid_file::VMF.read(path)? });
+        let write = |path: &Path, pyramid: &VmfPyramid| pyramid_file::VMF.write(path, &pyramid.levels);
+        Some(Stored { extension: "pyramid", read: Box::new(read), write: Box::new(write) })
     }
 }
 

@@ -101,6 +101,10 @@ impl Viewer {
             Some(loaded) => {
                 // The window scales it.
                 let mut view = self.view(loaded)?.fit(self.longest_side);
+                while let Err(error) = loaded.device_scene.check_size(&view) {
+                    self.shrink(&view, error)?;
+                    view = view.fit(self.longest_side);
+                }
                 if is_moving {
                     [view.width, view.height] = self.dynamic_resolution.moving([view.width, view.height]);
                 }
@@ -154,7 +158,7 @@ impl Viewer {
         self.measured.counted = drawn.counted.or(self.measured.counted);
     }
 
-    /// There is too little memory for a frame of `view`: later ones have a quarter of its pixels at most.
+    /// A frame of `view` is too large for the device, or there is too little memory for it: later ones have a quarter of its pixels at most.
     fn shrink(&mut self, view: &View, error: Error) -> Result<()> {
         let [width, height] = view.cache_size();
         self.longest_side = width.max(height) / 2;

@@ -283,7 +283,7 @@ impl Viewer {
 
     pub(super) fn move_camera(&mut self, act: impl FnOnce(&mut Orbit)) -> Result<()> {
         // What is still being loaded is to be seen by its own camera, or framed.
-        let Some(loaded) = self.loaded.as_ref().filter(|_| self.session.shows_wanted_objects()) else { return Ok(()) };
+        let Some(loaded) = self.loaded.as_ref().filter(|_| self.session.shares_a_camera()) else { return Ok(()) };
         let view = view_of(self.session.shown(), loaded.sphere)?;
         let mut orbit = Orbit::new(&view.camera, loaded.sphere);
         act(&mut orbit);
@@ -308,9 +308,14 @@ impl Viewer {
     }
 
     pub(super) fn tell_error(&mut self, error: &Error) {
-        tracing::warn!("{error}");
-        let text = error.to_string();
-        self.failures.push(text.clone());
-        self.notice = Some(Notice { text, is_error: true, change: self.changes });
+        self.tell_errors(std::slice::from_ref(error));
+    }
+
+    /// What went wrong at once is one notice.
+    pub(super) fn tell_errors(&mut self, errors: &[Error]) {
+        let texts: Vec<_> = errors.iter().map(Error::to_string).collect();
+        texts.iter().for_each(|text| tracing::warn!("{text}"));
+        self.notice = Some(Notice { text: texts.join("\n"), is_error: true, change: self.changes });
+        self.failures.extend(texts);
     }
 }

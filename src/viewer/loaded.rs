@@ -9,8 +9,17 @@ use crate::vulkan::Device;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// What was asked for; else why it cannot be, and those of the edits that were not shown yet which cannot be loaded.
-pub type Made = Result<Loaded, (Error, Vec<Edit>)>;
+/// What was asked for; else why it cannot be: at least one fault.
+pub type Made = Result<Loaded, Vec<Fault>>;
+
+/// Why something cannot be.
+#[derive(Debug)]
+pub struct Fault {
+    /// What is wrong.
+    pub error: Error,
+    /// The edit, not shown yet, that cannot be loaded; none if all of them can.
+    pub edit: Option<Edit>,
+}
 
 /// All that a scene needs, on the device.
 #[derive(Clone)]

@@ -2,7 +2,7 @@
 use super::change::Change;
 use super::interaction::Viewer;
 use super::latest_job::{Progress, Task};
-use super::loaded::{Loaded, Made};
+use super::loaded::{Fault, Loaded, Made};
 use super::session::Edit;
 use crate::memo::Round;
 use crate::pipeline::{DeviceScene, Wanted};
@@ -18,22 +18,36 @@ const DRAFT_PATIENCE: Duration = Duration::from_millis(100);
 /// Threads are finished when nobody has asked for others for so long: what is dragged moves more often.
 const BEFORE_FINISHING: Duration = Duration::from_millis(100);
 
-/// Whether all files and names that `edit` brings in can be loaded.
-fn can_be_loaded(edit: &Edit, round: &Round) -> bool {
-    let environment = |source| round.ask(&LoadEnvironment(source)).is_ok();
-    let material = |source| round.ask(&LoadMaterial(source)).is_ok();
-    let mesh = |source| round.ask(&LoadMesh(source)).is_ok();
+/// Loads all files and names that `edit` brings in.
+///
+/// # Errors
+/// The first that cannot be loaded; cancelled.
+fn load_all_of(edit: &Edit, round: &Round) -> Result<()> {
+    let environment = |source| round.ask(&LoadEnvironment(source)).map(drop);
+    let material = |source| round.ask(&LoadMaterial(source)).map(drop);
+    let mesh = |source| round.ask(&LoadMesh(source)).map(drop);
     match edit {
         Edit::Change(Change::Environment(source)) => environment(source),
         Edit::Change(Change::Material(source) | Change::OneMaterial { source, .. }) => material(source),
         Edit::Change(Change::Mesh(source)) => mesh(source),
-        Edit::Change(_) => true,
+        Edit::Change(_) => Ok(()),
         Edit::Scene(scene) => {
-            environment(&scene.environment.source)
-                && scene.materials.iter().all(|settings| material(&settings.source))
-                && scene.objects.iter().all(|object| mesh(&object.mesh))
+            environment(&scene.environment.source)?;
+            scene.materials.iter().try_for_each(|settings| material(&settings.source))?;
+            scene.objects.iter().try_for_each(|object| mesh(&object.mesh))
         }
     }
+}
+
+/// Which of the `edits` are at fault where all of them together fail with `error`.
+fn faults(error: Error, mut edits: Vec<Edit>, round: &Round) -> Vec<Fault> {
+    // One that is alone is taken back whatever is at fault.
+    if edits.len() < 2 {
+        return vec![Fault { error, edit: edits.pop() }];
+    }
+    let fault = |edit: Edit| load_all_of(&edit, round).err().map(|error| Fault { error, edit: Some(edit) });
+    let faults: Vec<_> = edits.into_iter().filter_map(fault).collect();
+    if faults.is_empty() { vec![Fault { error, edit: None }] } else { faults }
 }
 
 impl Viewer {
@@ -114,17 +128,10 @@ impl Viewer {
 
     /// Has `make` done in the background. Where that fails, so is finding out which edits are at fault: it may read large files again.
     fn load(&self, make: impl FnOnce(&Task<Made>) -> Result<Loaded> + Send + 'static) {
-        let (memo, mut edits) = (self.memo.clone(), self.session.pending());
-        self.requests.loading.request(move |task| {
-            Ok(make(task).map_err(|error| {
-                // One that is alone is taken back whatever is at fault.
-                if edits.len() > 1 {
-                    let round = memo.round(task);
-                    edits.retain(|edit| !can_be_loaded(edit, &round));
-                }
-                (error, edits)
-            }))
-        });
+        let (memo, edits) = (self.memo.clone(), self.session.pending());
+        self.requests
+            .loading
+            .request(move |task| Ok(make(task).map_err(|error| faults(error, edits, &memo.round(task)))));
     }
 
     /// Compiles the shaders anew, and everything that is made of them; if that fails, what is shown stays.
@@ -180,7 +187,7 @@ impl Viewer {
         while let Some(result) = self.requests.loading.take() {
             is_new = true;
             let was_drafting = self.requests.drafting_since.take().is_some();
-            match result.unwrap_or_else(|error| Err((error, Vec::new()))) {
+            match result.unwrap_or_else(|error| Err(vec![Fault { error, edit: None }])) {
                 Ok(loaded) => {
                     // What was wanted since may be the same, from files of other names.
                     match self.is_wanted(Some(&loaded)) {
@@ -198,20 +205,22 @@ impl Viewer {
                         self.save_finished(true);
                     }
                 }
-                Err((Error::Cancelled, _)) => {}
-                Err((error, cannot_be)) => self.take_back(error, &cannot_be)?,
+                Err(faults) if faults.iter().any(|fault| matches!(fault.error, Error::Cancelled)) => {}
+                Err(faults) => self.take_back(faults)?,
             }
         }
         Ok(is_new)
     }
 
-    /// What was asked for failed with `error`: the edits that `cannot_be` are taken back, or all if there are none of these.
-    fn take_back(&mut self, error: Error, cannot_be: &[Edit]) -> Result<()> {
-        let taken_back = self.session.failed(cannot_be);
+    /// What was asked for failed with these `faults`: their edits are taken back, or all if they have none.
+    fn take_back(&mut self, faults: Vec<Fault>) -> Result<()> {
+        let (errors, edits): (Vec<_>, Vec<_>) = faults.into_iter().map(|Fault { error, edit }| (error, edit)).unzip();
+        let cannot_be: Vec<_> = edits.into_iter().flatten().collect();
+        let taken_back = self.session.failed(&cannot_be);
         // Else what failed is what is wanted still, and would fail again.
         let is_another_wanted = !(taken_back.is_empty() && cannot_be.is_empty());
         if self.loaded.is_none() && !is_another_wanted {
-            return Err(error);
+            return errors.into_iter().next().map_or(Ok(()), Err);
         }
         self.history.forget(&taken_back);
         self.latency.failed();
@@ -220,7 +229,7 @@ impl Viewer {
             self.go_back();
         }
         self.save_finished(is_another_wanted);
-        self.tell_error(&error);
+        self.tell_errors(&errors);
         Ok(())
     }
 
@@ -252,6 +261,7 @@ impl Drop for Viewer {
 mod tests {
     use super::*;
     use crate::memo::Memo;
+    use crate::method::Method;
     use crate::scene::{MaterialSource, Scene, Source};
     use crate::vulkan::test_device;
     use std::sync::Arc;
@@ -311,11 +321,27 @@ mod tests {
             std::thread::sleep(Duration::from_millis(1));
         };
         drop(folder);
-        let Err((error, cannot_be)) = made else { panic!("it was loaded") };
-        viewer.take_back(error, &cannot_be).unwrap();
+        let Err(faults) = made else { panic!("it was loaded") };
+        viewer.take_back(faults).unwrap();
         let wanted = viewer.session.wanted();
         assert_eq!((&wanted.objects[0].mesh, wanted.materials[0].name.as_str()), (&mesh, "gold"));
         assert!(viewer.failures.len() == 1 && viewer.failures[0].contains("broken.toml"), "{:?}", viewer.failures);
+    }
+
+    #[test]
+    fn of_all_that_cannot_be_loaded_it_is_told_why() {
+        let mut viewer = viewer(MaterialSource::Builtin("gold".to_owned()));
+        viewer.change(&Change::Mesh(Source::File("missing.obj".into()))).unwrap();
+        viewer.change(&Change::Environment(Source::File("missing.hdr".into()))).unwrap();
+        viewer.change(&Change::Method(Method::Paper)).unwrap();
+        viewer.change(&Change::Material(MaterialSource::File("missing.toml".into()))).unwrap();
+        wait(&mut viewer);
+        let missing = ["missing.obj", "missing.hdr", "missing.toml"];
+        let are_told = |told: &[String]| missing.iter().zip(told).all(|(name, told)| told.contains(name));
+        assert!(viewer.failures.len() == 3 && are_told(&viewer.failures), "{:?}", viewer.failures);
+        let notice = viewer.notice.clone().map(|notice| notice.text).unwrap_or_default();
+        assert!(missing.iter().all(|name| notice.contains(name)), "{notice}");
+        assert_eq!(viewer.session.wanted().shading.method, Method::Paper);
     }
 
     #[test]
@@ -324,7 +350,8 @@ mod tests {
         let clay = MaterialSource::Builtin("clay".to_owned());
         viewer.change(&Change::Material(clay)).unwrap();
         let broken = Edit::Change(Change::Material(MaterialSource::File("broken.toml".into())));
-        viewer.take_back(Error::input("broken.toml", "is broken", "mend it"), &[broken]).unwrap();
+        let error = Error::input("broken.toml", "is broken", "mend it");
+        viewer.take_back(vec![Fault { error, edit: Some(broken) }]).unwrap();
         assert_eq!(viewer.session.wanted().materials[0].name, "clay");
         wait(&mut viewer);
         assert_eq!(viewer.session.shown().materials[0].name, "clay");

@@ -24,6 +24,7 @@
 //! | frames into the window | [`presenter`] | Vulkan, by the frame graph |
 //! | where the pointer is, and what it drags | `pointer` | pure |
 //! | what keys ask for | `keyboard` | pure |
+//! | when inputs of a replay have their turn | `script` | pure |
 //! | the window | `window` | winit |
 
 pub mod change;
@@ -47,6 +48,7 @@ pub mod plots;
 mod pointer;
 pub mod presenter;
 mod requests;
+mod script;
 pub mod session;
 #[cfg(feature = "hot-reload")]
 mod shader_watch;
@@ -60,7 +62,7 @@ use crate::vulkan::PresentMode;
 use crate::{Error, Result};
 use input::Input;
 use latency::{Record, Stats};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 use winit::event_loop::{EventLoop, EventLoopProxy};
 
@@ -115,8 +117,8 @@ impl Cancel {
 /// Opens a window and runs until it is closed, or cancelled by what `take_cancel` is given.
 ///
 /// # Errors
-/// No window system, no device that presents to it, a scene that cannot be loaded; cancelled, or a device or a window system that fails: then
-/// the scene is kept if it was edited, and the log says where.
+/// No window system, no device that presents to it, a scene that cannot be loaded; cancelled, or a device or a window system that fails, or a
+/// screenshot that cannot be written. The scene is kept if it was edited, and the log says where.
 pub fn run(settings: ViewerSettings, take_cancel: impl FnOnce(Cancel)) -> Result<Ended> {
     let folder = settings.cache.clone().unwrap_or_else(std::env::temp_dir);
     let mut event_loop = EventLoop::<window::Wake>::with_user_event();
@@ -128,9 +130,8 @@ pub fn run(settings: ViewerSettings, take_cancel: impl FnOnce(Cancel)) -> Result
     let mut app = window::App::new(settings, event_loop.create_proxy());
     let ended = event_loop.run_app(&mut app);
     let window::App { result, messages, stats, edited, failures, missing_screenshot, .. } = app;
-    let fails = ended.is_err() || matches!(result, Err(Error::Vulkan(_) | Error::Cancelled));
-    if let Some(scene) = edited.filter(|_| fails) {
-        keep(&scene, &folder.join("edited.toml"));
+    if let Some(scene) = edited.filter(|_| ended.is_err() || result.is_err()) {
+        keep(&scene, &folder);
     }
     result?;
     ended?;
@@ -138,12 +139,21 @@ pub fn run(settings: ViewerSettings, take_cancel: impl FnOnce(Cancel)) -> Result
     Ok(Ended { messages, stats, failures, missing_screenshot })
 }
 
-/// Keeps a `scene` whose viewer fails or is cancelled.
-fn keep(scene: &Scene, path: &std::path::Path) {
-    // Early on nothing was kept yet, and there is no folder.
-    let folder = path.parent().map_or(Ok(()), std::fs::create_dir_all);
-    match folder.map_err(|cause| Error::unwritable(path, cause)).and_then(|()| scene.save(path)) {
-        Ok(()) => tracing::warn!("the scene as it was edited is kept: threadlight view {}", path.display()),
+/// Keeps a `scene` whose viewer fails or is cancelled, in a new file of `folder`.
+fn keep(scene: &Scene, folder: &Path) {
+    let keep = || -> Result<PathBuf> {
+        let unwritable = |cause| Error::unwritable(folder, cause);
+        // Early on nothing was kept yet, and there is no folder.
+        std::fs::create_dir_all(folder).map_err(unwritable)?;
+        // Another viewer may end, too, and in a folder that users share a name that can be told beforehand may be a link of somebody else's.
+        let file =
+            tempfile::Builder::new().prefix("edited-").suffix(".toml").tempfile_in(folder).map_err(unwritable)?;
+        scene.save(file.path())?;
+        let path = file.into_temp_path();
+        path.keep().map_err(|cause| unwritable(cause.error))
+    };
+    match keep() {
+        Ok(path) => tracing::warn!("the scene as it was edited is kept: threadlight view {}", path.display()),
         Err(error) => tracing::warn!("the scene as it was edited is lost: {error}"),
     }
 }

@@ -24,7 +24,7 @@ const NEAREST: f64 = 1e-3;
 /// Farthest distance of the eye from the target, and of the target from the objects, in radii: farther, they are less than two pixels.
 const FARTHEST: f64 = 1e3;
 /// The turntable turns once in so many seconds.
-const TURNTABLE_S: f64 = 20.0;
+pub const TURNTABLE_S: f64 = 20.0;
 
 /// A camera that moves on a sphere around what it looks at. Motions that are not finite do nothing.
 #[derive(Clone, Copy, Debug, PartialEq)]

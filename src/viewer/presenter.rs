@@ -139,7 +139,7 @@ fn make_ready<'a>(
         ]),
         None => None,
     };
-    let screenshot = readbacks.image("window", shown, [width, height], 4, extras.screenshot)?;
+    let screenshot = readbacks.image("window", shown, extras.screenshot)?;
     let Readbacks { graph, mut imports, .. } = readbacks;
     imports.push((window.into(), DeviceResource::Image(target.clone())));
     let executable = Executable::keeping(device, graph, &imports, store)?;

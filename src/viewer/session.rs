@@ -13,8 +13,18 @@ use std::path::Path;
 pub struct Session {
     wanted: Scene,
     shown: Scene,
-    /// What was asked for and is not shown yet, with its numbers, which grow.
-    pending: Vec<(u64, Edit)>,
+    /// What was asked for and is not shown yet.
+    pending: Vec<Pending>,
+}
+
+/// What was asked for and is not shown yet.
+#[derive(Clone, Debug, PartialEq)]
+struct Pending {
+    /// Grows from one to the next.
+    number: u64,
+    edit: Edit,
+    /// Whether it is a scene with a camera or a display of its own. Until it is loaded, what is seen is looked at as before.
+    has_own_view: bool,
 }
 
 /// What was asked for.
@@ -44,21 +54,27 @@ impl Session {
 
     /// What was asked for and is not shown yet.
     pub fn pending(&self) -> Vec<Edit> {
-        self.pending.iter().map(|(_, edit)| edit.clone()).collect()
+        self.pending.iter().map(|pending| pending.edit.clone()).collect()
     }
 
     /// Whether something that is not shown yet names the file at `path`.
     pub fn asks_for(&self, path: &Path) -> bool {
-        self.pending.iter().any(|(_, edit)| match edit {
+        self.pending.iter().any(|Pending { edit, .. }| match edit {
             Edit::Change(change) => change.files().iter().any(|file| file == path),
             Edit::Scene(scene) => scene.files().iter().any(|file| file == path),
         })
     }
 
-    /// Whether the objects that are wanted are where those are that are seen: else no camera suits both.
-    pub fn shows_wanted_objects(&self) -> bool {
+    /// Whether one camera suits what is wanted and what is seen: objects are where they were, and no scene is awaited that has a view of its own.
+    pub fn shares_a_camera(&self) -> bool {
         let place = |object: &ObjectSettings| (object.mesh.clone(), object.transform());
-        self.wanted.objects.iter().map(place).eq(self.shown.objects.iter().map(place))
+        let are_there = self.wanted.objects.iter().map(place).eq(self.shown.objects.iter().map(place));
+        are_there && self.awaited_view().is_none()
+    }
+
+    /// The number of the last scene with a view of its own that is not shown yet.
+    fn awaited_view(&self) -> Option<u64> {
+        self.pending.iter().rfind(|pending| pending.has_own_view).map(|pending| pending.number)
     }
 
     /// Makes a change, whose number is above that of all before.
@@ -67,49 +83,54 @@ impl Session {
     /// Those of [`Change::apply`]; nothing is changed then.
     pub fn change(&mut self, change: &Change, number: u64) -> Result<()> {
         change.apply(&mut self.wanted)?;
-        if !change.is_seen_at_once() {
-            // Of a slider that is dragged only the last value counts.
-            if let Some((_, Edit::Change(last))) = self.pending.last()
-                && last.is_undone_by(change)
-            {
-                self.pending.pop();
-            }
-            self.pending.push((number, Edit::Change(change.clone())));
+        if change.is_seen_at_once() {
+            return change.apply(&mut self.shown);
         }
-        self.show(self.shown.clone());
+        // Of a slider that is dragged only the last value counts.
+        if let Some(Pending { edit: Edit::Change(last), .. }) = self.pending.last()
+            && last.is_undone_by(change)
+        {
+            self.pending.pop();
+        }
+        self.pending.push(Pending { number, edit: Edit::Change(change.clone()), has_own_view: false });
         Ok(())
     }
 
     /// The same for a whole other scene, such as one from a file.
     pub fn replace(&mut self, scene: Scene, number: u64) {
-        self.pending.push((number, Edit::Scene(Box::new(scene.clone()))));
+        let has_own_view = scene != scene.clone().with_frame_settings_of(&self.wanted);
+        self.pending.push(Pending { number, edit: Edit::Scene(Box::new(scene.clone())), has_own_view });
         self.wanted = scene;
-        self.show(self.shown.clone());
     }
 
     /// All that `scene` needs is there, which has all changes up to this number: it is shown.
     pub fn loaded(&mut self, scene: Scene, number: u64) {
-        self.pending.retain(|(pending, _)| *pending > number);
-        self.show(scene);
-    }
-
-    /// Shows `scene`, in the way that is wanted by now.
-    fn show(&mut self, scene: Scene) {
-        self.shown = scene.with_frame_settings_of(&self.wanted);
+        let brings_view = self.pending.iter().any(|pending| pending.number <= number && pending.has_own_view);
+        self.pending.retain(|pending| pending.number > number);
+        self.shown = match self.awaited_view() {
+            None => scene.with_frame_settings_of(&self.wanted),
+            Some(_) if brings_view => scene,
+            Some(_) => scene.with_frame_settings_of(&self.shown),
+        };
     }
 
     /// What was wanted cannot be: what is seen is wanted again, with the changes but those that `cannot_be`, or without any if there are none of
     /// these. The numbers of those that were taken back: none where others have taken the place of what was at fault.
     pub fn failed(&mut self, cannot_be: &[Edit]) -> Vec<u64> {
-        let before: Vec<_> = self.pending.iter().map(|(number, _)| *number).collect();
-        self.pending.retain(|(_, edit)| !cannot_be.contains(edit));
+        let before: Vec<_> = self.pending.iter().map(|pending| pending.number).collect();
+        let awaited = self.awaited_view();
+        self.pending.retain(|pending| !cannot_be.contains(&pending.edit));
         if cannot_be.is_empty() {
             self.pending.clear();
         }
-        self.wanted = self.shown.clone();
+        let wanted_before = std::mem::replace(&mut self.wanted, self.shown.clone());
         let wanted = &mut self.wanted;
-        self.pending.retain(|(_, edit)| edit.apply(wanted).is_ok());
-        before.into_iter().filter(|number| self.pending.iter().all(|(left, _)| left != number)).collect()
+        self.pending.retain(|pending| pending.edit.apply(wanted).is_ok());
+        // What was changed of the view since is of the scene that it is awaited with.
+        if awaited.is_some() && awaited == self.awaited_view() {
+            self.wanted = self.wanted.clone().with_frame_settings_of(&wanted_before);
+        }
+        before.into_iter().filter(|number| self.pending.iter().all(|left| left.number != *number)).collect()
     }
 }
 
@@ -133,7 +154,7 @@ impl Edit {
 mod tests {
     use super::*;
     use crate::method::Method;
-    use crate::scene::{Background, MaterialSource, Source};
+    use crate::scene::{Background, Camera, MaterialSource, Source};
 
     fn material(name: &str) -> Change {
         Change::Material(MaterialSource::Builtin(name.into()))
@@ -175,6 +196,56 @@ mod tests {
         assert!(session.change(&Change::Exposure(f64::NAN), 3).is_err());
         assert_eq!((session.shown(), session.wanted()), (&expected, &expected));
         assert!(session.failed(&[Edit::Change(broken_mesh())]).is_empty(), "there is nothing to take back");
+    }
+
+    /// A scene with a view of its own, with this mesh.
+    fn opened(mesh: &str) -> Scene {
+        let mut scene = Scene { camera: Some(Camera::framing(glam::DVec3::ONE, 3.0, 1.0)), ..Scene::default() };
+        scene.objects[0].mesh = Source::File(mesh.into());
+        (scene.image.exposure, scene.environment.rotation_deg) = (8.0, 90.0);
+        scene
+    }
+
+    #[test]
+    fn another_scene_is_looked_at_in_its_own_way_once_it_is_loaded() {
+        let mut session = Session::new(Scene::default());
+        session.replace(opened("a.obj"), 1);
+        assert!(session.shown() == &Scene::default() && !session.shares_a_camera());
+        // What is changed of the view meanwhile is seen, and stays.
+        session.change(&Change::Gamma(1.5), 2).unwrap();
+        assert_eq!((session.shown().image.gamma, session.shown().image.exposure), (1.5, 1.0));
+        session.replace(opened("b.obj"), 3);
+        // The first comes, although another is wanted by now.
+        session.loaded(opened("a.obj"), 2);
+        assert_eq!(session.shown(), &opened("a.obj"));
+        session.change(&Change::Gamma(1.8), 4).unwrap();
+        session.loaded(session.wanted().clone(), 4);
+        let mut expected = opened("b.obj");
+        expected.image.gamma = 1.8;
+        assert!(session.shown() == &expected && session.wanted() == &expected && session.shares_a_camera());
+        // One that is looked at as what is shown is, such as after an undo, holds nothing up.
+        session.replace(Scene { materials: Scene::default().materials, ..expected }, 5);
+        assert!(session.shares_a_camera());
+    }
+
+    #[test]
+    fn another_scene_that_cannot_be_loaded_leaves_the_view_as_it_is() {
+        let mut session = Session::new(Scene::default());
+        session.change(&material("copper"), 1).unwrap();
+        let [mut shown, mut expected] = [session.shown().clone(), session.wanted().clone()];
+        session.replace(opened("broken.obj"), 2);
+        session.change(&Change::Gamma(1.5), 3).unwrap();
+        (shown.image.gamma, expected.image.gamma) = (1.5, 1.5);
+        assert_eq!(session.failed(&[Edit::Scene(Box::new(opened("broken.obj")))]), [2]);
+        assert_eq!((session.wanted(), session.shown()), (&expected, &shown));
+        // One that is not at fault has what was changed of its view since.
+        session.replace(opened("good.obj"), 4);
+        session.change(&Change::Gamma(1.8), 5).unwrap();
+        session.change(&broken_mesh(), 6).unwrap();
+        assert_eq!(session.failed(&[Edit::Change(broken_mesh())]), [6]);
+        let mut expected = opened("good.obj");
+        expected.image.gamma = 1.8;
+        assert_eq!(session.wanted(), &expected);
     }
 
     #[test]

@@ -127,7 +127,8 @@ pub fn draw_hemisphere(ui: &mut Ui, threads: &Threads, surface: Option<&SurfaceP
     }
     let curve_rows = rows.min(MOST_ROWS);
     for thread in (0..count).step_by(count.div_ceil(MOST_CURVES)) {
-        let points = (0..curve_rows).map(|i| place(threads.direction(i * rows / curve_rows, thread))).collect();
+        let row = |i: usize| i * (rows - 1) / (curve_rows - 1).max(1);
+        let points = (0..curve_rows).map(|i| place(threads.direction(row(i), thread))).collect();
         painter.add(Shape::line(points, Stroke::new(1.2, colour(thread, count, false))));
     }
     let eye = visuals.strong_text_color();

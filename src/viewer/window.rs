@@ -7,6 +7,7 @@ use super::latency::Stats;
 use super::panel::{self, Panel};
 use super::pointer::{Pointer, button_of, scroll_of};
 use super::presenter::Presenter;
+use super::script::{self, Script, Turn};
 use super::{ViewerSettings, failed};
 use crate::memo::Memo;
 use crate::passes::Area;
@@ -15,7 +16,6 @@ use crate::scene::{MAX_SIZE_PX, Scene};
 use crate::vulkan::{Device, Instance, Messages, Surface, UiFrame};
 use crate::{Error, Result};
 use egui::{TexturesDelta, ViewportId};
-use std::collections::VecDeque;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -41,8 +41,6 @@ const RETRY: Duration = Duration::from_millis(100);
 const PROGRESS_INTERVAL: Duration = Duration::from_millis(100);
 /// What the picture has at least, so that the panel beside it can be used.
 const LEAST_PICTURE: [u32; 2] = [160, 240];
-/// A window system has this long to give the window the size that a replay asks for.
-const RESIZE_PATIENCE: Duration = Duration::from_secs(2);
 
 /// The program as winit sees it.
 pub struct App {
@@ -83,20 +81,6 @@ struct Open {
     script: Script,
 }
 
-/// What a script asks for: inputs to play, frames to count, a picture to take.
-struct Script {
-    replay: VecDeque<Input>,
-    frames_left: Option<u64>,
-    /// Where the picture goes, until it is taken.
-    screenshot: Option<PathBuf>,
-    /// Until when the window may take to get this size.
-    resizing: Option<([u32; 2], Instant)>,
-    /// Whether the last input has not been drawn yet: each is before the next.
-    is_undrawn: bool,
-    /// Until when a `"wait"` may take.
-    waiting: Option<Instant>,
-}
-
 impl App {
     /// An app that will open its window when winit says so.
     pub fn new(settings: ViewerSettings, proxy: EventLoopProxy<Wake>) -> Self {
@@ -114,8 +98,7 @@ impl App {
     }
 
     fn open(&mut self, event_loop: &ActiveEventLoop) -> Result<Open> {
-        let ViewerSettings { scene, device, validate, cache, present_mode, frames, screenshot, replay, .. } =
-            &self.settings;
+        let ViewerSettings { scene, device, validate, cache, present_mode, .. } = &self.settings;
         let image = &scene.image;
         let [least_width, least_height] = LEAST_PICTURE;
         if image.width < least_width || image.height < least_height {
@@ -158,16 +141,8 @@ impl App {
             // A loop that has ended needs no waking.
             let _ = proxy.send_event(Wake::New);
         });
-        viewer.record(self.settings.record);
-        let frames_left = frames.or(screenshot.is_some().then_some(1));
-        let script = Script {
-            replay: replay.clone().into(),
-            frames_left,
-            screenshot: screenshot.clone(),
-            resizing: None,
-            is_undrawn: true,
-            waiting: None,
-        };
+        let &ViewerSettings { ref replay, replay_limit, frames, ref screenshot, record, .. } = &self.settings;
+        viewer.record(record);
         let mut open = Open {
             viewer,
             presenter,
@@ -181,7 +156,7 @@ impl App {
             is_minimised: false,
             pointer: Pointer::default(),
             modifiers: ModifiersState::empty(),
-            script,
+            script: Script::new(replay, replay_limit, frames, screenshot.clone()),
         };
         open.fit_picture();
         Ok(open)
@@ -248,7 +223,7 @@ impl Open {
             self.presenter.window_changed();
             self.fit_picture();
         }
-        self.script.resizing = Some((size, Instant::now() + RESIZE_PATIENCE));
+        self.script.resizes(size, Instant::now());
         Ok(())
     }
 
@@ -259,7 +234,7 @@ impl Open {
     /// Draws a frame; gives whether the program is to end.
     fn draw(&mut self) -> Result<bool> {
         self.due = None;
-        self.script.is_undrawn = false;
+        self.script.draws();
         self.last_drawn = Instant::now();
         let raw = self.egui.take_egui_input(&self.window);
         let mut inputs = Vec::new();
@@ -280,8 +255,8 @@ impl Open {
         let size = if self.is_minimised { [0, 0] } else { [width, height] };
         let drags_slider = self.context.is_using_pointer() && inputs.iter().any(Input::changes_picture);
         let is_held = drags_slider || self.pointer.is_dragging();
-        let counts = self.viewer.loaded().is_some() && !self.viewer.is_busy() && self.script.replay.is_empty();
-        let last = counts && self.script.frames_left.is_some_and(|left| left <= 1);
+        let counts = self.viewer.loaded().is_some() && !self.viewer.is_busy() && self.script.is_played();
+        let last = counts && self.script.is_last();
         let screenshot = last && self.script.screenshot.is_some();
         let drawn = self.viewer.draw(&mut self.presenter, size, &frame, &self.textures, is_held, screenshot)?;
         self.textures.clear();
@@ -307,8 +282,7 @@ impl Open {
         {
             picture::write_png(&path, width, height, &rgba, false)?;
         }
-        if let Some(left) = self.script.frames_left.as_mut().filter(|_| counts) {
-            *left = left.saturating_sub(1);
+        if counts && self.script.count() {
             self.redraw();
         }
         Ok(last)
@@ -318,44 +292,30 @@ impl Open {
         self.due = Some(self.due.map_or(time, |due| due.min(time)));
     }
 
-    /// Plays inputs of the script, up to one that has to be drawn or waited for. Gives whether the program is to end.
+    /// Does what the script asks for now. Gives whether the program is to end.
     ///
     /// # Errors
-    /// A `"wait"` that takes longer than `limit`.
-    fn play(&mut self, limit: Duration) -> Result<bool> {
-        if let Some((size, until)) = self.script.resizing {
-            let area = self.viewer.area;
-            if [area.width, area.height] != size && Instant::now() < until {
-                self.due_at(Instant::now() + Duration::from_millis(20));
+    /// Those of [`Script::next`].
+    fn play(&mut self) -> Result<bool> {
+        let state = script::State {
+            size: [self.viewer.area.width, self.viewer.area.height],
+            is_frame_due: self.due.is_some(),
+            has_new_draft: self.viewer.has_new_draft(),
+            draft_awaited_until: self.viewer.draft_awaited_until(),
+            is_loading: self.viewer.is_loading(),
+            is_busy: self.viewer.is_busy(),
+            turntable: self.viewer.motion.turntable,
+        };
+        let input = match self.script.next(state, Instant::now())? {
+            Turn::Later => return Ok(false),
+            Turn::At(time) => {
+                self.due_at(time);
                 return Ok(false);
             }
-            self.script.resizing = None;
-        }
-        if self.script.is_undrawn && self.due.is_some() || self.viewer.has_new_draft() {
-            return Ok(false);
-        }
-        if self.viewer.draft_awaited_until().is_some_and(|until| Instant::now() < until) {
-            // Nor does a user see where the slider is.
-            return Ok(false);
-        }
-        let Some(input) = self.script.replay.front().cloned() else { return Ok(false) };
-        let waits = match &input {
-            // A turntable always has a next frame.
-            Input::Wait => self.viewer.is_busy() || (self.due.is_some() && !self.viewer.motion.turntable),
-            // What comes next is not to change it.
-            Input::SavePicture(_) => self.viewer.is_loading(),
-            _ => false,
+            Turn::Quit => return Ok(true),
+            Turn::Now(input) => input,
         };
         match &input {
-            _ if waits => {
-                let until = *self.script.waiting.get_or_insert_with(|| Instant::now() + limit);
-                if Instant::now() < until {
-                    return Ok(false);
-                }
-                let problem = format!("waits for more than {} s", limit.as_secs());
-                return Err(Error::input("the replay", problem, "raise --replay-limit, or ask for less"));
-            }
-            Input::Quit => return Ok(true),
             Input::Resize(width, height) | Input::Set(Change::Size(width, height)) => {
                 if let Err(error) = self.request_size([*width, *height]) {
                     self.viewer.tell_error(&error);
@@ -372,9 +332,6 @@ impl Open {
             }
             input => self.viewer.handle(input),
         }
-        self.script.replay.pop_front();
-        self.script.waiting = None;
-        self.script.is_undrawn = true;
         self.redraw();
         Ok(false)
     }
@@ -413,7 +370,7 @@ impl Open {
             }
             WindowEvent::Occluded(hidden) => {
                 // A script's frames are drawn behind other windows, too.
-                self.is_minimised = *hidden && self.script.frames_left.is_none();
+                self.is_minimised = *hidden && !self.script.counts_frames();
                 self.redraw();
             }
             WindowEvent::ModifiersChanged(modifiers) => self.modifiers = modifiers.state(),
@@ -497,7 +454,7 @@ impl ApplicationHandler<Wake> for App {
 
     fn about_to_wait(&mut self, event_loop: &ActiveEventLoop) {
         let Some(open) = &mut self.open else { return };
-        match open.play(self.settings.replay_limit) {
+        match open.play() {
             Ok(false) => {}
             Ok(true) => return self.end(event_loop, Ok(())),
             Err(error) => return self.end(event_loop, Err(error)),
@@ -505,7 +462,7 @@ impl ApplicationHandler<Wake> for App {
         if let Some(until) = open.viewer.draft_awaited_until() {
             open.due = open.due.map(|due| due.max(until));
         }
-        let flow = match open.due.into_iter().chain(open.script.waiting).min() {
+        let flow = match open.due.into_iter().chain(open.script.due()).min() {
             None => ControlFlow::Wait,
             Some(until) if until <= Instant::now() => {
                 open.window.request_redraw();

@@ -112,8 +112,10 @@ fn what_was_edited_is_kept_when_the_device_is_lost() {
 fn the_device_is_lost() {
     let error = play().map(drop).expect_err("a device that is lost").to_string();
     assert!(error.contains("device") && error.contains("try again") && !error.contains('\n'), "{error}");
-    let kept = Scene::load(Path::new("cache/edited.toml"));
-    let scene = kept.unwrap_or_else(|unread| panic!("{unread}, after {error}"));
+    let of_cache = std::fs::read_dir("cache").expect("a cache").map(|entry| entry.expect("an entry").path());
+    let kept = of_cache.filter(|path| path.extension().is_some_and(|extension| extension == "toml"));
+    let [kept] = &kept.collect::<Vec<_>>()[..] else { panic!("not kept, after {error}") };
+    let scene = Scene::load(kept).unwrap_or_else(|unread| panic!("{unread}, after {error}"));
     assert!(scene.materials[0].name == "clay" && scene.image.exposure < 1.0, "{scene:?}");
     assert!(!Path::new("end.toml").exists());
 }

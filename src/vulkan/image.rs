@@ -63,6 +63,13 @@ impl ImageShape {
         }
     }
 
+    /// Bytes of `level` in a buffer, tightly packed; none of a format whose texels neither go to buffers nor come from there.
+    pub(crate) fn level_bytes(&self, level: u32) -> Option<u64> {
+        let vk::Extent3D { width, height, depth } = self.extent_at(level);
+        let texels = u64::from(width) * u64::from(height) * u64::from(depth) * u64::from(self.layers());
+        self.texel_bytes().map(|bytes| texels * bytes)
+    }
+
     /// Bytes of a texel, of the formats whose texels go to buffers or come from there.
     fn texel_bytes(&self) -> Option<u64> {
         match self.format {
@@ -186,9 +193,7 @@ impl Image {
     pub(super) fn level_bytes(&self, level: u32) -> Result<u64> {
         let unknown =
             || VulkanError::unfit(&self.name, format!("it is of format {:?}, which is not copied", self.shape.format));
-        let vk::Extent3D { width, height, depth } = self.shape.extent_at(level);
-        let texels = u64::from(width) * u64::from(height) * u64::from(depth) * u64::from(self.shape.layers());
-        Ok(texels * self.shape.texel_bytes().ok_or_else(unknown)?)
+        self.shape.level_bytes(level).ok_or_else(unknown)
     }
 
     /// What memory it needs.

@@ -142,7 +142,8 @@ impl Commands {
 fn refused(error: RendererError) -> VulkanError {
     match error {
         RendererError::Vulkan(result) => VulkanError::Call { call: "egui", object: "panel".to_owned(), result },
-        other => VulkanError::Memory { object: "panel".to_owned(), cause: other.to_string() },
+        RendererError::Allocator(_) => VulkanError::Memory { object: "panel".to_owned(), cause: error.to_string() },
+        _ => VulkanError::unfit("panel", error),
     }
 }
 

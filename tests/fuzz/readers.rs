@@ -4,7 +4,7 @@ use std::path::Path;
 use glam::{DVec3, dvec3};
 use threadlight::low_level::brdf::{BaseProfile, Brdf};
 use threadlight::low_level::device_check::Verdict;
-use threadlight::low_level::environment::{Environment, LightMoments, Pyramid, VmfPyramid, moments_file, vmf_file};
+use threadlight::low_level::environment::{Environment, LightMoments, Pyramid, VmfPyramid, moments_file, pyramid_file};
 use threadlight::low_level::evaluate::{Row, reference};
 use threadlight::low_level::picture::{ExrHeader, parse_image, write_exr, write_png};
 use threadlight::low_level::scene::{Mesh, Scene};
@@ -194,8 +194,9 @@ pub fn mesh() -> Reader {
 
 fn read_environment(path: &Path, bytes: &[u8]) -> Result<(), String> {
     let environment = Environment::FILES.parse(path, bytes).map_err(text)?;
-    assert_eq!(environment.texels.len(), environment.width * environment.height);
-    assert!(environment.texels.as_flattened().iter().all(|value| value.is_finite() && *value >= 0.0));
+    let [width, height] = environment.size();
+    assert_eq!(environment.texels().len(), width * height);
+    assert!(environment.texels().as_flattened().iter().all(|value| value.is_finite() && *value >= 0.0));
     Ok(())
 }
 
@@ -408,12 +409,12 @@ pub fn pyramid() -> Reader {
         file_name: "x.pyramid",
         seeds: || {
             let pyramid = VmfPyramid::new(&Pyramid::box_filtered(&environment()), &()).expect("a pyramid");
-            vec![written("x.pyramid", |path| vmf_file::write(path, &pyramid).expect("a file"))]
+            vec![written("x.pyramid", |path| pyramid_file::VMF.write(path, &pyramid.levels).expect("a file"))]
         },
         words: &["VMFMAPS\0", "\x04\0\0\0", "\x10\0\0\0", "\0\0\0\0"],
         seal: Some(seal_end),
         bytes_per_byte: 4,
-        read: |path, bytes| vmf_file::parse(path, bytes).map(drop).map_err(text),
+        read: |path, bytes| pyramid_file::VMF.parse(path, bytes).map(drop).map_err(text),
     }
 }
 

@@ -93,6 +93,31 @@ pub struct Defaults {
     pub size: Option<(u32, u32)>,
 }
 
+impl Defaults {
+    /// Help after that of the flags: these, where pictures are compared the `tolerance` of the references, and what `follows`.
+    pub fn help(&self, tolerance: Option<f64>, follows: &str) -> String {
+        let names = |given: &[&str], all: Vec<&str>| if given == all { "all".to_owned() } else { given.join(", ") };
+        let materials = names(&self.materials, Brdf::builtin_names().collect());
+        let methods: Vec<_> = self.methods.iter().map(|method| method.name()).collect();
+        let methods = names(&methods, methods_on_gpu().map(Method::name).collect());
+        let counts = self.counts.iter().map(u32::to_string).collect::<Vec<_>>().join(",");
+        let size = self.size.map_or("that of the scene".to_owned(), |(width, height)| format!("{width}x{height}"));
+        let tolerance = tolerance.map_or(String::new(), |tolerance| {
+            let on_gpu = Processor::Gpu.default_tolerance().max(tolerance);
+            let on_gpu = if on_gpu > tolerance { format!(", on the GPU {on_gpu:e}") } else { String::new() };
+            format!("; --reference-tolerance, {tolerance:e}{on_gpu}")
+        });
+        format!(
+            "Defaults: --materials, {materials}; --methods, {methods}; --counts, {counts}; --size, {size}{tolerance}.\n\n{follows}"
+        )
+    }
+}
+
+/// Those of which pictures are measured.
+pub fn methods_on_gpu() -> impl Iterator<Item = Method> {
+    Method::ALL.iter().copied().filter(|method| method.runs_on_gpu())
+}
+
 impl CasesArguments {
     pub fn cases(&self, defaults: &Defaults) -> Result<Cases> {
         let methods = match self.methods.as_slice() {
@@ -233,7 +258,7 @@ pub const QUICK_TOLERANCE: f64 = 1e-3;
 /// Against what errors are measured.
 #[derive(clap::Args)]
 pub struct TruthArguments {
-    /// Error of the reference pictures, in display values, that is good enough (default of `bench error` 2e-4, on the GPU and of others 1e-3).
+    /// Error of the reference pictures, in display values, that is good enough.
     #[arg(long, value_name = "X", value_parser = number(f64::MIN_POSITIVE..=1.0, "a number above 0, at most 1"))]
     reference_tolerance: Option<f64>,
     /// Where the reference pictures are made, as `threadlight render --help` explains.
@@ -323,6 +348,9 @@ pub fn check_folder(folder: &Path) -> Result<()> {
     if !folder.exists() && ["svg", "png", "exr", "html"].into_iter().any(is_like) {
         let problem = "is named like a file, and what is written is a folder of them";
         return Err(Error::in_file(folder, problem, "name a folder, or make one of this name"));
+    }
+    if folder.exists() && !folder.is_dir() {
+        return Err(Error::in_file(folder, "is a file, and what is written is a folder of them", "name a folder"));
     }
     // One that is not there yet has to be made; its name may end in a separator.
     let to_make = || folder.components().collect();

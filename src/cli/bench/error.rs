@@ -1,17 +1,13 @@
 //! `threadlight bench error`: error and time of methods and thread counts over materials, environments and scenes.
-use super::arguments::{CasesArguments, Defaults, OutputArguments, TruthArguments};
+use super::arguments::{CasesArguments, Defaults, OutputArguments, TruthArguments, methods_on_gpu};
 use crate::cli::print;
 use crate::cli::progress::TerminalProgress;
 use clap::value_parser;
 use threadlight::Error;
 use threadlight::low_level::evaluate::sweep::Measured;
 use threadlight::low_level::evaluate::{Row, Shard, Sweep, plots, reference, tables};
-use threadlight::low_level::method::Method;
 
 const EXAMPLES: &str = "\
-Without --materials, gold is measured; without --methods, all of them; without --counts, 1,4,16,32,64,100,512; without \
---size, pictures have the scene's size; without --reference-tolerance, it is 2e-4, or 1e-3 on the GPU.
-
 Examples:
   threadlight bench error
   threadlight bench error --materials gold,alumina-oxide.binary --environments studio,lebombo.hdr --counts 4,16,64
@@ -41,7 +37,7 @@ expected_over_measured.svg.";
 
 /// Measures RMS, SSIM, FLIP and time on the GPU against the reference. Lists are separated by commas.
 #[derive(clap::Args)]
-#[command(after_help = EXAMPLES, allow_negative_numbers = true)]
+#[command(after_help = defaults().help(Some(reference::TOLERANCE), EXAMPLES), allow_negative_numbers = true)]
 pub struct BenchError {
     #[command(flatten)]
     cases: CasesArguments,
@@ -63,14 +59,18 @@ pub struct BenchError {
     output: OutputArguments,
 }
 
+fn defaults() -> Defaults {
+    Defaults {
+        materials: vec!["gold"],
+        methods: methods_on_gpu().collect(),
+        counts: &[1, 4, 16, 32, 64, 100, 512],
+        size: None,
+    }
+}
+
 impl BenchError {
     pub fn run(self) -> anyhow::Result<()> {
-        let mut cases = self.cases.cases(&Defaults {
-            materials: vec!["gold"],
-            methods: Method::ALL.iter().copied().filter(|method| method.runs_on_gpu()).collect(),
-            counts: &[1, 4, 16, 32, 64, 100, 512],
-            size: None,
-        })?;
+        let mut cases = self.cases.cases(&defaults())?;
         self.output.check(&self.cases.files(&cases))?;
         cases.shard = self.shard.unwrap_or(Shard::WHOLE);
         cases.check_shard()?;

@@ -18,9 +18,6 @@ use threadlight::low_level::threads::MAX_COUNT;
 use threadlight::{Error, Result};
 
 const EXAMPLES: &str = "\
-Without --materials, all built-in ones are shown; without --methods, fitted, paper, importance and filtered; without --counts, \
-1,4,16,64,100; without --size, pictures are 160x120; without --reference-tolerance, it is 1e-3.
-
 Examples:
   threadlight bench gallery --plot gallery
   threadlight bench gallery --materials-only --threads 32 --plot gallery
@@ -40,7 +37,7 @@ The table and the JSON have the errors of the latter, as `threadlight bench erro
 
 /// Draws pictures beside each other: materials, and methods by their number of samples. Lists are separated by commas.
 #[derive(clap::Args)]
-#[command(after_help = EXAMPLES, allow_negative_numbers = true)]
+#[command(after_help = defaults().help(Some(QUICK_TOLERANCE), EXAMPLES), allow_negative_numbers = true)]
 pub struct BenchGallery {
     #[command(flatten)]
     cases: CasesArguments,
@@ -59,6 +56,15 @@ pub struct BenchGallery {
     output: OutputArguments,
 }
 
+fn defaults() -> Defaults {
+    Defaults {
+        materials: Brdf::builtin_names().collect(),
+        methods: vec![Method::Fitted, Method::Paper, Method::Importance, Method::Filtered],
+        counts: &[1, 4, 16, 64, 100],
+        size: Some((160, 120)),
+    }
+}
+
 impl BenchGallery {
     pub fn run(self) -> anyhow::Result<()> {
         let Some(folder) = &self.output.plot else {
@@ -66,12 +72,7 @@ impl BenchGallery {
                 Error::input("bench gallery", "has nowhere to put pictures", "name a folder with --plot DIR").into()
             );
         };
-        let materials = self.cases.cases(&Defaults {
-            materials: Brdf::builtin_names().collect(),
-            methods: vec![Method::Fitted, Method::Paper, Method::Importance, Method::Filtered],
-            counts: &[1, 4, 16, 64, 100],
-            size: Some((160, 120)),
-        })?;
+        let materials = self.cases.cases(&defaults())?;
         let estimator = Estimator { variant: materials.methods[0], count: self.threads };
         let compared = named_materials("--compare", &self.compare)?;
         self.output.check(&[self.cases.files(&materials), files_of_materials(&self.compare, &compared)].concat())?;

@@ -21,9 +21,6 @@ use threadlight::low_level::vulkan::Device;
 use threadlight::{Error, Result};
 
 const EXAMPLES: &str = "\
-Without --materials, gold and red-plastic are measured; without --methods, fitted, paper, importance and filtered; without \
---counts, 1,4,16,64; without --size, pictures are 160x120; without --reference-tolerance, it is 1e-3.
-
 Examples:
   threadlight bench report report
   threadlight bench report report --materials alumina-oxide.binary,nickel.binary --environments lebombo.hdr --size 320x240
@@ -45,7 +42,7 @@ are parts by --shard if one is missing or was interrupted.";
 
 /// Measures everything and writes it as one HTML page. Lists are separated by commas.
 #[derive(clap::Args)]
-#[command(after_help = EXAMPLES, allow_negative_numbers = true)]
+#[command(after_help = defaults().help(Some(QUICK_TOLERANCE), EXAMPLES), allow_negative_numbers = true)]
 pub struct BenchReport {
     #[command(flatten)]
     given: Given,
@@ -87,6 +84,15 @@ const MEASURING: [&str; 14] = [
     "repeat",
 ];
 
+fn defaults() -> Defaults {
+    Defaults {
+        materials: vec!["gold", "red-plastic"],
+        methods: vec![Method::Fitted, Method::Paper, Method::Importance, Method::Filtered],
+        counts: &[1, 4, 16, 64],
+        size: Some((160, 120)),
+    }
+}
+
 impl BenchReport {
     pub fn run(mut self) -> anyhow::Result<()> {
         if self.folder.is_none()
@@ -107,12 +113,7 @@ impl BenchReport {
         if let Some((row, path)) = earlier.first().zip(self.from.first()) {
             self.cases.take_from(row, path, &self.given)?;
         }
-        let cases = self.cases.cases(&Defaults {
-            materials: vec!["gold", "red-plastic"],
-            methods: vec![Method::Fitted, Method::Paper, Method::Importance, Method::Filtered],
-            counts: &[1, 4, 16, 64],
-            size: Some((160, 120)),
-        })?;
+        let cases = self.cases.cases(&defaults())?;
         self.output.check(&[self.cases.files(&cases), self.from.clone()].concat())?;
         let only_first = first_place(&cases);
         let sweep = Sweep {

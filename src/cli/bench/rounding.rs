@@ -5,8 +5,6 @@ use threadlight::low_level::evaluate::rounding;
 use threadlight::low_level::method::Method;
 
 const EXAMPLES: &str = "\
-Without --materials gold and clay are measured; without --methods, fitted; without --counts, 16; without --size, 80x60.
-
 Examples:
   threadlight bench rounding
   threadlight bench rounding --materials nickel.binary,steel.binary --environments room.hdr,studio.hdr
@@ -23,7 +21,7 @@ The JSON is a list of rows with these fields, in this order:
 
 /// Measures what each rounding of a device costs: of fractions, light, normals, threads and sums.
 #[derive(clap::Args)]
-#[command(after_help = EXAMPLES)]
+#[command(after_help = defaults().help(None, EXAMPLES))]
 pub struct BenchRounding {
     #[command(flatten)]
     cases: CasesArguments,
@@ -31,14 +29,13 @@ pub struct BenchRounding {
     json: JsonArgument,
 }
 
+fn defaults() -> Defaults {
+    Defaults { materials: vec!["gold", "clay"], methods: vec![Method::Fitted], counts: &[16], size: Some((80, 60)) }
+}
+
 impl BenchRounding {
     pub fn run(self) -> anyhow::Result<()> {
-        let cases = self.cases.cases(&Defaults {
-            materials: vec!["gold", "clay"],
-            methods: vec![Method::Fitted],
-            counts: &[16],
-            size: Some((80, 60)),
-        })?;
+        let cases = self.cases.cases(&defaults())?;
         self.json.check(&self.cases.files(&cases))?;
         let (device, memo) = (self.cases.device.open()?, self.cases.device.memo());
         let progress = TerminalProgress::of("bench rounding", "pictures")?;

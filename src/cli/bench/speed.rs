@@ -10,9 +10,6 @@ use threadlight::low_level::method::Method;
 use threadlight::low_level::threads::MAX_COUNT;
 
 const EXAMPLES: &str = "\
-Without --materials, gold is measured; without --methods, fitted and paper; without --counts, 16,32,64,100,200,512; without --size, \
-pictures have the scene's size.
-
 Examples:
   threadlight bench speed
   threadlight bench speed --scene dragon.obj --materials alumina-oxide.binary --environments lebombo.hdr
@@ -43,7 +40,7 @@ The plots are SVG, log-log: frame_over_threads.svg, and METHOD_cost_over_growth.
 
 /// Measures times on the GPU: by threads, beside the floor, and as things double. Lists are separated by commas.
 #[derive(clap::Args)]
-#[command(after_help = EXAMPLES, allow_negative_numbers = true)]
+#[command(after_help = defaults().help(None, EXAMPLES), allow_negative_numbers = true)]
 pub struct BenchSpeed {
     #[command(flatten)]
     cases: CasesArguments,
@@ -57,14 +54,18 @@ pub struct BenchSpeed {
     output: OutputArguments,
 }
 
+fn defaults() -> Defaults {
+    Defaults {
+        materials: vec!["gold"],
+        methods: vec![Method::Fitted, Method::Paper],
+        counts: &[16, 32, 64, 100, 200, 512],
+        size: None,
+    }
+}
+
 impl BenchSpeed {
     pub fn run(self) -> anyhow::Result<()> {
-        let cases = self.cases.cases(&Defaults {
-            materials: vec!["gold"],
-            methods: vec![Method::Fitted, Method::Paper],
-            counts: &[16, 32, 64, 100, 200, 512],
-            size: None,
-        })?;
+        let cases = self.cases.cases(&defaults())?;
         self.output.check(&self.cases.files(&cases))?;
         let speed = Speed { cases, threads: self.threads, repeat: self.repeat };
         let device = self.cases.device.open()?;

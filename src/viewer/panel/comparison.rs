@@ -34,9 +34,10 @@ impl State {
                 return;
             }
             let mut shows = comparer.shows_heat_map;
-            let response = ui.checkbox(&mut shows, "heat map").on_hover_text(
-                "Right of the line: the largest difference of display values among the channels, by its logarithm: black at 1e-4 and below, over violet and orange to pale yellow at 1.",
-            );
+            let response = ui.checkbox(&mut shows, "heat map").on_hover_text(format!(
+                "Right of the line: the largest difference of display values among the channels, by its logarithm: black at {:e} and below, over violet and orange to pale yellow at 1.",
+                difference::SMALLEST
+            ));
             if response.changed() {
                 inputs.push(Input::HeatMap(shows));
             }

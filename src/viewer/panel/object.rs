@@ -4,6 +4,7 @@ use crate::scene::{Mesh, Source, mesh};
 use crate::viewer::change::Change;
 use crate::viewer::input::Input;
 use crate::viewer::interaction::Viewer;
+use crate::viewer::orbit::TURNTABLE_S;
 use egui::Ui;
 
 #[derive(Default)]
@@ -38,7 +39,10 @@ impl State {
                     inputs.push(Input::Key("home".to_owned()));
                 }
                 let turn = ui.selectable_label(viewer.motion.turntable, "turntable");
-                if turn.on_hover_text("Turns the camera around the objects, once in 20 s: T").clicked() {
+                if turn
+                    .on_hover_text(format!("Turns the camera around the objects, once in {TURNTABLE_S} s: T"))
+                    .clicked()
+                {
                     inputs.push(Input::Key("t".to_owned()));
                 }
             });

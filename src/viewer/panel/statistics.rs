@@ -16,7 +16,7 @@ pub fn show(ui: &mut Ui, viewer: &Viewer) {
             let [width, height] = measured.size;
             row("frame", format!("{:.1} ms", measured.frame.as_secs_f64() * 1e3), "From the start of the last frame until it was handed to the window.");
             if let (Some(median), Some(latest)) = (viewer.latency.shown_ms(0.5), viewer.latency.answers().back()) {
-                row("input", format!("{median:.0} ms"), "From an input to the frame that shows it: median of the latest hundred.");
+                row("input", format!("{median:.0} ms"), "From an input to the frame that shows it: median of the latest.");
                 let finished = latest.finished_ms.map_or_else(String::new, |ms| format!(", finished {ms:.0} ms"));
                 row("latest input", format!("{:.0} ms{finished}", latest.shown_ms), "The same of the latest one; where that frame shows threads that are only drafts, also to the frame with finished ones.");
             }
