@@ -46,7 +46,7 @@ use crate::error::{Error, Result};
 use crate::files::{self, sealed, unsealed, write_whole};
 
 /// Version of the file format and of the threads in it: to be raised when either changes, since caches depend on it.
-pub const FORMAT_VERSION: u32 = 32;
+pub const FORMAT_VERSION: u32 = 33;
 
 const MAGIC: &[u8; 8] = b"THREADS\0";
 

@@ -8,7 +8,7 @@ use glam::{DVec3, dvec3};
 use rayon::prelude::*;
 
 use super::fitted::kernel::vmf_peak;
-use super::fitted::lights::{BaseAnswers, Quadrature, SCALES, TestLights, light_kappa};
+use super::fitted::lights::{BaseAnswers, LightSettings, Quadrature, SCALES, TestLights, light_kappa};
 use super::rim::rim_power;
 use super::slice::{Resolution, Slice};
 use super::theta_o;
@@ -21,7 +21,7 @@ pub const ROWS: usize = SPLIT_SUM_ROWS as usize;
 /// View angles at which lights are answered.
 const FITTED_ROWS: [usize; 6] = [0, 20, 40, 55, 70, 80];
 /// Test lights of each.
-const LIGHTS: usize = 512;
+const LIGHTS: LightSettings = LightSettings::for_few(512);
 /// The lobe is so many rings of so many taps.
 const RINGS: usize = 12;
 
@@ -92,7 +92,7 @@ impl Answers {
     fn new(brdf: &SeenBrdf, row: usize) -> Self {
         let theta_o = theta_o(row, ROWS);
         let slices = Slice::with_lobes(brdf, theta_o, Resolution::DRAFT);
-        let lights = TestLights::new(&slices, LIGHTS, 0, Quadrature::DRAFT, &BaseAnswers::of(&BaseProfile::EVEN));
+        let lights = TestLights::new(&slices, LIGHTS, Quadrature::DRAFT, &BaseAnswers::of(&BaseProfile::EVEN));
         Self { lights, albedo: slices[0].albedo(), mirror: dvec3(-theta_o.sin(), 0.0, theta_o.cos()) }
     }
 

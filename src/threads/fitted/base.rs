@@ -3,7 +3,7 @@ use rayon::prelude::*;
 
 use super::cells::in_sets;
 use super::kernel::{scaled, sharpest_level};
-use super::lights::{BaseAnswers, Quadrature, TestLights};
+use super::lights::{BaseAnswers, LightSettings, Quadrature, TestLights};
 use super::solve::{Effort, Fit};
 use crate::brdf::{BaseProfile, Brdf, LobeShape};
 use crate::error::Result;
@@ -19,7 +19,7 @@ const VIEWS: [View; 4] = [
     View { theta_o: 1.2, phi_o: 1.5 },
 ];
 const KERNELS: usize = 4;
-const LIGHTS: usize = 512;
+const LIGHTS: LightSettings = LightSettings::for_few(512);
 const EFFORT: Effort = Effort { steps: 60, least_gain: 1e-3 };
 
 /// A base of one's own has a map of its own, so it has to leave less than this part of the error.
@@ -39,7 +39,7 @@ pub(super) fn base_of(brdf: &Brdf, lobe: &LobeShape, observer: &dyn Observer) ->
         let slices = Slice::with_lobes_of_view(brdf, lobe, *view, Resolution::DRAFT);
         let starts = in_sets(&slices[1], KERNELS, 1);
         let square = |base: &BaseAnswers| -> Result<f64> {
-            let lights = TestLights::new(&slices, LIGHTS, 0, Quadrature::DRAFT, base);
+            let lights = TestLights::new(&slices, LIGHTS, Quadrature::DRAFT, base);
             let fit = Fit::new(&lights, slices[0].albedo() / lights.unit);
             let fit = fit.no_sharper_than(sharpest_level(lobe, KERNELS, view.theta_o));
             let mut kernels = starts.first().map(|start| scaled(start, 1.0 / lights.unit)).unwrap_or_default();

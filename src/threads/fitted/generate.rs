@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::base::base_of;
 use super::cells::in_sets;
 use super::kernel::{Kernel, all_between, scale_rad, scaled, sharpest_level};
-use super::lights::{BaseAnswers, Quadrature, TestLights};
+use super::lights::{BaseAnswers, LightSettings, Quadrature, TestLights, dim_response};
 use super::row::Row;
 use super::sets::{pixels_have_own, share_of_sets};
 use super::solve::{Effort, Fit};
@@ -98,6 +98,7 @@ impl Targets {
     /// Cancelled by `observer` (noticed within a row).
     fn new(brdf: &Brdf, settings: &ThreadSettings, observer: &dyn Observer) -> Result<Self> {
         let (rows, count) = (settings.rows, light_count(settings.count));
+        let light_settings = LightSettings { count, seed: LIGHTS_SEED, dim_response: dim_response(settings.count) };
         let (azimuths, lobe) = (azimuth_count(brdf), LobeShape::of(brdf));
         let base = match settings.kind {
             ThreadKind::Fitted => base_of(brdf, &lobe, observer)?,
@@ -114,7 +115,7 @@ impl Targets {
             let slices = slices(View::of_row(index, rows));
             let lights = match settings.kind {
                 ThreadKind::Gaussian => TestLights::directions(&slices, DIRECTIONS_A_LIGHT * count),
-                _ => TestLights::new(&slices, count, LIGHTS_SEED, quadrature, &answers),
+                _ => TestLights::new(&slices, light_settings, quadrature, &answers),
             };
             Ok(TargetRow { lights, albedo: slices[0].albedo() })
         };

@@ -5,7 +5,7 @@ use glam::{DVec3, dvec3};
 
 use super::generate::{MOST_MOVED, carried, f_cos_of, most_moved};
 use super::kernel::{Kernel, SHARPEST_LEVEL, WIDEST_LEVEL, kappa_of_level, scale_rad, scaled, vmf_peak};
-use super::lights::{BaseAnswers, Quadrature, TestLights};
+use super::lights::{BaseAnswers, LightSettings, Quadrature, TestLights};
 use super::sets::pixels_have_own;
 use super::solve::{Effort, Fit};
 use super::stray::strays;
@@ -124,7 +124,8 @@ fn no_kernel_of_a_cusp_looks_up_the_environment_as_it_is() {
 fn seen_gold() -> (TestLights, DVec3) {
     let gold = gold(0.3);
     let slices = Slice::with_lobes(&SeenBrdf::from_azimuth(&gold, 0.0), 0.7, Resolution::DRAFT);
-    let lights = TestLights::new(&slices, 512, 0, Quadrature::DRAFT, &BaseAnswers::of(&BaseProfile::EVEN));
+    let lights =
+        TestLights::new(&slices, LightSettings::for_few(512), Quadrature::DRAFT, &BaseAnswers::of(&BaseProfile::EVEN));
     let albedo = slices[0].albedo() / lights.unit;
     (lights, albedo)
 }

@@ -2,7 +2,7 @@
 use rayon::prelude::*;
 
 use super::kernel::Kernel;
-use super::lights::{BaseAnswers, Quadrature, TestLights};
+use super::lights::{BaseAnswers, LightSettings, Quadrature, TestLights};
 use super::solve::Fit;
 use super::table::FittedTable;
 use crate::brdf::{Brdf, LobeShape};
@@ -16,8 +16,7 @@ const ANGLES_DEG: [f64; 12] = [3.25, 10.5, 20.75, 30.0, 37.5, 45.25, 52.5, 60.75
 const AZIMUTHS_DEG: [f64; 6] = [0.0, 7.5, 33.0, 48.0, 82.0, 139.0];
 
 /// Lights at each angle, and how they are turned away from those of a fit.
-const LIGHTS: usize = 2400;
-const SEED: usize = 5;
+const LIGHTS: LightSettings = LightSettings { seed: 5, ..LightSettings::for_few(2400) };
 
 /// The error of `table` relative to the radiance that `brdf` has under lights of all sizes, others than those of the fit and integrated
 /// with more points: RMS over view angles, each with the weight sin(2 theta_o) that it has on a sphere.
@@ -28,7 +27,7 @@ pub fn validation_error(table: &FittedTable, brdf: &Brdf) -> f64 {
         let theta_o = ANGLES_DEG[index % ANGLES_DEG.len()].to_radians();
         let phi_o = AZIMUTHS_DEG[index / ANGLES_DEG.len()].to_radians();
         let slices = Slice::with_lobes_of_view(brdf, &lobe, View { theta_o, phi_o }, Resolution::FULL);
-        let lights = TestLights::new(&slices, LIGHTS, SEED, Quadrature::FINE, &base);
+        let lights = TestLights::new(&slices, LIGHTS, Quadrature::FINE, &base);
         let in_units = |kernel: Kernel| Kernel { weight: kernel.weight / lights.unit, ..kernel };
         let kernels: Vec<_> = table.seen_from(theta_o, phi_o).into_iter().map(in_units).collect();
         let error = Fit::new(&lights, slices[0].albedo() / lights.unit).relative_error(&kernels);
