@@ -107,6 +107,10 @@ impl<T> FileKind<T> {
     pub fn remedy_for(&self, name: &str) -> String {
         let builtin = (self.builtin_names)();
         let files = format!("give {}", self.names());
+        // Where one of these may stand by its name alone it is no file's.
+        if let Some(builtin) = builtin.iter().find(|builtin| Path::new(name).ends_with(builtin)) {
+            return format!("{files}, or in a scene builtin = \"{builtin}\" in its place");
+        }
         // The nearest: names may differ in a letter.
         let near = builtin.iter().filter(|builtin| is_misspelt(name, builtin));
         match near.min_by_key(|builtin| misspellings(name, builtin)) {
@@ -164,6 +168,7 @@ mod tests {
         for given in ["Sky", "SKY"] {
             assert!(Environment::FILES.remedy_for(given).starts_with("write sky, or "), "{given}");
         }
+        assert!(Mesh::FILES.remedy_for("meshes/sphere").ends_with("in a scene builtin = \"sphere\" in its place"));
         assert!(Mesh::FILES.remedy_for("SPHERE").starts_with("write sphere, or "));
         // What a file is called that has the name of a built-in, and what is far from any.
         for given in ["gold", "goldfish", "bronze-age"] {

@@ -21,7 +21,7 @@ pub const ROWS: usize = SPLIT_SUM_ROWS as usize;
 /// View angles at which lights are answered.
 const FITTED_ROWS: [usize; 6] = [0, 20, 40, 55, 70, 80];
 /// Test lights of each.
-const LIGHTS: LightSettings = LightSettings::for_few(512);
+const LIGHTS: LightSettings = LightSettings { count: 512, threads: 1, seed: 0 };
 /// The lobe is so many rings of so many taps.
 const RINGS: usize = 12;
 

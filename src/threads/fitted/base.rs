@@ -19,7 +19,7 @@ const VIEWS: [View; 4] = [
     View { theta_o: 1.2, phi_o: 1.5 },
 ];
 const KERNELS: usize = 4;
-const LIGHTS: LightSettings = LightSettings::for_few(512);
+const LIGHTS: LightSettings = LightSettings { count: 512, threads: KERNELS, seed: 0 };
 const EFFORT: Effort = Effort { steps: 60, least_gain: 1e-3 };
 
 /// A base of one's own has a map of its own, so it has to leave less than this part of the error.

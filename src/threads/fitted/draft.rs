@@ -4,7 +4,7 @@ use glam::DVec3;
 use super::edit::Edit;
 use super::generate::{Neighbour, carried, from_the_middle, most_moved};
 use super::kernel::{Kernel, WIDEST_LEVEL, all_between, scaled, sharpest_level};
-use super::lights::{BaseAnswers, LightSettings, Quadrature, TestLights, dim_response};
+use super::lights::{BaseAnswers, LightSettings, Quadrature, TestLights};
 use super::row::Row;
 use super::sets::share_of_sets;
 use super::solve::{Effort, Fit};
@@ -138,7 +138,7 @@ impl Drafting<'_> {
         let slices = Slice::with_lobes_of_view(self.brdf, &self.lobe, self.view(index), Resolution::DRAFT);
         let threads = self.before.count;
         let count = FEWEST_LIGHTS + LIGHTS_A_THREAD * threads;
-        let settings = LightSettings { count, seed: 0, dim_response: dim_response(threads) };
+        let settings = LightSettings { count, threads, seed: 0 };
         let lights = TestLights::new(&slices, settings, Quadrature::DRAFT, self.base);
         let albedo = slices[0].albedo();
         let kernels = scaled(&in_proportion(self.before, index, albedo), 1.0 / lights.unit);

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::base::base_of;
 use super::cells::in_sets;
 use super::kernel::{Kernel, all_between, scale_rad, scaled, sharpest_level};
-use super::lights::{BaseAnswers, LightSettings, Quadrature, TestLights, dim_response};
+use super::lights::{BaseAnswers, LightSettings, Quadrature, TestLights};
 use super::row::Row;
 use super::sets::{pixels_have_own, share_of_sets};
 use super::solve::{Effort, Fit};
@@ -92,13 +92,14 @@ fn light_count(threads: usize) -> usize {
 }
 
 impl Targets {
-    /// Of as many rows as `settings` says, for each azimuth that `brdf` needs. 3 MB for 90 rows and 1128 lights.
+    /// Of as many rows as `settings` says, for each azimuth that `brdf` needs; lights count as where so many `threads` are fitted. 3 MB for 90 rows
+    /// and 1128 lights.
     ///
     /// # Errors
     /// Cancelled by `observer` (noticed within a row).
-    fn new(brdf: &Brdf, settings: &ThreadSettings, observer: &dyn Observer) -> Result<Self> {
+    fn new(brdf: &Brdf, settings: &ThreadSettings, threads: usize, observer: &dyn Observer) -> Result<Self> {
         let (rows, count) = (settings.rows, light_count(settings.count));
-        let light_settings = LightSettings { count, seed: LIGHTS_SEED, dim_response: dim_response(settings.count) };
+        let light_settings = LightSettings { count, threads, seed: LIGHTS_SEED };
         let (azimuths, lobe) = (azimuth_count(brdf), LobeShape::of(brdf));
         let base = match settings.kind {
             ThreadKind::Fitted => base_of(brdf, &lobe, observer)?,
@@ -138,8 +139,18 @@ impl Targets {
 /// # Errors
 /// No or too many threads, no rows, or cancelled by `observer` (noticed within a step of a row).
 pub fn generate(brdf: &Brdf, settings: &ThreadSettings, observer: &dyn Observer) -> Result<FittedTable> {
+    generate_as_of(settings.count, brdf, settings, observer)
+}
+
+/// The same by lights that count as where so many `threads` are fitted.
+pub(super) fn generate_as_of(
+    threads: usize,
+    brdf: &Brdf,
+    settings: &ThreadSettings,
+    observer: &dyn Observer,
+) -> Result<FittedTable> {
     settings.check()?;
-    let targets = Targets::new(brdf, settings, observer)?;
+    let targets = Targets::new(brdf, settings, threads, observer)?;
     let are_two = settings.sets > 1 && pixels_have_own(&targets.lobe);
     let total = if are_two { 2 * targets.rows.len() } else { targets.rows.len() };
     let done = Parts::new(total, observer);

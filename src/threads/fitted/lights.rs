@@ -25,29 +25,19 @@ const WIDTH_EXPONENT: f64 = 0.8;
 /// they can take of what is dim: 1 up to 4, 0.5 with 16, 0.25 with 64. With 0.1, 0.3, 0.5, 1 and 4 ten measured materials in three maps, sphere and
 /// dragon at 80 x 60, err by 0.00163, 0.00149, 0.00147, 0.00145 and 0.00164 with 16; a metal of GGX 0.15 beside a window that is 300 times as
 /// bright as the rest by 0.0103, 0.0096, 0.0095 and 0.0114 with the first four, and with 64 by 0.0025, 0.0047, 0.0058 and 0.0065.
-pub fn dim_response(threads: usize) -> f64 {
-    (2.0 / (threads as f64).sqrt()).min(DIM_RESPONSE_OF_FEW)
+fn dim_response(threads: usize) -> f64 {
+    (2.0 / (threads as f64).sqrt()).min(1.0)
 }
-
-/// That of few threads.
-const DIM_RESPONSE_OF_FEW: f64 = 1.0;
 
 /// Which lights, and how they count.
 #[derive(Clone, Copy, Debug)]
 pub struct LightSettings {
     /// About how many.
     pub count: usize,
+    /// They count as where so many threads are fitted.
+    pub threads: usize,
     /// Turns them.
     pub seed: usize,
-    /// See [`dim_response`].
-    pub dim_response: f64,
-}
-
-impl LightSettings {
-    /// So many for few threads.
-    pub const fn for_few(count: usize) -> Self {
-        Self { count, seed: 0, dim_response: DIM_RESPONSE_OF_FEW }
-    }
 }
 
 /// Lights of a scale are a multiple of this, so that loops over them are made of whole vectors.
@@ -119,7 +109,7 @@ impl TestLights {
     /// Half of the lights in the `lobes` of `slice`, half anywhere.
     pub fn new(
         [slice, lobes]: &[Slice; 2],
-        LightSettings { count, seed, dim_response }: LightSettings,
+        LightSettings { count, threads, seed }: LightSettings,
         quadrature: Quadrature,
         base: &BaseAnswers,
     ) -> Self {
@@ -139,6 +129,7 @@ impl TestLights {
         let unit = unit(slice);
         let scale_of = |j: usize| j / (2 * per_scale);
         // (F20)
+        let dim_response = dim_response(threads);
         let weights = response.iter().enumerate().map(|(j, response)| {
             light_width(scale_of(j)).powf(WIDTH_EXPONENT) / (luminance(*response) / unit + dim_response)
         });
