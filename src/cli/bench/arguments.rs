@@ -96,7 +96,7 @@ pub struct Defaults {
 impl Defaults {
     /// Help after that of the flags: these, where pictures are compared the `tolerance` of the references, and what `follows`.
     pub fn help(&self, tolerance: Option<f64>, follows: &str) -> String {
-        let names = |given: &[&str], all: Vec<&str>| if given == all { "all".to_owned() } else { given.join(", ") };
+        let names = |given: &[&str], all: Vec<&str>| if given == all { "all".to_owned() } else { given.join(",") };
         let materials = names(&self.materials, Brdf::builtin_names().collect());
         let methods: Vec<_> = self.methods.iter().map(|method| method.name()).collect();
         let methods = names(&methods, methods_on_gpu().map(Method::name).collect());
@@ -105,10 +105,10 @@ impl Defaults {
         let tolerance = tolerance.map_or(String::new(), |tolerance| {
             let on_gpu = Processor::Gpu.default_tolerance().max(tolerance);
             let on_gpu = if on_gpu > tolerance { format!(", on the GPU {on_gpu:e}") } else { String::new() };
-            format!("; --reference-tolerance, {tolerance:e}{on_gpu}")
+            format!("; --reference-tolerance {tolerance:e}{on_gpu}")
         });
         format!(
-            "Defaults: --materials, {materials}; --methods, {methods}; --counts, {counts}; --size, {size}{tolerance}.\n\n{follows}"
+            "Defaults: --materials {materials}; --methods {methods}; --counts {counts}; --size {size}{tolerance}.\n\n{follows}"
         )
     }
 }
