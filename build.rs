@@ -27,7 +27,10 @@ fn main() {
     let generated = out.join("glsl");
     write(&generated.join("brdf_models.glsl"), &brdf_switch());
 
-    write(&out.join("shader_constants.rs"), &shader_constants(&[glsl, &glsl.join("methods")]));
+    write(
+        &out.join("shader_constants.rs"),
+        &shader_constants(&[glsl, &glsl.join("methods"), &glsl.join("brdf"), &glsl.join("threads")]),
+    );
 
     let twins: Vec<_> = BRDF_MODELS.iter().filter(|name| has_twin(name)).collect();
     write(

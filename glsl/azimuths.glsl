@@ -1,8 +1,9 @@
 // The azimuths of the view for which an anisotropic BRDF has rows. Twin: src/threads/azimuths.rs.
 #include "arc_tangent.glsl"
 
-// From one azimuth of the view to the next, in radians.
-const float AZIMUTH_STEP = radians(5.0);
+// From one azimuth of the view to the next.
+const float AZIMUTH_STEP_DEG = 5.0;
+const float AZIMUTH_STEP = radians(AZIMUTH_STEP_DEG);
 
 // Where the azimuth of a view is among so many of them, in steps, and whether what is seen is the mirror image of what is there (1 or -1).
 // What their number says of the BRDF's symmetry stands with the twin: fold_azimuth in src/threads/azimuths.rs.

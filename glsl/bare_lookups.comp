@@ -19,6 +19,7 @@ layout(push_constant) uniform Push {
     uint pixel_count;
     uint lookup_count; // of each pixel
     uint row_count;
+    uint sum_mask; // all ones, or one less than how many sums there is room for
 } push;
 
 void main() {
@@ -40,5 +41,5 @@ void main() {
         vec4 lookup = lookups[row * push.lookup_count + k];
         sum += textureLod(environment_pyramid, vec3(turned * lookup.xy, lookup.z), lookup.w).rgb;
     } while (++k < push.lookup_count);
-    sums[pixel] = vec4(sum, 1.0);
+    sums[pixel & push.sum_mask] = vec4(sum, 1.0);
 }

@@ -1,5 +1,5 @@
 // The pinhole camera: from a position on the image to the direction through it.
-// Twin: Camera::ray in src/scene/camera.rs.
+// Twin: CameraRays::ray in src/passes/view.rs.
 
 // Right and up are scaled by the half-extent of the image plane at distance 1 along forward.
 struct Camera {

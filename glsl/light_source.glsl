@@ -7,8 +7,10 @@ struct Source {
     vec4 power;     // radiance integrated over its solid angle, over the scale of the pyramid's texels
 };
 
-// Uniform, which some drivers read faster than storage. Depth first; the number: twice MAX_SOURCES.
+const uint MAX_SOURCE_NODES = 96u; // of all trees
+
+// Uniform, which some drivers read faster than storage. Depth first.
 layout(set = 0, binding = 14, std140) uniform Sources {
     uint source_count;
-    Source sources[96];
+    Source sources[MAX_SOURCE_NODES];
 };

@@ -3,12 +3,13 @@ mod common;
 
 use common::{Validated, analytic_materials, ready, sphere};
 use threadlight::Error;
+use threadlight::glam::Vec4;
 use threadlight::low_level::environment::Pyramid;
 use threadlight::low_level::evaluate::bare_lookups::time_bare_lookups;
 use threadlight::low_level::evaluate::speed::{self, Growth, Speed, Timings};
 use threadlight::low_level::evaluate::{Cases, Shard};
 use threadlight::low_level::method::Method;
-use threadlight::low_level::passes::{BareLookup, BareLookups};
+use threadlight::low_level::passes::{BareLookup, BareLookups, bare_sum};
 use threadlight::low_level::scene::{Camera, Scene, Source};
 use threadlight::low_level::vulkan::PipelineCache;
 
@@ -50,6 +51,31 @@ fn bare_lookups_see_the_environment_as_often_as_asked_for() {
         }
     }
     drop(cache);
+    gpu.finish();
+}
+
+#[test]
+fn bare_lookups_are_of_the_row_the_turn_and_the_level_that_their_cpu_form_has() {
+    let gpu = Validated::new();
+    let (_, material) = analytic_materials().remove(0);
+    let pyramid = Pyramid::box_filtered(&ready(&sphere(material, "sky", 1, (8, 8))).environment);
+    let cache = PipelineCache::new(&gpu.device, None).unwrap();
+    // Groups are no multiple of the rows: none but the first is where two meet.
+    let (counts, rows) = ([70_000, 3], 7);
+    let lookup = |k: u32| {
+        let (sin, cos) = (0.2 + 0.05 * k as f32).sin_cos();
+        BareLookup { direction: [sin, 0.0, cos], level: 0.4 * (k % 9) as f32 }
+    };
+    let rows: Vec<_> = (0..rows * counts[1]).map(lookup).collect();
+    let bare = BareLookups::new(&gpu.device, &cache, &pyramid, counts, &rows, None).unwrap();
+    let (_, sums) = time_bare_lookups(&gpu.device, &bare).unwrap();
+    for (pixel, sum) in sums.iter().enumerate().step_by(101) {
+        let expected = bare_sum(counts, &rows, &pyramid, pixel as u32) / pyramid.radiance_scale();
+        // Weights of a lookup have 8 bits.
+        let off = (Vec4::from(*sum).truncate() / expected - 1.0).abs().max_element();
+        assert!(off < 5e-3, "{pixel}: {sum:?}, expected {expected}");
+    }
+    drop((bare, cache));
     gpu.finish();
 }
 

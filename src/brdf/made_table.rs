@@ -5,6 +5,8 @@ use glam::{DVec3, Vec3};
 use half::f16;
 use rayon::prelude::*;
 
+use super::{Brdf, lobe_radius};
+
 /// What the greatest value is stored as. Half precision then keeps eleven bits of all that is above a billionth of it.
 pub(super) const GREATEST_TEXEL: f64 = 6e4;
 
@@ -84,9 +86,20 @@ pub(super) fn logarithmic(x: f64, knee: f64) -> f64 {
     (x / knee).ln_1p() / knee.recip().ln_1p()
 }
 
+/// The knee that suits half vectors where a lobe is so wide: of the angle in right angles, or of tan(theta_h / 2), which is about as much.
+pub(super) fn knee_of_lobe(brdf: &Brdf, lobe_width_rad: f64) -> f64 {
+    // tan(theta_h / 2) is half of theta_h, and half of the width is where f is within a tenth or so of its peak.
+    (0.25 * lobe_width_rad.min(lobe_radius(brdf, 0.0))).clamp(1e-4, 1.0)
+}
+
 /// The inverse of [`logarithmic`].
 pub(super) fn exponential(x: f64, knee: f64) -> f64 {
     knee * (x * knee.recip().ln_1p()).exp_m1()
+}
+
+/// The derivative of [`exponential`] where that is `value`.
+pub(super) fn exponential_slope(value: f64, knee: f64) -> f64 {
+    (value + knee) * knee.recip().ln_1p()
 }
 
 /// Nodes per doubling of what is far above the knee, of an axis of `count`.

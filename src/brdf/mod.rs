@@ -18,6 +18,7 @@ use crate::files::{FileKind, read, toml_problem};
 mod base;
 mod builtin;
 mod cosines;
+mod directions;
 mod files;
 mod lobe;
 mod made_table;
@@ -31,11 +32,14 @@ mod symmetry;
 mod tabulate;
 
 pub use base::BaseProfile;
+pub(crate) use directions::{reflect, theta};
 pub(crate) use files::has_model;
 pub use files::{merl_bytes, merl_bytes_of_stored, merl_bytes_of_values};
 pub use lobe::{Ellipse, LobeShape, MIN_COS_THETA_D, NARROWING_COSINES, half_vector_width, lobe_radius};
 pub use made_table::{MADE_TABLE_SIZE, MadeTable};
-pub use microfacet::{Axes, Distribution, Roughness, Tap, fresnel_conductor, fresnel_dielectric, ggx_lobe};
+pub use microfacet::{
+    Axes, Distribution, NARROWEST_ALPHA, Roughness, Tap, fresnel_conductor, fresnel_dielectric, ggx_lobe,
+};
 pub use models::custom::CustomBrdf;
 pub use models::layered::{Coat, base_files, base_files_of, change_base_files, resolve_base_files};
 pub use models::*;
@@ -217,11 +221,10 @@ impl Brdf {
     /// 1e-3 of the truth for roughness_alpha >= 0.001; lobes about another direction that are narrower than about 3 degrees may fall between its
     /// points.
     pub fn albedo_from(&self, theta_o: f64, phi_o: f64) -> DVec3 {
-        // A ring crosses an ellipse within its ratio in radians. GGX then leaves an error of 2 e^(-ratio phi_steps).
-        let least_phi_steps = (8.0 / lobe::narrowness(self)).ceil() as usize;
+        let narrowness = lobe::narrowness(self);
         let in_steps = |halvings: u32| {
             let [theta_steps, phi_steps] = ALBEDO_STEPS.map(|steps| steps << halvings);
-            self.albedo_in_steps(theta_o, phi_o, [theta_steps, phi_steps.max(least_phi_steps)])
+            self.albedo_in_steps(theta_o, phi_o, [theta_steps, lobe::azimuths_across(narrowness, phi_steps)])
         };
         let mut albedo = in_steps(0);
         for halvings in 1..=ALBEDO_HALVINGS {
@@ -247,7 +250,7 @@ impl Brdf {
             let mirrored = azimuths.iter().filter_map(|azimuth| {
                 let h = (azimuth * sin_theta_h).extend(cos_theta_h);
                 let cos_theta_d = w_o.dot(h);
-                let w_i = 2.0 * cos_theta_d * h - w_o;
+                let w_i = reflect(w_o, h);
                 (cos_theta_d > 0.0 && w_i.z > 0.0).then_some((w_i, cos_theta_d))
             });
             let (w_i, cosines): (Vec<_>, Vec<_>) = mirrored.unzip();

@@ -18,6 +18,8 @@ pub struct Parameters {
     only_checks: bool,
     /// Keys that the model has, but not beside those that are given.
     idle: Vec<Idle>,
+    /// The model that these are of, if a key among them said so.
+    model: Option<String>,
 }
 
 /// A key that the model has, but not beside those that are given.
@@ -111,7 +113,7 @@ pub enum Spacing {
 impl Parameters {
     /// All entries of `table` are parameters.
     pub fn new(table: Table) -> Self {
-        Self { table, read: Vec::new(), fills: false, only_checks: false, idle: Vec::new() }
+        Self { table, read: Vec::new(), fills: false, only_checks: false, idle: Vec::new(), model: None }
     }
 
     /// The same, but what is missing counts as the middle of its range, or as the first of its words.
@@ -192,6 +194,11 @@ impl Parameters {
         in_range(key, value, &range)
     }
 
+    /// The albedo of a diffuse part.
+    pub(super) fn diffuse(&mut self) -> Result<DVec3> {
+        self.colour("diffuse", 0.0..=1.0, "Albedo of the diffuse part, linear Rec. 709.")
+    }
+
     /// The RGB colour `key`, each channel within `range`; a single number stands for a grey.
     pub fn colour(&mut self, key: &str, range: RangeInclusive<f64>, help: &'static str) -> Result<DVec3> {
         // Colours that may exceed 1 span orders of magnitude, as indices of refraction do.
@@ -227,7 +234,9 @@ impl Parameters {
 
     /// The name of the model that stands beside its parameters.
     pub(super) fn model(&mut self) -> Result<String> {
-        take_model(&mut self.table)
+        let model = take_model(&mut self.table)?;
+        self.model = Some(model.clone());
+        Ok(model)
     }
 
     /// Whether `key` is a table.
@@ -252,7 +261,8 @@ impl Parameters {
         let value = read(&mut inner).map_err(|error| inside(error, key))?;
         let of_inner = |parameter: Parameter| Parameter { key: format!("{key}.{}", parameter.key), ..parameter };
         self.read.extend(inner.read.drain(..).map(of_inner));
-        inner.finish(key).map_err(|error| inside(error, key))?;
+        let of = inner.model.clone();
+        inner.finish(of.as_deref().unwrap_or(key)).map_err(|error| inside(error, key))?;
         Ok(value)
     }
 

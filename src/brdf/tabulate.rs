@@ -4,10 +4,11 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use glam::{DVec2, DVec3};
 
+use super::made_table::{exponential, exponential_slope, knee_of_lobe};
 use super::merl::DEVICE_TABLE_SIZE;
 use super::tabulated::{Grid, Tabulated};
 use super::tabulated_anisotropic::{AnisotropicGrid, TabulatedAnisotropic};
-use super::{Brdf, LobeShape, MadeTable, lobe_radius};
+use super::{Brdf, LobeShape, MadeTable, reflect};
 
 /// Relative error of a table at which nodes are no longer added.
 const TARGET_ERROR: f64 = 2e-3;
@@ -35,9 +36,7 @@ const AZIMUTH_DEG: [f64; 3] = [0.0, 50.0, 100.0];
 /// an edge. Of anisotropic models they are 0.3 to 1.7 % up to 70 degrees, and 1 to 6 % at 85; the guide has two that err by more.
 pub fn tabulate(brdf: &Brdf) -> (Brdf, f64) {
     let lobe = LobeShape::of(brdf);
-    // tan(theta_h / 2) is half of theta_h, and half of the width is where f is within a tenth or so of its peak.
-    let knee_of = |width: f64| (0.25 * width).clamp(1e-4, 1.0);
-    let knee = knee_of(lobe.width_rad.min(lobe_radius(brdf, 0.0)));
+    let knee = knee_of_lobe(brdf, lobe.width_rad);
     let f = |w_i: DVec3, w_o: DVec3| brdf.evaluate(w_i, w_o);
     let azimuths = if lobe.is_isotropic { &AZIMUTH_DEG[..1] } else { &AZIMUTH_DEG[..] };
     let views =
@@ -89,18 +88,17 @@ impl Sample {
         const PHI_STEPS: usize = 37;
         let [theta_o, phi_o] = view_deg.map(f64::to_radians);
         let w_o = (DVec2::from_angle(phi_o) * theta_o.sin()).extend(theta_o.cos());
-        let range = knee.recip().ln_1p();
         let pairs = (0..THETA_STEPS).flat_map(|i| (0..PHI_STEPS).map(move |j| (i, j)));
         let sample = |(i, j): (usize, usize)| {
-            // theta_h = 90 deg t with t = knee (e^(range x) - 1), so dtheta_h = pi / 2 (t + knee) range dx.
-            let t = knee * (range * (i as f64 + 0.5) / THETA_STEPS as f64).exp_m1();
-            let (sin_theta_h, cos_theta_h) = (FRAC_PI_2 * t).sin_cos();
+            // In right angles.
+            let theta_h = exponential((i as f64 + 0.5) / THETA_STEPS as f64, knee);
+            let (sin_theta_h, cos_theta_h) = (FRAC_PI_2 * theta_h).sin_cos();
             let across = DVec2::from_angle(2.0 * PI * (j as f64 + 0.3) / PHI_STEPS as f64) * sin_theta_h;
             let h = across.extend(cos_theta_h);
             let cos_theta_d = w_o.dot(h);
-            let w_i = 2.0 * cos_theta_d * h - w_o;
+            let w_i = reflect(w_o, h);
             // dw_i = 4 (w_o . h) dw_h, but for a constant factor.
-            let weight = w_i.z * cos_theta_d * sin_theta_h * (t + knee);
+            let weight = w_i.z * cos_theta_d * sin_theta_h * exponential_slope(theta_h, knee);
             (cos_theta_d > 0.0 && w_i.z > 0.0).then(|| Self { w_i, w_o, value: f(w_i, w_o), weight })
         };
         pairs.filter_map(sample).collect()

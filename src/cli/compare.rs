@@ -5,7 +5,7 @@ use threadlight::Result;
 use threadlight::low_level::evaluate::{Comparable, Display, Metrics, compare, difference_picture};
 use threadlight::low_level::files;
 use threadlight::low_level::picture;
-use threadlight::low_level::scene::{EXPOSURE, GAMMA};
+use threadlight::low_level::scene::{EXPOSURE, GAMMA, POSITIVE_SINGLE};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -42,7 +42,7 @@ pub struct Compare {
     #[arg(long, value_name = "X", default_value_t = Display::default().exposure, value_parser = number(f64::MIN_POSITIVE..=*EXPOSURE.end(), "a number above 0, at most 3.4e38"))]
     exposure: f64,
     /// Display values are radiance to the power of 1/X.
-    #[arg(long, value_name = "X", default_value_t = Display::default().gamma, value_parser = number(GAMMA, "a finite number above 0: 1.2e-38 to 3.4e38"))]
+    #[arg(long, value_name = "X", default_value_t = Display::default().gamma, value_parser = number(GAMMA, POSITIVE_SINGLE))]
     gamma: f64,
     /// Picture to write of where they differ.
     #[arg(long, value_name = "FILE.png")]

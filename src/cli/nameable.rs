@@ -1,8 +1,9 @@
-//! Help texts of what flags can name: they follow from the tables of formats and methods.
+//! Help texts of what flags can name, and of their ranges: they follow from the tables of formats and methods, and from what is checked.
 use threadlight::low_level::brdf::Brdf;
 use threadlight::low_level::environment::Environment;
 use threadlight::low_level::method::{DEFAULT_SAMPLES, Method};
-use threadlight::low_level::scene::{MAX_SAMPLES, Mesh, Scene};
+use threadlight::low_level::scene::{MAX_SAMPLES, MAX_SIZE_PX, MAX_SUBPIXELS, Mesh, Scene};
+use threadlight::low_level::threads::{self, ThreadKind, fitted};
 
 /// `what` and how a material is named.
 pub fn material(what: &str) -> String {
@@ -29,13 +30,36 @@ pub fn scenes(what: &str) -> String {
     format!("{}; or {}, whose camera and objects are used", mesh(what), Scene::FILES.names())
 }
 
+/// `what` and how many sub-pixels there can be.
+pub fn subpixels(what: &str) -> String {
+    format!("{what}, 1 to {MAX_SUBPIXELS}")
+}
+
+/// Sizes of pictures with sides of at `least` so many pixels.
+pub fn size(what: &str, least: usize) -> String {
+    format!("{what} in pixels, each side {least} to {MAX_SIZE_PX}")
+}
+
+/// `what` and how many threads there can be, of methods that can have so many.
+pub fn most_threads(what: &str) -> String {
+    format!("{what}, 1 to {}; of a method that can have fewer, its most", threads::MAX_COUNT)
+}
+
+/// `what` and how many fitted threads there can be.
+pub fn fitted_threads(what: &str) -> String {
+    format!("{what}, 1 to {}", fitted::MAX_COUNT)
+}
+
+/// Of these kinds, how many threads there can be.
+pub fn counts_of_threads(kinds: impl Iterator<Item = ThreadKind>) -> String {
+    let count =
+        |kind: ThreadKind| format!("{} 1 to {} (default {})", kind.name(), kind.max_count(), kind.default_count());
+    kinds.map(count).collect::<Vec<_>>().join(", ")
+}
+
 /// Numbers of threads, and of samples.
 pub fn counts() -> String {
-    let of_threads = |method: &Method| {
-        let kind = method.threads()?;
-        Some(format!("{} 1 to {} (default {})", method.name(), kind.max_count(), kind.default_count()))
-    };
-    let of_threads = Method::ALL.iter().filter_map(of_threads).collect::<Vec<_>>().join(", ");
+    let of_threads = counts_of_threads(Method::ALL.iter().filter_map(|method| method.threads()));
     let of_samples = format!(
         "samples per pixel of methods that have none, 1 to {MAX_SAMPLES}, fewer of `ris` and with many sub-pixels (default {DEFAULT_SAMPLES}; `split_sum` has 1)"
     );

@@ -9,7 +9,8 @@ use threadlight::low_level::environment;
 use threadlight::low_level::memo::Memo;
 use threadlight::low_level::method::{Method, Pattern};
 use threadlight::low_level::scene::{
-    Background, EXPOSURE, GAMMA, MAX_SAMPLES, MAX_SIZE_PX, MAX_SUBPIXELS, MaterialSource, Scene, Source, mesh,
+    Background, EXPOSURE, GAMMA, MAX_SAMPLES, MAX_SIZE_PX, MAX_SUBPIXELS, MaterialSource, POSITIVE_SINGLE,
+    SINGLE_FACTOR, Scene, Source, mesh,
 };
 use threadlight::low_level::vulkan::{Device, Instance, Messages};
 
@@ -32,17 +33,15 @@ pub struct SceneFlags {
     /// Where methods filtered and importance draw samples: at random numbers of each pixel's own (noise), or at one fixed set (bias).
     #[arg(long, value_name = "per-pixel|fixed", value_parser = pattern(), hide_possible_values = true)]
     pub pattern: Option<Pattern>,
-    /// Sub-pixels per axis, 1 to 4.
-    #[arg(long, value_name = "S", value_parser = subpixels())]
+    #[arg(long, help = nameable::subpixels("Sub-pixels per axis"), value_name = "S", value_parser = subpixels())]
     pub subpixels: Option<u32>,
-    /// Size of the picture in pixels, each side 1 to 16384.
-    #[arg(long, value_name = "WxH", value_parser = parse_size, allow_hyphen_values = true)]
+    #[arg(long, help = nameable::size("Size of the picture", 1), value_name = "WxH", value_parser = parse_size, allow_hyphen_values = true)]
     pub size: Option<(u32, u32)>,
     /// Factor on radiance before display.
-    #[arg(long, value_name = "X", value_parser = number(EXPOSURE, "a finite number from 0 to 3.4e38"))]
+    #[arg(long, value_name = "X", value_parser = number(EXPOSURE, SINGLE_FACTOR))]
     pub exposure: Option<f64>,
     /// Display values are radiance to the power of 1/X.
-    #[arg(long, value_name = "X", value_parser = number(GAMMA, "a finite number above 0: 1.2e-38 to 3.4e38"))]
+    #[arg(long, value_name = "X", value_parser = number(GAMMA, POSITIVE_SINGLE))]
     pub gamma: Option<f64>,
     /// What is seen behind the objects.
     #[arg(long, value_name = "environment|none", value_parser = background(), hide_possible_values = true)]

@@ -24,8 +24,7 @@ Examples:
 pub struct Threads {
     #[arg(help = nameable::material("Material"))]
     material: String,
-    /// Number of threads: 1 to 128 (fitted; 16 by default, of which anisotropic materials have 13 in sets) or 1 to 1024 (paper; 100 by default).
-    #[arg(long, value_name = "N")]
+    #[arg(long, help = counts(), value_name = "N")]
     count: Option<u32>,
     /// Whose threads: fitted, paper or gaussian.
     #[arg(long, value_name = "METHOD", default_value = ThreadKind::default().name())]
@@ -33,8 +32,7 @@ pub struct Threads {
     /// Seed of everything random; the same seed gives the same threads.
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
-    /// Sub-pixels per axis of the pictures that they are for, 1 to 4: fitted threads are in as many sets as a pixel has of them, those of anisotropic materials in fewer.
-    #[arg(long, value_name = "S", default_value_t = ImageSettings::default().subpixels, value_parser = subpixels())]
+    #[arg(long, help = for_subpixels(), value_name = "S", default_value_t = ImageSettings::default().subpixels, value_parser = subpixels())]
     subpixels: u32,
     /// Neither read nor write cached threads.
     #[arg(long)]
@@ -45,6 +43,20 @@ pub struct Threads {
     /// Picture of the threads to draw, as the paper's figures 7 and 8.
     #[arg(long, value_name = "FILE.png")]
     plot: Option<PathBuf>,
+}
+
+fn counts() -> String {
+    let counts = nameable::counts_of_threads(ThreadKind::ALL.into_iter());
+    format!(
+        "Number of threads: {counts}; where anisotropic materials have few sets of fitted ones, fewer are made (13 of 16)"
+    )
+}
+
+fn for_subpixels() -> String {
+    let subpixels = nameable::subpixels("Sub-pixels per axis of the pictures that they are for");
+    format!(
+        "{subpixels}: fitted threads are in as many sets as a pixel has of them, those of anisotropic materials in fewer"
+    )
 }
 
 impl Threads {

@@ -9,9 +9,12 @@ use glam::{DMat2, DVec2, DVec3, Vec4, dvec2, dvec3};
 
 use super::Environment;
 use crate::brdf::luminance;
+use crate::shader_constants::light_source;
 
 /// Most sources of an environment, and most bright regions that it has them of.
 pub const MAX_SOURCES: usize = 48;
+
+const _: () = assert!(light_source::MAX_SOURCE_NODES as usize == 2 * MAX_SOURCES);
 const MAX_REGIONS: usize = 12;
 
 /// Pixels so many times brighter than the mean over the sphere of all that are not are of a source.

@@ -35,11 +35,11 @@ pub struct VmfPyramid {
 #[repr(u32)]
 pub enum BlurKernel {
     /// The texel itself.
-    Box = 0,
+    Box = vmf_pyramid_comp::BOX,
     /// The kernel that, with the blur of a bilinear lookup, makes the level's vMF kernel.
-    Vmf = 1,
+    Vmf = vmf_pyramid_comp::VMF,
     /// As the level of twice the size, and then means of 2 x 2 texels.
-    Mean = 2,
+    Mean = vmf_pyramid_comp::MEAN,
 }
 
 /// How to make one map.

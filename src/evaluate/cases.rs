@@ -12,7 +12,7 @@ use crate::error::{Error, Result};
 use crate::memo::{Keyed, Memo, Round};
 use crate::method::{Method, Sampling, Variant};
 use crate::pipeline::DeviceScene;
-use crate::prepare::{Prepared, PreparedMaterial, ask_threads, prepare};
+use crate::prepare::{Prepared, PreparedMaterial, ask_threads, check_count, prepare};
 use crate::progress::{Observer, OnlyCancels};
 use crate::scene::{Background, EnvironmentSource, MaterialSettings, MaterialSource, Scene};
 use crate::steps::{LoadEnvironment, LoadMaterial};
@@ -236,7 +236,7 @@ impl Cases {
         scene.objects.iter_mut().for_each(|object| object.material = "placeholder".to_owned());
         scene.environment.source = EnvironmentSource::Builtin("white".to_owned());
         scene.image.background = Background::None;
-        scene.shading.method = Method::Uniform;
+        (scene.shading.method, scene.shading.threads) = (Method::Uniform, None);
         prepare(&scene, round)
     }
 }
@@ -276,9 +276,10 @@ impl Place<'_> {
     /// Prepares rendering by `estimator`: makes its threads, if it has any and they were not made before.
     ///
     /// # Errors
-    /// A number of threads that is out of range, or cancelled.
+    /// A number of threads or samples that is out of range, or cancelled.
     pub fn choose(&mut self, estimator: Estimator) -> Result<()> {
         let Estimator { variant: Variant { method, pattern }, count } = estimator;
+        check_count(method, count, self.prepared.view.subpixels)?;
         let sampling = Sampling { count, seed: self.cases.seed, pattern };
         let threads =
             ask_threads(&self.round(), method, &self.prepared.materials[0], sampling, self.prepared.view.subpixels)?;

@@ -14,7 +14,7 @@ use crate::vulkan::Device;
 
 /// Pixels that are looked at. Errors gather in a part of a picture, at rims and highlights, say a tenth of it: of 50 normal numbers
 /// the mean square has a standard deviation of sqrt(2 / 50) of it, so the RMS one of a tenth.
-const PIXELS: usize = 512;
+pub(super) const PIXELS: usize = 512;
 
 /// The truth at some of the pixels that see a surface, spread evenly over a picture.
 pub struct TrueSample {
@@ -63,7 +63,7 @@ impl TrueSample {
     pub fn expected_rms(&self, radiance: &[[f32; 4]]) -> f64 {
         let here: Vec<_> = self.pixels.iter().map(|&pixel| radiance[pixel]).collect();
         let here = Comparable::from_radiance(here.len(), 1, &here, true, self.display);
-        Differences::of(&here.display, &self.truth.display).rms(self.pixels.len().max(1) as u64)
+        Differences::of_pictures(&here.display, &self.truth.display).rms(self.pixels.len().max(1) as u64)
     }
 }
 

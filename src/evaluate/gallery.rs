@@ -13,6 +13,7 @@ use crate::error::Result;
 use crate::memo::Memo;
 use crate::pipeline::Wanted;
 use crate::progress::{Observer, Parts};
+use crate::scene::MaterialSource;
 use crate::vulkan::Device;
 
 /// A picture and what it is of, after which its file is named.
@@ -48,21 +49,25 @@ pub fn material_sheets(
         tiles.push((of, Tile { picture, caption: place.material.to_owned() }));
         places.advance()
     })?;
+    let is_builtin = |name: &str| {
+        cases.materials.iter().any(|(its, source)| its == name && matches!(source, MaterialSource::Builtin(_)))
+    };
     let sheets = in_order(tiles.iter().map(|(of, _)| of.clone()));
     let sheet = |of: &String| {
         let tiles: Vec<_> = tiles.iter().filter(|(its, _)| its == of).map(|(_, tile)| tile.clone()).collect();
         let name = if sheets.len() == 1 { "materials".to_owned() } else { format!("materials_{of}") };
-        (name, by_family(tiles).draw())
+        (name, by_family(tiles, &is_builtin).draw())
     };
     Ok(sheets.iter().map(sheet).collect())
 }
 
 /// Built-in materials family by family, then the others: rows that begin with the name of the family. If all are of one, a square.
-fn by_family(tiles: Vec<Tile>) -> Sheet {
+fn by_family(tiles: Vec<Tile>, is_builtin: &dyn Fn(&str) -> bool) -> Sheet {
     const COLUMNS: usize = 6;
     let families: Vec<_> = Brdf::builtin_families().collect();
     let family_of = |tile: &Tile| {
-        let family = families.iter().position(|(_, names)| names.contains(&tile.caption.as_str()));
+        let name = tile.caption.as_str();
+        let family = families.iter().position(|(_, names)| is_builtin(name) && names.contains(&name));
         family.unwrap_or(families.len())
     };
     let mut groups = vec![Vec::new(); families.len() + 1];
@@ -146,11 +151,11 @@ mod tests {
             names.iter().map(tile).collect()
         };
         let metals: Vec<_> = Brdf::builtin_families().find(|(family, _)| *family == "metals").unwrap().1;
-        let all = [&["clay", "own-file"][..], &metals[..7]].concat();
-        let sheet = by_family(tiles(&all));
+        let all = [&["clay", "own-file", "porcelain"][..], &metals[..7]].concat();
+        let sheet = by_family(tiles(&all), &|name| name != "porcelain");
         let rows: Vec<_> = sheet.rows.iter().map(|(label, cells)| (label.as_str(), cells.len())).collect();
-        assert_eq!(rows, [("metals", 6), ("", 1), ("ceramics", 1), ("files", 1)]);
-        let square = by_family(tiles(&metals[..4]));
+        assert_eq!(rows, [("metals", 6), ("", 1), ("ceramics", 1), ("files", 2)]);
+        let square = by_family(tiles(&metals[..4]), &|_| true);
         assert!(
             square.rows.len() == 2 && square.rows.iter().all(|(label, cells)| label.is_empty() && cells.len() == 2)
         );

@@ -3,12 +3,12 @@ use std::f64::consts::FRAC_PI_2;
 
 use glam::{DMat3, DVec3, dvec3};
 
+use super::colours::CURVES;
 use super::metrics::Display;
 use crate::brdf::{Brdf, luminance};
 
-/// Angles of the light whose lobes are drawn, in degrees, and their colours (Okabe and Ito 2008).
-pub const LIGHTS: [(f64, [u8; 3]); 4] =
-    [(0.0, [213, 94, 0]), (30.0, [0, 114, 178]), (60.0, [0, 158, 115]), (80.0, [204, 121, 167])];
+/// Angles of the light whose lobes are drawn, in degrees, and their colours.
+pub const LIGHTS: [(f64, [u8; 3]); 4] = [(0.0, CURVES[0]), (30.0, CURVES[1]), (60.0, CURVES[2]), (80.0, CURVES[3])];
 
 /// Names of the channels, and the colours of their albedos.
 pub const CHANNELS: [(&str, [u8; 3]); 3] = [("red", [200, 30, 30]), ("green", [20, 140, 40]), ("blue", [40, 70, 200])];

@@ -20,7 +20,7 @@ use glam::{DVec2, DVec3, dvec3};
 use rayon::prelude::*;
 use tracing::subscriber::NoSubscriber;
 
-use crate::brdf::{Brdf, Domain, Parameter, Scale, parameter, set_parameter};
+use crate::brdf::{Brdf, Domain, Parameter, Scale, parameter, reflect, set_parameter};
 use crate::error::{Error, Result};
 
 /// Points at which the search looks first.
@@ -295,7 +295,7 @@ fn samples(brdf: &Brdf) -> Vec<Sample> {
         let (sin_theta_h, cos_theta_h) = (FRAC_PI_2 * x * x).sin_cos();
         let phi = PI * ((i % PHI_STEPS) as f64 + 0.5) / PHI_STEPS as f64;
         let h = (DVec2::from_angle(phi) * sin_theta_h).extend(cos_theta_h);
-        let w_i = 2.0 * w_o.dot(h) * h - w_o;
+        let w_i = reflect(w_o, h);
         (w_i.z > 0.0).then(|| Sample { w_i, w_o, wanted: logarithm(brdf.evaluate(w_i, w_o), w_i) })
     };
     places.filter_map(sample).collect()

@@ -6,6 +6,7 @@ use crate::error::{Error, Result};
 use crate::passes::View;
 use crate::picture::{Format, PictureFile};
 use crate::scene::ImageSettings;
+use crate::statistics::largest;
 
 /// How radiance L is displayed: clamp(exposure L, 0, 1)^(1/gamma).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -100,7 +101,9 @@ impl Comparable {
             Format::Png => Self::new(width, height, &picture.rgba, picture.alpha, |[r, g, b, alpha]| {
                 let coverage = f64::from(alpha).powf(1.0 / display.gamma);
                 let over_black = [r, g, b].map(|value| f64::from(value) * coverage);
-                let radiance = over_black.map(|value| (value.powf(display.gamma) / display.exposure) as f32);
+                // What a tiny exposure makes of them may be more than single precision holds.
+                let radiance = |value: f64| (value.powf(display.gamma) / display.exposure).min(f32::MAX.into()) as f32;
+                let radiance = over_black.map(radiance);
                 (radiance, over_black.map(|value| value as f32))
             }),
         }
@@ -158,8 +161,10 @@ pub fn compare(a: &Comparable, b: &Comparable, mask_background: bool) -> Result<
     let (display_a, display_b) = (masked(&a.display), masked(&b.display));
 
     let pixels = compared.iter().filter(|compared| **compared).count() as u64;
-    let (display, linear) =
-        (Differences::of(&display_a, &display_b), Differences::of(&masked(&a.radiance), &masked(&b.radiance)));
+    let (display, linear) = (
+        Differences::of_pictures(&display_a, &display_b),
+        Differences::of_pictures(&masked(&a.radiance), &masked(&b.radiance)),
+    );
     let ssim = ssim_map(&display_a, &display_b, width, height);
     let rows = compared.chunks(width).skip(RADIUS).zip(ssim.chunks(width - 2 * RADIUS));
     let inside = rows.flat_map(|(compared, ssim)| compared[RADIUS..].iter().zip(ssim));
@@ -195,15 +200,24 @@ pub(super) fn compared_pixels(a: &Comparable, b: &Comparable, mask_background: b
 #[derive(Default)]
 pub(super) struct Differences {
     sum_of_squares: f64,
-    max: f64,
+    /// NaN if one is.
+    pub(super) max: f64,
 }
 
 impl Differences {
-    pub(super) fn of(a: &[[f32; 3]], b: &[[f32; 3]]) -> Self {
-        a.as_flattened().iter().zip(b.as_flattened()).fold(Self::default(), |sofar, (a, b)| {
-            let difference = (f64::from(*a) - f64::from(*b)).abs();
-            Self { sum_of_squares: sofar.sum_of_squares + difference * difference, max: sofar.max.max(difference) }
+    pub(super) fn of(pairs: impl Iterator<Item = [f64; 2]>) -> Self {
+        pairs.fold(Self::default(), |sofar, [a, b]| {
+            let difference = (a - b).abs();
+            Self {
+                sum_of_squares: sofar.sum_of_squares + difference * difference,
+                max: largest([sofar.max, difference]),
+            }
         })
+    }
+
+    /// Of two pictures.
+    pub(super) fn of_pictures(a: &[[f32; 3]], b: &[[f32; 3]]) -> Self {
+        Self::of(a.as_flattened().iter().zip(b.as_flattened()).map(|(a, b)| [*a, *b].map(f64::from)))
     }
 
     /// Root of the mean square over the channels of so many pixels.

@@ -23,6 +23,7 @@
 
 pub mod bare_lookups;
 pub mod cases;
+mod colours;
 pub mod difference;
 pub mod expected;
 pub mod fit;

@@ -9,30 +9,22 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::Row;
+use super::colours::{CURVES, GREY};
 use super::speed::{Growth, TimedFrame, Timings};
 use super::tables::{by_count, in_order};
 use crate::error::{Error, Result};
 use crate::files::{file_in, write_whole};
 use crate::statistics::mean;
 
-const SIZE_PX: (u32, u32) = (960, 600);
-/// At the right, for names: the longest is about "environment, floor".
-const LEGEND_PX: u32 = 190;
+/// Width and least height of the plot, without the names at its right.
+const PLOT_PX: (u32, u32) = (770, 600);
+/// Where the first name of the legend is, what is before each, how far they are apart, and how wide a letter is.
+const FIRST_NAME_PX: u32 = 60;
+const BEFORE_NAME_PX: u32 = 44;
+const LINE_PX: u32 = 26;
+const LETTER_PX: u32 = 8;
 pub(super) const TEXT: RGBColor = RGBColor(40, 42, 48);
 pub(super) const GRID: RGBColor = RGBColor(222, 223, 226);
-/// Distinguishable with any kind of colour vision (Okabe and Ito 2008), with grey for their yellow, which is too pale for lines.
-const COLOURS: [RGBColor; 8] = [
-    RGBColor(213, 94, 0),
-    RGBColor(0, 114, 178),
-    RGBColor(0, 158, 115),
-    RGBColor(204, 121, 167),
-    RGBColor(86, 180, 233),
-    RGBColor(230, 159, 0),
-    RGBColor(0, 0, 0),
-    RGBColor(128, 130, 136),
-];
-/// Place of grey among them.
-const GREY: usize = 7;
 /// Outlines in pixels around the point. As many as colours, but for one: so curves with one colour differ in their markers.
 const MARKERS: [&[(i32, i32)]; 7] = [
     &[(-2, -5), (2, -5), (5, -2), (5, 2), (2, 5), (-2, 5), (-5, 2), (-5, -2)],
@@ -268,10 +260,17 @@ impl Chart {
     pub fn svg(&self) -> Result<String, String> {
         let mut svg = String::new();
         {
-            let area = SVGBackend::with_string(&mut svg, SIZE_PX).into_drawing_area();
+            let area = SVGBackend::with_string(&mut svg, self.size_px()).into_drawing_area();
             self.draw(&area).map_err(|cause| cause.to_string())?;
         }
         Ok(svg)
+    }
+
+    /// Width and height, with room for all names.
+    fn size_px(&self) -> (u32, u32) {
+        let letters = self.curves.iter().map(|curve| curve.name.chars().count()).max().unwrap_or(0) as u32;
+        let names = FIRST_NAME_PX + LINE_PX * self.curves.len() as u32;
+        (PLOT_PX.0 + BEFORE_NAME_PX + LETTER_PX * (letters + 1), PLOT_PX.1.max(names))
     }
 
     fn draw(&self, area: &Area) -> Result<(), Box<dyn std::error::Error>> {
@@ -287,7 +286,7 @@ impl Chart {
         };
         let (x_ticks, y_ticks) = (ticks_of(&self.x, &x), ticks_of(&self.y, &y));
         area.fill(&WHITE)?;
-        let (plot, legend) = area.split_horizontally(SIZE_PX.0 - LEGEND_PX);
+        let (plot, legend) = area.split_horizontally(PLOT_PX.0);
         let mut chart = ChartBuilder::on(&plot)
             .caption(&self.title, font(22))
             .margin(16)
@@ -308,10 +307,11 @@ impl Chart {
             .draw()?;
         for (index, curve) in self.curves.iter().enumerate() {
             let marker = MARKERS[curve.style % MARKERS.len()].to_vec();
-            let colour = COLOURS[curve.style % COLOURS.len()];
+            let [r, g, b] = CURVES[curve.style % CURVES.len()];
+            let colour = RGBColor(r, g, b);
             let line = colour.stroke_width(2);
             let points = drawn(curve);
-            let legend_y = 60 + 26 * index as i32;
+            let legend_y = FIRST_NAME_PX as i32 + LINE_PX as i32 * index as i32;
             let legend_line = [(4, legend_y), (36, legend_y)];
             if curve.drawn == Drawn::Dashed {
                 chart.draw_series(DashedLineSeries::new(points, 6, 5, line))?;
@@ -326,7 +326,7 @@ impl Chart {
                 legend.draw(&(EmptyElement::at((20, legend_y)) + Polygon::new(marker.clone(), colour.filled())))?;
             }
             let style = font(16).pos(Pos::new(HPos::Left, VPos::Center));
-            legend.draw(&Text::new(curve.name.clone(), (44, legend_y), style))?;
+            legend.draw(&Text::new(curve.name.clone(), (BEFORE_NAME_PX as i32, legend_y), style))?;
         }
         area.present()?;
         Ok(())
@@ -353,18 +353,25 @@ fn around(values: impl Iterator<Item = f64>) -> Range<f64> {
     if low > high { 0.1..10.0 } else { low / 1.25..high * 1.25 }
 }
 
-/// Round numbers in `range`, not too many for labels: 1, 2, 5 times powers of ten, or only the powers.
+/// Round numbers in `range`, not too many for labels: powers of ten, or 1, 2 and 5 times these, or where there are less than two of those, more.
 fn ticks(range: &Range<f64>) -> Vec<f64> {
     let decades = range.start.log10().floor() as i32..=range.end.log10().ceil() as i32;
-    let steps: &[f64] = if (range.end / range.start).log10() < 3.5 { &[1.0, 2.0, 5.0] } else { &[1.0] };
-    let all = decades.flat_map(|decade| steps.iter().map(move |step| step * 10_f64.powi(decade)));
-    all.filter(|tick| range.contains(tick)).collect()
+    let by = |tenths: &[u32]| -> Vec<f64> {
+        let steps = |decade| tenths.iter().map(move |tenths| f64::from(*tenths) * 10_f64.powi(decade) / 10.0);
+        decades.clone().flat_map(steps).filter(|tick| range.contains(tick)).collect()
+    };
+    if (range.end / range.start).log10() >= 3.5 {
+        return by(&[10]);
+    }
+    let finer = [vec![10, 20, 50], (10..100).step_by(10).collect(), (10..100).collect()];
+    finer.iter().map(|tenths| by(tenths)).find(|ticks| ticks.len() > 1).unwrap_or_default()
 }
 
 /// A tick's number without digits that say nothing.
 fn short(value: f64) -> String {
-    let decimals = (-value.log10().floor()).max(0.0) as usize;
-    format!("{value:.decimals$}")
+    let decimals = (1.0 - value.log10().floor()).max(0.0) as usize;
+    let text = format!("{value:.decimals$}");
+    if decimals == 0 { text } else { text.trim_end_matches('0').trim_end_matches('.').to_owned() }
 }
 
 #[cfg(test)]
@@ -457,5 +464,10 @@ mod tests {
         assert_eq!(text(0.8..640.0), "1 2 5 10 20 50 100 200 500");
         assert_eq!(text(0.0004..0.03), "0.0005 0.001 0.002 0.005 0.01 0.02");
         assert_eq!(text(2e-5..1.0), "0.0001 0.001 0.01 0.1");
+        assert_eq!(
+            text(0.0024..0.00375),
+            "0.0024 0.0025 0.0026 0.0027 0.0028 0.0029 0.003 0.0031 0.0032 0.0033 0.0034 0.0035 0.0036 0.0037"
+        );
+        assert_eq!(text(8.0..12.5), "8 9 10");
     }
 }

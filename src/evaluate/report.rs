@@ -7,6 +7,7 @@ use image::{ImageFormat, RgbImage};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::Row;
+use super::expected::PIXELS;
 use super::gallery::Named;
 use super::plots::{Chart, error_charts, expectation_chart, speed_charts};
 use super::speed::Timings;
@@ -96,8 +97,9 @@ impl Report {
                     @if !self.rows.is_empty() {
                         h2 { "Error (tables 2 to 4)" }
                         p {
-                            "Differences of display values from the reference picture of the same material, environment and \
-                             scene, over the pixels that see a surface. "
+                            "Differences of display values from the reference picture of the same material, environment and scene, "
+                            @if self.rows.iter().any(|row| row.settings.whole_picture) { "over the whole picture. " }
+                            @else { "over the pixels that see a surface. " }
                             @if let Some(error) = self.reference_error {
                                 "The reference is within " (format!("{error:.1e}")) " by its own estimate."
                             }
@@ -108,7 +110,7 @@ impl Report {
                         @for chart in &expectation {
                             h2 { "Error expected and measured" }
                             p {
-                                "What " code { "render --error" } " goes by: the RMS at 512 pixels at most, where the reference is \
+                                "What " code { "render --error" } " goes by: the RMS at " (PIXELS) " pixels at most, where the reference is \
                                  computed, against that over the whole picture."
                             }
                             (chart)

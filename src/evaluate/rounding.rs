@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::cases::{Cases, Place};
-use super::metrics::Display;
+use super::metrics::{Differences, Display};
 use super::tables::{Section, Table};
 use crate::environment::FractionBits;
 use crate::error::Result;
@@ -163,16 +163,12 @@ pub(super) fn shade(twin: &CpuShader, prepared: &Prepared, geometry: &[[u32; 2]]
 }
 
 fn difference(display: Display, exact: &[Vec4], found: &[Vec4]) -> [f64; 2] {
-    let (mut squares, mut most, mut count) = (0.0, 0.0_f64, 0);
-    for (exact, found) in exact.iter().zip(found).filter(|(exact, _)| exact.w > 0.0) {
-        for channel in 0..3 {
-            let [exact, found] = [exact[channel], found[channel]].map(|value| display.value(value.into()));
-            squares += (found - exact).powi(2);
-            most = most.max((found - exact).abs());
-            count += 1;
-        }
-    }
-    [(squares / f64::from(count.max(1))).sqrt(), most]
+    let seen: Vec<_> = exact.iter().zip(found).filter(|(exact, _)| exact.w > 0.0).collect();
+    let channels = |(exact, found): &(&Vec4, &Vec4)| {
+        [0, 1, 2].map(|c| [exact[c], found[c]].map(|value| display.value(value.into())))
+    };
+    let differences = Differences::of(seen.iter().flat_map(channels));
+    [differences.rms(seen.len().max(1) as u64), differences.max]
 }
 
 /// Texels whose normals are a step off, either way at random. Background stays.
@@ -257,10 +253,10 @@ pub fn tables(found: &[Rounded]) -> Section {
             let rows: Vec<_> = found.iter().filter(is_of).collect();
             let rms = || rows.iter().map(|row| row.rms);
             let worst = largest(rms());
-            let of_worst = &rows.iter().find(|row| row.rms == worst)?.material;
+            let of_worst = &rows.iter().find(|row| row.rms == worst || row.rms.is_nan())?.material;
             let most = largest(rows.iter().map(|row| row.most));
             let cells = [mean(rms()), worst, most].map(|value| format!("{value:.1e}"));
-            let cells = cells.into_iter().chain([rms().filter(|rms| *rms > 1e-3).count().to_string()]);
+            let cells = cells.into_iter().chain([rms().filter(|rms| rms.is_nan() || *rms > 1e-3).count().to_string()]);
             Some((format!("{environment}, {name}"), cells.chain([of_worst.clone()]).collect()))
         };
         let rows =
@@ -289,6 +285,23 @@ mod tests {
         let step = (-10.0_f32).exp2();
         assert_eq!([next(1.0, true), next(-1.0, true), next(1.0, false)], [1.0 + step, -1.0 - step, 1.0 - 0.5 * step]);
         assert_eq!([next(0.0, true), next(65504.0, true), next(f32::INFINITY, false)], [0.0, 65504.0, f32::INFINITY]);
+    }
+
+    #[test]
+    fn a_picture_that_is_not_a_number_is_the_worst() {
+        let row = |material: &str, rms: f64| Rounded {
+            material: material.to_owned(),
+            environment: "sky".to_owned(),
+            scene: "sphere".to_owned(),
+            method: "fitted".to_owned(),
+            count: 16,
+            rounding: Rounding::Device.name(),
+            rms,
+            most: rms,
+        };
+        let shown = |rows: &[Rounded]| tables(rows).tables[0].rows[0].1.clone();
+        assert_eq!(shown(&[row("gold", 4e-4), row("clay", 2e-3)]), ["1.2e-3", "2.0e-3", "2.0e-3", "1", "clay"]);
+        assert_eq!(shown(&[row("gold", f64::NAN), row("clay", 2e-3)])[1..], ["NaN", "NaN", "2", "gold"]);
     }
 
     #[test]

@@ -143,8 +143,7 @@ pub fn over_grey(radiance: &[[f32; 4]], width: u32, height: u32, display: Displa
         let [r, g, b, coverage] = radiance[(y * width + x) as usize];
         let coverage = f64::from(coverage);
         Rgb([r, g, b].map(|value| {
-            let surface = if coverage > 0.0 { f64::from(value) / coverage } else { 0.0 };
-            // The clamp of a NaN is a NaN, which as a byte is 0.
+            let surface = if coverage > 0.0 && value.is_finite() { f64::from(value) / coverage } else { 0.0 };
             (255.0 * coverage * display.value(surface) + f64::from(GREY) * (1.0 - coverage)).round() as u8
         }))
     })
@@ -190,13 +189,15 @@ mod tests {
 
     #[test]
     fn radiance_is_displayed_over_grey() {
-        let pixels = [[0.0; 4], [0.5, 0.25, 0.0, 0.5], [2.0, 0.5, f32::NAN, 1.0]];
-        let picture = over_grey(&pixels, 3, 1, Display::default());
+        let pixels =
+            [[0.0; 4], [0.5, 0.25, 0.0, 0.5], [2.0, 0.5, f32::NAN, 1.0], [f32::INFINITY, f32::NEG_INFINITY, 0.5, 1.0]];
+        let picture = over_grey(&pixels, 4, 1, Display::default());
         assert_eq!(picture.get_pixel(0, 0).0, [GREY; 3]);
         // Half covered: the mean of grey, and of 1, a half and 0 in display values.
         let half = 255.0 * 0.5_f64.powf(1.0 / 2.2);
         let mean = |displayed: f64| ((displayed + f64::from(GREY)) / 2.0).round() as u8;
         assert_eq!(picture.get_pixel(1, 0).0, [mean(255.0), mean(half), mean(0.0)]);
         assert_eq!(picture.get_pixel(2, 0).0, [255, half.round() as u8, 0]);
+        assert_eq!(picture.get_pixel(3, 0).0, [0, 0, half.round() as u8]);
     }
 }

@@ -8,6 +8,8 @@ use crate::shader_constants::tiles::MAX_GROUPS;
 use crate::vulkan::{Buffer, ComputePipeline, Device, PipelineCache, compiled};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
+use glam::{Vec2, Vec3};
+use std::f32::consts::TAU;
 use std::sync::Arc;
 
 /// What the pass is made of.
@@ -28,12 +30,16 @@ pub struct BareLookup {
     pub level: f32,
 }
 
+/// Red, green, blue and 1.
+const SUM_BYTES: u64 = size_of::<[f32; 4]>() as u64;
+
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct Push {
     pixel_count: u32,
     lookup_count: u32,
     row_count: u32,
+    sum_mask: u32,
 }
 
 impl BareLookups {
@@ -53,21 +59,39 @@ impl BareLookups {
         let row_count = rows.len() as u32 / lookup_count;
         let scale = pyramid.radiance_scale();
         let storage = vk::BufferUsageFlags::STORAGE_BUFFER;
+        // Where a buffer cannot hold the sums of all pixels, several write the same one.
+        let most = u64::from(device.limits().max_storage_buffer_range) / SUM_BYTES;
+        let sum_mask = if u64::from(pixel_count) <= most { u32::MAX } else { (1 << most.ilog2()) - 1 };
         Ok(Self {
             pipeline: ComputePipeline::new(device, cache, &compiled::BARE_LOOKUPS, &[])?,
             pyramid: DevicePyramid::new(device, "environment pyramid", pyramid, scale, way_around)?,
             lookups: Buffer::with_contents(device, "lookups", storage, bytemuck::cast_slice(rows))?,
-            push: Push { pixel_count, lookup_count, row_count },
+            push: Push { pixel_count, lookup_count, row_count, sum_mask },
         })
     }
 
     /// Size of what the pass leaves.
     pub fn sums_bytes(&self) -> u64 {
-        u64::from(self.push.pixel_count) * size_of::<[f32; 4]>() as u64
+        u64::from((self.push.pixel_count - 1).min(self.push.sum_mask) + 1) * SUM_BYTES
     }
 }
 
-/// Looks up; leaves for each pixel the sum of what it saw, RGB in units of the pyramid's texels, and 1.
+/// What the pass sees from `pixel` of so many, by so many lookups of a row of `rows`. Twin of glsl/bare_lookups.comp.
+pub fn bare_sum([pixel_count, lookup_count]: [u32; 2], rows: &[BareLookup], pyramid: &Pyramid, pixel: u32) -> Vec3 {
+    const GROUP: u32 = 64;
+    let (group, group_count) = (pixel / GROUP, (pixel_count - 1) / GROUP + 1);
+    let row_count = rows.len() as u32 / lookup_count;
+    let row = (group as f32 / group_count as f32 * row_count as f32) as usize;
+    let turns = (pixel_count as f32 / TAU).sqrt();
+    let turn = Vec2::from_angle(TAU * (turns * (pixel as f32 / pixel_count as f32)).fract());
+    let looked_up = |BareLookup { direction: [x, y, z], level }: &BareLookup| {
+        pyramid.lookup(turn.rotate(Vec2::new(*x, *y)).extend(*z), *level)
+    };
+    rows[row * lookup_count as usize..][..lookup_count as usize].iter().map(looked_up).sum()
+}
+
+/// Looks up; leaves for each pixel the sum of what it saw, RGB in units of the pyramid's texels, and 1; where the device has no buffer of that size, for
+/// as many as it has one for.
 pub fn bare_lookups<'a>(graph: &mut FrameGraph<'a>, bare: &'a BareLookups) -> BufferHandle {
     let BareLookups { pipeline, pyramid, lookups, push } = bare;
     let mut sums = graph.buffer("sums", BufferDesc { size_bytes: bare.sums_bytes() });

@@ -179,7 +179,7 @@ pub struct Tiles {
     pub parts: BufferHandle,
     /// For each tile of the image the places of its pixels in it, class by class.
     pub pixels: BufferHandle,
-    /// For each tile of the region two bits a pixel: whether it sees any surface, and whether it sees nothing else.
+    /// For each tile of the image two bits a pixel, written for those of the region: whether it sees any surface, and whether it sees nothing else.
     pub coverage: BufferHandle,
 }
 

@@ -6,7 +6,7 @@ use crate::graph::{FrameGraph, ImageDesc, ImageHandle};
 use crate::memo::Keyed;
 use crate::packing::pack_snorm_2x16;
 use crate::scene::{BoundingSphere, Mesh, TangentRule};
-use crate::shader_constants::geometry_cache::{TANGENT_ALONG, TANGENT_AROUND, TANGENT_OF_MESH};
+use crate::shader_constants::geometry_cache::{NO_TANGENT, TANGENT_ALONG, TANGENT_AROUND, TANGENT_OF_MESH};
 use crate::vulkan::{
     Device, GraphicsPipeline, GraphicsState, PipelineCache, Shader, Triangles, VertexAttribute, compiled,
 };
@@ -168,7 +168,7 @@ impl GeometryCache {
             let radius = self.sphere(object).radius / unit;
             let to_middle = from_eye * (radius / from_eye.length()).min(1.0);
             let (axis, rule, at_middle) = match object.tangent.map(|tangent| tangent.rule) {
-                None => (Vec3::ZERO, 0.0, DVec3::ZERO),
+                None => (Vec3::ZERO, NO_TANGENT, DVec3::ZERO),
                 Some(TangentRule::Around(axis)) => (axis, TANGENT_AROUND, axis.as_dvec3().cross(middle)),
                 Some(TangentRule::Along(axis)) => (axis, TANGENT_ALONG, DVec3::ZERO),
                 Some(TangentRule::Uv) => (Vec3::ZERO, TANGENT_OF_MESH, DVec3::ZERO),

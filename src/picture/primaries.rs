@@ -71,7 +71,7 @@ impl Primaries {
     }
 
     /// What takes linear colours to X, Y and Z, white to Y = 1: SMPTE RP 177-1993, section 3.
-    fn to_xyz(self) -> DMat3 {
+    pub(crate) fn to_xyz(self) -> DMat3 {
         let primaries = DMat3::from_cols(xyz(self.red), xyz(self.green), xyz(self.blue));
         primaries * DMat3::from_diagonal(primaries.inverse() * self.white_xyz())
     }

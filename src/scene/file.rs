@@ -10,8 +10,8 @@ use toml::de::{DeTable, DeValue};
 
 use super::{
     Camera, DEFAULT_MATERIAL, EXPOSURE, EnvironmentSettings, GAMMA, INTENSITY, ImageSettings, MAX_SAMPLES, MAX_SIZE_PX,
-    MAX_SUBPIXELS, MaterialSettings, MaterialSource, Mesh, ObjectSettings, Scene, ShadingSettings, Source, TangentRule,
-    mesh, three_numbers,
+    MAX_SUBPIXELS, MaterialSettings, MaterialSource, Mesh, ObjectSettings, POSITIVE_SINGLE, SINGLE_FACTOR, Scene,
+    ShadingSettings, Source, TangentRule, mesh, three_numbers,
 };
 use crate::brdf::{Brdf, change_base_files, has_model, resolve_base_files};
 use crate::environment::{self, Environment};
@@ -372,17 +372,17 @@ pub(super) fn threads<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Opti
 
 /// Factor of radiance before display.
 pub(super) fn exposure<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
-    checked(deserializer, EXPOSURE, "a finite number from 0 to 3.4e38")
+    checked(deserializer, EXPOSURE, SINGLE_FACTOR)
 }
 
 /// Exponent of the display.
 pub(super) fn gamma<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
-    checked(deserializer, GAMMA, "a finite number above 0: 1.2e-38 to 3.4e38")
+    checked(deserializer, GAMMA, POSITIVE_SINGLE)
 }
 
 /// Factor of the environment's radiance.
 fn intensity<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
-    checked(deserializer, INTENSITY, "a finite number from 0 to 3.4e38")
+    checked(deserializer, INTENSITY, SINGLE_FACTOR)
 }
 
 fn finite<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {

@@ -58,9 +58,13 @@ pub const MAX_SAMPLES: u32 = 10_000;
 /// What the exposure may be: shaders have it in single precision.
 pub const EXPOSURE: RangeInclusive<f64> = 0.0..=f32::MAX as f64;
 /// What the factor of the environment's radiance may be: shaders have it in single precision.
-pub const INTENSITY: RangeInclusive<f64> = 0.0..=f32::MAX as f64;
+pub const INTENSITY: RangeInclusive<f64> = EXPOSURE;
+/// Both in words.
+pub const SINGLE_FACTOR: &str = "a finite number from 0 to 3.4e38";
 /// What the gamma may be: shaders have it in single precision.
 pub const GAMMA: RangeInclusive<f64> = f32::MIN_POSITIVE as f64..=f32::MAX as f64;
+/// The same in words.
+pub const POSITIVE_SINGLE: &str = "a finite number above 0: 1.2e-38 to 3.4e38";
 
 /// A scene, as yet only named: meshes, materials and environment are not loaded.
 #[derive(Clone, Debug, PartialEq)]

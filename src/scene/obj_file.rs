@@ -148,18 +148,24 @@ fn read_obj(text: &str, is_textured: bool, observer: &dyn Observer) -> Result<Ob
     let options = tobj::LoadOptions::default();
     let no_materials = |_: &Path| Ok(Default::default());
     let mut lines = BufReader::new(Watched { bytes: lines.as_bytes(), observer });
-    let (models, _) = tobj::load_obj_buf(&mut lines, &options, no_materials).map_err(|cause| {
-        let line = text.lines().position(lacks_numbers).map_or(String::new(), |index| format!("line {}: ", index + 1));
-        format!("is not a sound OBJ: {line}{cause}")
-    })?;
+    let found = tobj::load_obj_buf(&mut lines, &options, no_materials);
     // Without o, g and usemtl there is one model.
-    let mesh = models.into_iter().next().map(|model| model.mesh).unwrap_or_default();
-    if mesh.face_arities.contains(&0) {
-        return Err("has a face without corners".into());
-    }
-    match vectors(&mesh.positions).into_iter().find(|position| !position.is_finite()) {
-        Some(position) => Err(format!("has a vertex that is not finite, {position}")),
-        None => Ok(Obj { mesh, smoothing_groups }),
+    let mesh = found.map(|(models, _)| models.into_iter().next().map(|model| model.mesh).unwrap_or_default());
+    let is_sound = |mesh: &tobj::Mesh| {
+        !mesh.face_arities.contains(&0) && mesh.positions.iter().all(|coordinate| coordinate.is_finite())
+    };
+    match mesh {
+        Ok(mesh) if is_sound(&mesh) => Ok(Obj { mesh, smoothing_groups }),
+        // What tobj says of it names no line.
+        unsound => {
+            let fault = |(index, line)| Some(format!("line {}: {}", index + 1, fault(line, is_textured)?));
+            let cause = || {
+                unsound
+                    .err()
+                    .map_or_else(|| "is not a sound OBJ".to_owned(), |cause| format!("is not a sound OBJ: {cause}"))
+            };
+            Err(text.lines().enumerate().find_map(fault).unwrap_or_else(cause))
+        }
     }
 }
 
@@ -175,10 +181,20 @@ impl Read for Watched<'_> {
     }
 }
 
-/// Whether this is a position or normal without three numbers.
-fn lacks_numbers(line: &str) -> bool {
+/// What is wrong with a line by itself, if anything is.
+fn fault(line: &str, is_textured: bool) -> Option<String> {
     let mut words = line.split_ascii_whitespace();
-    matches!(words.next(), Some("v" | "vn")) && words.take(3).filter(|word| word.parse::<f32>().is_ok()).count() < 3
+    let keyword = words.next()?;
+    let numbers = |most: usize| -> Vec<f32> { words.clone().take(most).map_while(|word| word.parse().ok()).collect() };
+    match keyword {
+        "v" | "vn" if numbers(3).len() < 3 => Some(format!("`{keyword}` is not followed by three numbers")),
+        "v" if !numbers(3).iter().all(|number| number.is_finite()) => Some("a vertex that is not finite".to_owned()),
+        "vt" if is_textured && numbers(2).len() < words.clone().count().clamp(1, 2) => {
+            Some("`vt` is not followed by one or two numbers".to_owned())
+        }
+        "f" if words.next().is_none() => Some("a face without corners".to_owned()),
+        _ => None,
+    }
 }
 
 /// The lines of an OBJ that are the mesh, such that tobj reads them right: of `v` the coordinates, `vn`, and `f` with its

@@ -143,13 +143,21 @@ impl Step for LoadMaterial<'_> {
 }
 
 fn load(memo: &Memo, source: &MaterialSource) -> Result<Brdf> {
+    // Bases are read by their names where a coat is made: they have to be what its key names.
+    let check_bases = |bases: &[PathBuf]| bases.iter().try_for_each(|base| memo.file_bytes(base).map(drop));
     match source {
-        MaterialSource::File(path) => Brdf::FILES.parse(path, &memo.file_bytes(path)?),
+        MaterialSource::File(path) => {
+            check_bases(&base_files_of(path))?;
+            Brdf::FILES.parse(path, &memo.file_bytes(path)?)
+        }
         MaterialSource::Builtin(name) => Brdf::builtin(name).ok_or_else(|| {
             let remedy = Brdf::FILES.remedy_for(name);
             Error::input(format!("material \"{name}\""), "is neither built in nor a file", remedy)
         }),
-        MaterialSource::Model { model, parameters } => Brdf::from_parameters(model, parameters.clone()),
+        MaterialSource::Model { model, parameters } => {
+            check_bases(&base_files(parameters))?;
+            Brdf::from_parameters(model, parameters.clone())
+        }
         MaterialSource::Custom(custom) => Ok(Brdf::Custom(custom.clone())),
     }
 }
@@ -231,5 +239,25 @@ mod tests {
             memo.look_again(&path("base.toml"));
             assert!(ask().unwrap_err().to_string().contains("base: "));
         }
+    }
+
+    #[test]
+    fn a_base_that_was_changed_on_disk_is_not_taken_for_what_it_was() {
+        let folder = tempfile::tempdir().unwrap();
+        let base = folder.path().join("base.toml");
+        std::fs::write(&base, "model = 'lambert'\nreflectance = 0.2").unwrap();
+        let memo = Memo::default();
+        let ask = |alpha: f64| {
+            let text = format!("base = {base:?}\ncoat = {{ alpha = {alpha}, ior = 1.5 }}");
+            let source = MaterialSource::Model { model: "layered".into(), parameters: text.parse().unwrap() };
+            memo.round(&()).ask(&LoadMaterial(&source)).map(|brdf| brdf.fingerprint())
+        };
+        ask(0.1).unwrap();
+        ask(0.2).unwrap();
+        std::fs::write(&base, "model = 'lambert'\nreflectance = 0.4").unwrap();
+        let error = ask(0.3).unwrap_err().to_string();
+        assert!(error.contains("base.toml") && error.contains("was changed"), "{error}");
+        memo.look_again(&base);
+        ask(0.3).unwrap();
     }
 }

@@ -130,7 +130,7 @@ mod tests {
     use super::*;
     use crate::brdf::tests::samples::of_model;
     use crate::error::Error;
-    use crate::threads::{MAX_COUNT, ThreadKind, test_materials};
+    use crate::threads::{MAX_COUNT, MAX_ROWS, ThreadKind, test_materials};
 
     fn small(count: usize, rows: usize) -> ThreadSettings {
         ThreadSettings { kind: ThreadKind::Paper, count, rows, seed: 7, sets: 1 }
@@ -274,7 +274,9 @@ mod tests {
     #[test]
     fn impossible_settings_are_refused() {
         let brdf = test_materials::narrow();
-        for settings in [small(0, 90), small(MAX_COUNT + 1, 90), small(10, 0)] {
+        for settings in
+            [small(0, 90), small(MAX_COUNT + 1, 90), small(10, 0), small(10, MAX_ROWS + 1), small(10, usize::MAX)]
+        {
             assert!(matches!(generate(brdf, &settings, &()), Err(Error::Input { .. })));
         }
     }

@@ -60,6 +60,8 @@ pub const MIN_COS: f64 = 1e-4;
 
 /// Most of the paper's threads that a table can have.
 pub const MAX_COUNT: usize = 1024;
+/// Most view angles of a table: of more the last but one would be beyond the last, [`MAX_THETA_O_DEG`].
+pub const MAX_ROWS: usize = 9000;
 
 /// Which threads.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -236,7 +238,7 @@ pub struct ThreadSettings {
     pub kind: ThreadKind,
     /// Number of threads m, 1 to [`ThreadKind::max_count`].
     pub count: usize,
-    /// Number of view angles, evenly spaced from 0 to 90 degrees, but the last of them is 89.99; at least 1, the paper's is 90.
+    /// Number of view angles, evenly spaced from 0 to 90 degrees, but the last of them is 89.99; 1 to [`MAX_ROWS`], the paper's is 90.
     pub rows: usize,
     /// Where the first row's points start.
     pub seed: u64,
@@ -272,8 +274,13 @@ impl ThreadSettings {
             let problem = format!("{} are not possible for {} threads", self.sets, self.count);
             return Err(Error::input("sets", problem, "use at least 1, and no more than threads"));
         }
-        if self.rows == 0 {
-            return Err(Error::input("rows", "0 is not possible", "use at least 1; 91 are a degree apart"));
+        if !(1..=MAX_ROWS).contains(&self.rows) {
+            let problem = format!("{} is not possible", self.rows);
+            return Err(Error::input(
+                "rows",
+                problem,
+                format!("use a number from 1 to {MAX_ROWS}; 91 are a degree apart"),
+            ));
         }
         Ok(())
     }

@@ -5,9 +5,10 @@ use glam::DVec3;
 
 use super::theta_o;
 use crate::brdf::{MAX_THETA_O_DEG, luminance};
+use crate::shader_constants::rim;
 
 /// The power of albedos that change evenly, or by too little to tell.
-pub const EVEN: f32 = 1.0;
+pub use crate::shader_constants::rim::EVEN;
 
 /// The powers that are looked for. `ward` by Dür has -1, the original one -1/2, lobes that set 0.6 to 1.2. What turns within the last degree
 /// is of none, and the bounds keep it from running away.
@@ -21,6 +22,8 @@ const LEAST_POWER: f64 = 0.02;
 
 /// The angle of the last row to the horizon, of which 1 is a right angle.
 const LAST_TO_HORIZON: f64 = 1.0 - MAX_THETA_O_DEG / 90.0;
+
+const _: () = assert!((rim::LAST_TO_HORIZON as f64 / LAST_TO_HORIZON - 1.0).abs() < 1e-6);
 
 /// The power, in that of the angle to the horizon, by which the albedo goes from the last row but one to the last: the one that is right
 /// half-way. `albedos` are those of rows, and `albedo` is that of a view angle in radians.
@@ -48,7 +51,7 @@ pub fn rim_power(albedos: &[DVec3], albedo: impl FnOnce(f64) -> DVec3) -> f32 {
 /// Twin of `towards_row_above`.
 pub fn towards_row_above(row: f32, rows: usize, rim_power: f32) -> f32 {
     let t = row.fract();
-    if rim_power == EVEN || row <= (rows - 2) as f32 {
+    if rim_power == EVEN || row <= rows as f32 - 2.0 {
         return t;
     }
     towards_last(t.into(), rows, rim_power.into()) as f32

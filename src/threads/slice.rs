@@ -4,7 +4,7 @@ use std::f64::consts::{FRAC_1_PI, FRAC_PI_2, PI, TAU};
 use glam::{DVec2, DVec3, dvec3};
 
 use super::azimuths::View;
-use crate::brdf::{Brdf, Ellipse, LobeShape, SeenBrdf, luminance};
+use crate::brdf::{Brdf, Ellipse, LobeShape, SeenBrdf, luminance, reflect};
 
 /// Numbers of steps over theta_h and phi_h.
 #[derive(Clone, Copy, Debug)]
@@ -75,11 +75,6 @@ struct Cell {
     f: DVec3,
 }
 
-/// The direction that the facet `h` mirrors `w_o` into.
-pub fn reflect(w_o: DVec3, h: DVec3) -> DVec3 {
-    (2.0 * w_o.dot(h) * h - w_o).normalize()
-}
-
 /// What of `f` is above a base of this luminance.
 fn above_base(f: DVec3, base: f64) -> DVec3 {
     let value = luminance(f);
@@ -122,7 +117,7 @@ fn cells(brdf: &SeenBrdf, w_o: DVec3, resolution: Resolution) -> Vec<Cell> {
         for &(phi, widened) in &azimuths {
             let h = half_vector(x, phi);
             let cos_theta_d = w_o.dot(h);
-            let w_i = 2.0 * cos_theta_d * h - w_o;
+            let w_i = reflect(w_o, h);
             if cos_theta_d > 0.0 && w_i.z > 0.0 {
                 seen.push(cells.len());
                 directions.push(w_i);
@@ -264,8 +259,8 @@ impl<'a> Slice<'a> {
     /// Where the pdf is greatest.
     pub fn peak(&self) -> DVec3 {
         let (h, step) = self.highest;
-        let height = |h: DVec3| if self.w_o.dot(h) > 0.0 { self.pdf(reflect(self.w_o, h)) } else { 0.0 };
-        reflect(self.w_o, climb(h, step, height))
+        let height = |h: DVec3| if self.w_o.dot(h) > 0.0 { self.pdf(reflect(self.w_o, h).normalize()) } else { 0.0 };
+        reflect(self.w_o, climb(h, step, height)).normalize()
     }
 
     /// Inverse CDF: the unit square onto the hemisphere, equal areas onto equal masses.
@@ -275,7 +270,7 @@ impl<'a> Slice<'a> {
         let Resolution { theta, phi, .. } = self.resolution;
         let (phi, _) = self.resolution.azimuth((j as f64 + turn) / phi as f64);
         let h = half_vector((i as f64 + x) / theta as f64, phi);
-        reflect(self.w_o, h)
+        reflect(self.w_o, h).normalize()
     }
 
     /// CDF: the point of the unit square that `direction` maps to `w_i`.

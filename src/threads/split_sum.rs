@@ -12,7 +12,7 @@ use super::fitted::lights::{BaseAnswers, LightSettings, Quadrature, SCALES, Test
 use super::rim::rim_power;
 use super::slice::{Resolution, Slice};
 use super::theta_o;
-use crate::brdf::{BaseProfile, Brdf, SeenBrdf, Tap, ggx_lobe};
+use crate::brdf::{BaseProfile, Brdf, NARROWEST_ALPHA, SeenBrdf, Tap, ggx_lobe};
 use crate::shader_constants::split_sum::SPLIT_SUM_ROWS;
 
 /// View angles: theta_o = row 90 deg / (ROWS - 1), the last 89.99 degrees.
@@ -25,9 +25,7 @@ const LIGHTS: LightSettings = LightSettings { count: 512, threads: 1, seed: 0 };
 /// The lobe is so many rings of so many taps.
 const RINGS: usize = 12;
 
-/// The smoothest lobe that is tried, as narrow as the sharpest models are; how many more up to 1 are; and steps between the neighbours of the
-/// best.
-const LEAST_ALPHA: f64 = 1e-3;
+/// Beside the narrowest lobe so many up to 1 are tried, and steps between the neighbours of the best.
 const ALPHA_STEPS: usize = 20;
 const REFINING_STEPS: usize = 6;
 
@@ -49,8 +47,8 @@ impl SplitSum {
         let (seen, is_isotropic) = (SeenBrdf::from_all_around(brdf), brdf.is_isotropic());
         let answers: Vec<_> = FITTED_ROWS.into_par_iter().map(|row| Answers::new(&seen, row)).collect();
         let cost_at = |log_alpha: f64| fit(&answers, log_alpha.exp()).1;
-        let step = -LEAST_ALPHA.ln() / ALPHA_STEPS as f64;
-        let places: Vec<_> = (0..=ALPHA_STEPS).map(|i| LEAST_ALPHA.ln() + step * i as f64).collect();
+        let step = -NARROWEST_ALPHA.ln() / ALPHA_STEPS as f64;
+        let places: Vec<_> = (0..=ALPHA_STEPS).map(|i| NARROWEST_ALPHA.ln() + step * i as f64).collect();
         let costs: Vec<_> = places.par_iter().map(|&place| cost_at(place)).collect();
         let best = (0..places.len()).min_by(|&a, &b| costs[a].total_cmp(&costs[b])).expect("there are some");
         let (mut low, mut high) = ((places[best] - step).max(places[0]), (places[best] + step).min(0.0));

@@ -80,6 +80,10 @@ pub(super) fn named<'a>(devices: impl Iterator<Item = &'a DeviceDescription> + C
     }
 }
 
+/// What is lacking where not even shaders can be compiled, as [`DeviceDescription::lacks`] has it.
+pub(super) const CUBE_ARRAYS: &str = "arrays of cube maps (imageCubeArray)";
+pub(super) const DYNAMIC_RENDERING: &str = "VK_KHR_dynamic_rendering";
+
 /// A physical device and what was found out about it.
 pub(super) struct Candidate {
     pub description: DeviceDescription,
@@ -125,12 +129,13 @@ fn candidate(instance: &Instance, index: usize, physical: vk::PhysicalDevice) ->
         lacks.push("Vulkan 1.2");
     }
     if properties.limits.max_per_stage_descriptor_storage_buffers < STORAGE_BUFFERS {
+        const { assert!(STORAGE_BUFFERS == 7) };
         lacks.push("seven storage buffers in a shader (maxPerStageDescriptorStorageBuffers)");
     }
     // SAFETY: `physical` comes from this instance.
     let features = unsafe { instance.raw.get_physical_device_features(physical) };
     if features.image_cube_array == vk::FALSE {
-        lacks.push("arrays of cube maps (imageCubeArray)");
+        lacks.push(CUBE_ARRAYS);
     }
     let extensions = extensions(instance, physical, &name, &mut lacks)?;
     let (queue_family, timestamp_valid_bits) = queue_family(instance, physical, &mut lacks);
@@ -163,10 +168,8 @@ fn extensions(
     let available = available_extensions(instance, physical, name)?;
     let has = |wanted: &CStr| contains(&available, wanted);
     // These are asked for even where Vulkan 1.3 has them in its core: their entry points are the same ones.
-    let needed = [
-        (khr::synchronization2::NAME, "VK_KHR_synchronization2"),
-        (khr::dynamic_rendering::NAME, "VK_KHR_dynamic_rendering"),
-    ];
+    let needed =
+        [(khr::synchronization2::NAME, "VK_KHR_synchronization2"), (khr::dynamic_rendering::NAME, DYNAMIC_RENDERING)];
     lacks.extend(needed.iter().filter(|(extension, _)| !has(extension)).map(|(_, name)| *name));
     let mut wanted: Vec<&'static CStr> = needed.iter().map(|(extension, _)| *extension).collect();
     // A portability driver insists on this one being enabled.

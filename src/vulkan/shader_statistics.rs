@@ -2,7 +2,7 @@
 use super::device::{choose, create_device};
 use super::error::{Result, VulkanError, call};
 use super::instance::Instance;
-use super::physical_device::{DeviceDescription, candidates, has_extension};
+use super::physical_device::{CUBE_ARRAYS, DYNAMIC_RENDERING, DeviceDescription, candidates, has_extension};
 use super::pipeline::{Constants, Declared, GraphicsState, check_stage, layout_of, make_graphics, set_layout, stage};
 use super::shader::{Interface, Shader, ShaderStage};
 use ash::{khr, vk};
@@ -30,10 +30,13 @@ impl CompilingDevice {
     /// Opens the device that `asked` names (index, or part of its name), or the best one, to compile only.
     ///
     /// # Errors
-    /// No driver, no device of that name, or one whose driver tells nothing of the shaders that it compiles.
+    /// No driver, no device of that name, one that lacks what shaders need, or one whose driver tells nothing of the shaders that it compiles.
     pub fn new(instance: &Arc<Instance>, asked: Option<&str>) -> Result<Self> {
         let chosen = choose(candidates(instance)?, asked)?;
-        let name = chosen.description.name.clone();
+        let DeviceDescription { name, lacks, .. } = chosen.description.clone();
+        if let Some(feature) = lacks.into_iter().find(|lack| [CUBE_ARRAYS, DYNAMIC_RENDERING].contains(lack)) {
+            return Err(VulkanError::Unsuitable { device: name, feature: feature.to_owned() });
+        }
         if !has_extension(instance, chosen.physical, &name, khr::pipeline_executable_properties::NAME)? {
             return Err(VulkanError::NoStatistics { device: name });
         }

@@ -150,6 +150,10 @@ fn galleries_and_reports_that_cannot_be_made_are_refused() {
         ("gallery --plot out --compare unobtainium --materials clay --size 16x12", &["unobtainium"]),
         ("gallery --plot out --compare gold,gold", &["--compare", "twice"]),
         ("gallery --plot out --materials missing.binary", &["missing.binary"]),
+        (
+            "gallery --plot out --materials-only --materials clay --methods ris --threads 1024 --subpixels 4 --size 16x12",
+            &["threads: are 1024", "\"ris\""],
+        ),
         ("gallery --plot out --materials-only --json out/errors.json", &["--materials-only", "--json"]),
         ("stress --only nosuchcase", &["--only \"nosuchcase\"", "\"slivers\"", "--all"]),
         ("stress --only slivers --only nosuchcase --all", &["nosuchcase", "\"map of 8192 x 4096\""]),

@@ -31,7 +31,7 @@ fn hostile_meshes_are_refused() {
     }
     for (name, reason) in [
         ("beyond.obj", "line 5: there is no vertex 4"),
-        ("words.obj", "line 5: position parse error"),
+        ("words.obj", "line 5: `v` is not followed by three numbers"),
         ("distant.obj", "is 1.41e20 in size and reaches 1.41e20"),
     ] {
         refuses(&folder, &render(&format!("--mesh {name}")), &[name, reason]);

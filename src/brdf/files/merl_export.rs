@@ -1,4 +1,4 @@
-//! Writes any BRDF, or any values, as a file of the MERL database's form, which `merl.rs` reads.
+//! Writes any BRDF, or any values, as a file of the MERL database's form, which `merl_file.rs` reads.
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use glam::{DMat3, DVec2, DVec3};

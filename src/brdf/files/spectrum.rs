@@ -1,29 +1,25 @@
 //! Linear Rec. 709 colours of spectra of reflectance, as they look under daylight.
 //!
 //! CIE 1931 colour matching functions of the 2 degree observer (ISO/CIE 11664-1), illuminant D65 (ISO/CIE 11664-2), both in steps of 5 nm,
-//! and the primaries of ITU-R BT.709. The white of Rec. 709 is that of D65, so a flat spectrum is grey.
-use glam::{DMat3, DVec3, dvec3};
+//! and the primaries of [`Primaries::REC_709`]. The white of Rec. 709 is that of D65, so a flat spectrum is grey.
+use glam::{DVec3, dvec3};
+
+use crate::picture::Primaries;
 
 /// The least and the greatest wavelength in the table, and its step, in nm. Beyond, the eye sees less than a ten-thousandth.
 pub(super) const VISIBLE_NM: [f64; 2] = [380.0, 780.0];
 const STEP_NM: f64 = 5.0;
-
-/// From XYZ to linear Rec. 709, columns of X, Y and Z.
-const REC709_OF_XYZ: DMat3 = DMat3::from_cols(
-    dvec3(3.240_969_94, -0.969_243_64, 0.055_630_08),
-    dvec3(-1.537_383_18, 1.875_967_50, -0.203_976_96),
-    dvec3(-0.498_610_76, 0.041_555_06, 1.056_971_51),
-);
 
 /// The weight in each channel of a spectrum's values at these wavelengths, in nm and ascending: linear between them, and as at the first
 /// and last beyond. Weights of a channel sum to 1.
 pub(super) fn rec709_weights(wavelengths_nm: &[f64]) -> Vec<DVec3> {
     let mut weights = vec![DVec3::ZERO; wavelengths_nm.len()];
     let mut sum = DVec3::ZERO;
+    let of_xyz = Primaries::REC_709.to_xyz().inverse();
     // Steps of 1 nm, in which what is linear between other steps is summed as well as need be.
     for nm in VISIBLE_NM[0] as u32..=VISIBLE_NM[1] as u32 {
         let nm = f64::from(nm);
-        let response = response_at(nm);
+        let response = of_xyz * response_at(nm);
         sum += response;
         let after = wavelengths_nm.partition_point(|&known| known <= nm);
         if after == 0 || after == wavelengths_nm.len() {
@@ -37,7 +33,7 @@ pub(super) fn rec709_weights(wavelengths_nm: &[f64]) -> Vec<DVec3> {
     weights.into_iter().map(|weight| weight / sum).collect()
 }
 
-/// What light of this wavelength in D65 adds to each channel, on any scale.
+/// What light of this wavelength in D65 adds to X, Y and Z, on any scale.
 fn response_at(nm: f64) -> DVec3 {
     let position = (nm - VISIBLE_NM[0]) / STEP_NM;
     let first = (position as usize).min(CIE_1931_AND_D65.len() - 2);
@@ -45,7 +41,7 @@ fn response_at(nm: f64) -> DVec3 {
     let [x, y, z, d65]: [f64; 4] = std::array::from_fn(|column| {
         (1.0 - t) * CIE_1931_AND_D65[first][column] + t * CIE_1931_AND_D65[first + 1][column]
     });
-    REC709_OF_XYZ * dvec3(x, y, z) * d65
+    dvec3(x, y, z) * d65
 }
 
 /// x, y and z of the observer, and D65, from 380 nm in steps of 5 nm.
@@ -154,7 +150,8 @@ mod tests {
 
     #[test]
     fn white_is_d65() {
-        let sum: DVec3 = (380..=780).map(|nm| response_at(f64::from(nm))).sum();
+        let xyz: DVec3 = (380..=780).map(|nm| response_at(f64::from(nm))).sum();
+        let sum = Primaries::REC_709.to_xyz().inverse() * xyz;
         // Of white, all three channels are the same; the last digits of tables and primaries are rounded.
         assert!((sum / sum.y - 1.0).abs().max_element() < 1e-3, "{sum}");
     }

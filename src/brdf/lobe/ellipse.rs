@@ -1,7 +1,7 @@
 //! Azimuths of half vectors that suit a long lobe: those of an ellipse.
 use glam::{DVec2, dvec2};
 
-use super::LobeShape;
+use super::{LobeShape, azimuths_across};
 
 /// What spaces azimuths of the half vector: a ring crosses a long lobe within few degrees of its long axis.
 ///
@@ -24,9 +24,9 @@ impl Ellipse {
         Self { long_axis: DVec2::from_angle(angle).rotate(self.long_axis), ..self }
     }
 
-    /// How many azimuths suit it, `least` or more. GGX then leaves an error of 2 e^(-narrowness azimuths), as in [`albedo_from`](crate::brdf::Brdf::albedo_from).
+    /// How many azimuths suit it, `least` or more.
     pub fn azimuths(self, least: usize) -> usize {
-        least.max((8.0 / self.narrowness).ceil() as usize)
+        azimuths_across(self.narrowness, least)
     }
 
     /// The direction at the angle of a unit vector of a circle, and by how much steps are wider there than the circle's.

@@ -3,7 +3,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use glam::DVec2;
 
-use super::Brdf;
+use super::{Brdf, NARROWEST_ALPHA, reflect};
 
 mod cusp;
 mod ellipse;
@@ -14,7 +14,7 @@ pub use ellipse::Ellipse;
 pub use narrowing::NARROWING_COSINES;
 
 /// Half vectors closer to the normal than this count as one: a tenth of the narrowest lobe that a model may have.
-const NARROWEST_RAD: f64 = 1e-4;
+const NARROWEST_RAD: f64 = 0.1 * NARROWEST_ALPHA;
 
 /// At grazing angles lobes grow ever thinner across the plane of incidence, by the cosine; who goes by their width takes it for no less than
 /// this: beyond 87 degrees is a rim of 0.1 % of a sphere.
@@ -112,6 +112,12 @@ impl LobeShape {
 /// Narrower lobes may be a cusp of little energy, as many measured tables have it, on the lobe itself.
 const WIDEST_CUSP_RAD: f64 = 0.004;
 
+/// How many azimuths, `least` or more, suit an ellipse `ratio` times as wide as it is long: a ring crosses it within that ratio in radians. GGX then
+/// leaves an error of 2 e^(-ratio azimuths).
+pub(super) fn azimuths_across(ratio: f64, least: usize) -> usize {
+    least.max((8.0 / ratio).ceil() as usize)
+}
+
 /// [`LobeShape::narrowness`] alone.
 pub(super) fn narrowness(brdf: &Brdf) -> f64 {
     if brdf.is_isotropic() { 1.0 } else { lobe_axes(brdf).0 }
@@ -153,7 +159,7 @@ fn azimuths(is_isotropic: bool) -> impl Iterator<Item = DVec2> {
 fn profile(brdf: &Brdf, theta_o: f64, azimuth: DVec2, theta_h: f64) -> f64 {
     let w_o = (-azimuth.perp() * theta_o.sin()).extend(theta_o.cos());
     let half_vector = (azimuth * theta_h.sin()).extend(theta_h.cos());
-    brdf.evaluate(2.0 * w_o.dot(half_vector) * half_vector - w_o, w_o).element_sum()
+    brdf.evaluate(reflect(w_o, half_vector), w_o).element_sum()
 }
 
 /// The ratio of one angle to the next.

@@ -9,6 +9,9 @@ use glam::{DVec3, dvec3};
 use crate::brdf::Parameters;
 use crate::error::{Error, Result};
 
+/// Wavelengths of red, green and blue, in micrometres, at which constants are taken.
+pub(crate) const WAVELENGTHS_UM: DVec3 = dvec3(0.65, 0.55, 0.45);
+
 #[derive(Clone, Copy, Debug)]
 struct Metal {
     eta: DVec3,

@@ -15,7 +15,8 @@ pub(super) mod metals;
 pub(super) mod roughness;
 
 pub use ggx_lobe::{Tap, ggx_lobe};
-pub use roughness::{Axes, Roughness};
+pub(crate) use roughness::ALPHA_HELP;
+pub use roughness::{Axes, NARROWEST_ALPHA, Roughness};
 
 /// Shape of the distribution of microfacet normals.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -31,8 +32,7 @@ impl Distribution {
     pub(super) fn from_parameters(parameters: &mut Parameters) -> Result<(Self, Roughness)> {
         let choices = [("ggx", Distribution::Ggx), ("beckmann", Distribution::Beckmann)];
         let distribution = parameters.choice("distribution", &choices, "Distribution of the microfacets' normals.")?;
-        let help = "Roughness of the microfacets, used as it is, not squared: 0.01 is nearly a mirror.";
-        Ok((distribution, Roughness::from_parameters(parameters, help)?))
+        Ok((distribution, Roughness::from_parameters(parameters, ALPHA_HELP)?))
     }
 
     /// D(h) in 1/sr: density of microfacets with normal `h`; the integral of D (n . h) dh is 1. Walter eqs 25, 33.

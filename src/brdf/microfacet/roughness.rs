@@ -61,6 +61,13 @@ pub(crate) fn is_along_axes(parameters: &Parameters, single: &str, keys: [&str; 
     Ok(is_along_axes)
 }
 
+/// The least roughness_alpha of a model. Narrower (than a lobe of 0.06 degrees) no quadrature of this project resolves it: that is a mirror.
+pub const NARROWEST_ALPHA: f64 = 1e-3;
+
+/// What models of one roughness say of it.
+pub(crate) const ALPHA_HELP: &str =
+    "Roughness of the microfacets, used as it is, not squared: 0.01 is nearly a mirror.";
+
 /// roughness_alpha along both axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Roughness {
@@ -83,8 +90,7 @@ impl Roughness {
 
     /// Reads `alpha`, or `alpha_x`, `alpha_y` and `rotation_deg`, of which the last may be left out.
     pub(crate) fn from_parameters(parameters: &mut Parameters, help: &'static str) -> Result<Self> {
-        // Narrower than 0.001 (a lobe of 0.06 degrees) no quadrature of this project resolves it: that is a mirror.
-        let range = 1e-3..=1.0;
+        let range = NARROWEST_ALPHA..=1.0;
         if !is_along_axes(parameters, "alpha", ["alpha_x", "alpha_y"])? {
             return Ok(Self::isotropic(parameters.number("alpha", range, Spacing::Logarithmic, help)?));
         }

@@ -43,7 +43,7 @@ impl Model for Abc {
 
     fn from_parameters(parameters: &mut Parameters) -> Result<Self> {
         Ok(Self {
-            diffuse: parameters.colour("diffuse", 0.0..=1.0, "Albedo of the diffuse part, linear Rec. 709.")?,
+            diffuse: parameters.diffuse()?,
             // Scales hold what Löw et al. (2012) fitted to 40 measured materials.
             a: parameters.colour_on("a", 0.0..=1e6, Scale::logarithmic(0.1..=1e4), "Size of the lobe, A.")?,
             b: parameters.number_on(

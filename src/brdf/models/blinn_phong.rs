@@ -37,7 +37,7 @@ impl Model for BlinnPhong {
     fn from_parameters(parameters: &mut Parameters) -> Result<Self> {
         let help = "Exponent of the lobe: the larger, the narrower.";
         let model = Self {
-            diffuse: parameters.colour("diffuse", 0.0..=1.0, "Albedo of the diffuse part, linear Rec. 709.")?,
+            diffuse: parameters.diffuse()?,
             specular: parameters.colour(
                 "specular",
                 0.0..=1.0,

@@ -13,7 +13,7 @@ use std::f64::consts::FRAC_1_PI;
 use glam::DVec3;
 
 use crate::brdf::microfacet::{Distribution, fresnel_dielectric, v_cavities};
-use crate::brdf::{Model, Parameters, Spacing, hash_numbers, warn_of_excess};
+use crate::brdf::{Model, NARROWEST_ALPHA, Parameters, Spacing, hash_numbers, warn_of_excess};
 use crate::error::Result;
 
 /// Cook and Torrance's model.
@@ -46,7 +46,7 @@ impl Model for CookTorrance {
 
     fn from_parameters(parameters: &mut Parameters) -> Result<Self> {
         let model = Self {
-            diffuse: parameters.colour("diffuse", 0.0..=1.0, "Albedo of the diffuse part, linear Rec. 709.")?,
+            diffuse: parameters.diffuse()?,
             specular: parameters.number("specular", 0.0..=1.0, Spacing::Linear, "Share of the lobe, s.")?,
             f0: parameters.colour(
                 "f0",
@@ -55,7 +55,7 @@ impl Model for CookTorrance {
             )?,
             m: parameters.number(
                 "m",
-                1e-3..=1.0,
+                NARROWEST_ALPHA..=1.0,
                 Spacing::Logarithmic,
                 "Slope of the facets: 0.01 is nearly a mirror.",
             )?,

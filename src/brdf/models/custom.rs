@@ -142,6 +142,7 @@ impl Model for Custom {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::brdf::reflect;
     use crate::brdf::tests::samples::of_model;
     use crate::brdf::{half_vector_width, lobe_radius, tabulate};
     use glam::{DVec2, dvec3};
@@ -196,7 +197,7 @@ mod tests {
             for j in 0..91 {
                 let h = (DVec2::from_angle(2.0 * PI * f64::from(j) / 91.0) * sin_theta_h).extend(cos_theta_h);
                 let cos_theta_d = w_o.dot(h);
-                let w_i = 2.0 * cos_theta_d * h - w_o;
+                let w_i = reflect(w_o, h);
                 if cos_theta_d > 0.0 && w_i.z > 0.0 {
                     let weight = w_i.z * cos_theta_d * sin_theta_h * x;
                     let (f, g) = (f.evaluate(w_i, w_o).x, g.evaluate(w_i, w_o).x);

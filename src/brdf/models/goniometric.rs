@@ -9,11 +9,10 @@ use std::sync::Arc;
 
 use glam::{DVec3, Vec3, Vec4};
 
+use crate::brdf::models::MOST_MEASURED;
+use crate::brdf::theta;
 use crate::brdf::{Model, Parameters};
 use crate::error::{Error, Result};
-
-/// The greatest value that is kept, so that sums of values are numbers in single precision.
-const MOST: f32 = 1e30;
 
 /// A measured BRDF. Cheap to clone.
 #[derive(Clone)]
@@ -79,7 +78,7 @@ impl Goniometric {
         let value = |index: usize| {
             let line = index / turns;
             let node = [line / azimuths / thetas, line / azimuths % thetas, line % azimuths, index % turns];
-            measured(node).map_or(Vec4::ZERO, |rgb| rgb.clamp(Vec3::ZERO, Vec3::splat(MOST)).extend(1.0))
+            measured(node).map_or(Vec4::ZERO, |rgb| rgb.clamp(Vec3::ZERO, Vec3::splat(MOST_MEASURED)).extend(1.0))
         };
         let nodes: Arc<[Vec4]> = (0..thetas * thetas * azimuths * turns).map(value).collect();
         if !nodes.iter().any(|node| node.truncate().max_element() > 0.0) {
@@ -111,7 +110,7 @@ impl Model for Goniometric {
         let is_missing = between(w_i, w_o) > PI && !azimuths.is_circle;
         let (w_i, w_o) = if is_missing { (w_o, w_i) } else { (w_i, w_o) };
 
-        let theta = |w: DVec3| thetas.around(w.truncate().length().atan2(w.z));
+        let theta = |w: DVec3| thetas.around(theta(w));
         let (theta_i, theta_o) = (theta(w_i), theta(w_o));
         let (azimuth, turn) = (azimuths.around(between(w_i, w_o)), turns.around(phi(w_i)));
         let mut sum = Vec4::ZERO;

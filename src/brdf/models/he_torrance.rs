@@ -24,16 +24,13 @@
 //! diffuse + F <= 1; beyond it is not bounded by it.
 use std::f64::consts::{FRAC_1_PI, PI};
 
-use glam::{DVec3, dvec3};
+use glam::DVec3;
 use lambert_w::lambert_w0;
 
-use crate::brdf::microfacet::metals::index_of_refraction;
+use crate::brdf::microfacet::metals::{WAVELENGTHS_UM, index_of_refraction};
 use crate::brdf::microfacet::{Distribution, Roughness, fresnel_conductor};
-use crate::brdf::{Model, Parameters, Spacing, hash_numbers};
+use crate::brdf::{Model, NARROWEST_ALPHA, Parameters, Spacing, hash_numbers};
 use crate::error::Result;
-
-/// Wavelengths of red, green and blue in micrometres.
-const LAMBDA_UM: DVec3 = dvec3(0.65, 0.55, 0.45);
 
 /// The model of He, Torrance, Sillion and Greenberg.
 #[derive(Clone, Copy, Debug)]
@@ -138,7 +135,7 @@ impl Model for HeTorrance {
             let d = (0.5 * PI * self.tau_um / lambda_um).powi(2) * scattering(g, a);
             (-g).exp() * mirror + d * geometry * over_cos * FRAC_1_PI
         };
-        visible * LAMBDA_UM.map(channel) + self.diffuse * FRAC_1_PI
+        visible * WAVELENGTHS_UM.map(channel) + self.diffuse * FRAC_1_PI
     }
 
     fn from_parameters(parameters: &mut Parameters) -> Result<Self> {
@@ -149,7 +146,7 @@ impl Model for HeTorrance {
         let help = "Autocorrelation length of the surface's heights in micrometres.";
         let tau_um = parameters.number("tau_um", 0.1..=100.0, Spacing::Logarithmic, help)?;
         let help = "Width of the lobe that stands for the mirror-like term, as Beckmann's alpha.";
-        let specular_alpha = parameters.number("specular_alpha", 1e-3..=0.1, Spacing::Logarithmic, help)?;
+        let specular_alpha = parameters.number("specular_alpha", NARROWEST_ALPHA..=0.1, Spacing::Logarithmic, help)?;
         let (eta, k) = index_of_refraction(parameters)?;
         Ok(Self { diffuse, sigma_um, tau_um, specular_alpha, eta, k })
     }

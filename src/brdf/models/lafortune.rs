@@ -51,7 +51,7 @@ impl Model for Lafortune {
     }
 
     fn from_parameters(parameters: &mut Parameters) -> Result<Self> {
-        let diffuse = parameters.colour("diffuse", 0.0..=1.0, "Albedo of the diffuse part, linear Rec. 709.")?;
+        let diffuse = parameters.diffuse()?;
         let mut lobes = Vec::new();
         for number in 1..=MAX_LOBES {
             let key = |name: &str| format!("{name}_{number}");

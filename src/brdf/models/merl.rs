@@ -5,10 +5,11 @@
 use std::f64::consts::{FRAC_1_PI, FRAC_2_PI, FRAC_PI_2, PI};
 use std::sync::Arc;
 
-use glam::{DVec2, DVec3, Vec4, dvec2, dvec3};
+use glam::{DVec2, DVec3, Vec3, Vec4, dvec2, dvec3};
 use half::f16;
 
 use crate::brdf::made_table::GREATEST_TEXEL;
+use crate::brdf::models::MOST_MEASURED;
 use crate::brdf::{Model, Parameters};
 use crate::error::{Error, Result};
 use crate::vector_math::half_floats;
@@ -84,11 +85,12 @@ impl MerlTable {
                         ));
                     }
                     let valid = is_above && stored.iter().all(|&value| value >= 0.0);
-                    texels.push(if valid { Vec4::new(rgb[0], rgb[1], rgb[2], 1.0) } else { Vec4::ZERO });
+                    let rgb = Vec3::from(rgb).min(Vec3::splat(MOST_MEASURED));
+                    texels.push(if valid { rgb.extend(1.0) } else { Vec4::ZERO });
                 }
             }
         }
-        if texels.iter().all(|texel| texel.truncate() == glam::Vec3::ZERO) {
+        if texels.iter().all(|texel| texel.truncate() == Vec3::ZERO) {
             return Err("holds nothing but zero or invalid cells".into());
         }
         Ok(Self::from_texels(texels, PHI_D_BINS, 1.0))
@@ -285,6 +287,16 @@ impl Model for MerlTable {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_table_of_the_greatest_numbers_is_one_of_numbers_on_the_device() {
+        let mut bytes: Vec<u8> =
+            [THETA_H_BINS, THETA_D_BINS, PHI_D_BINS].iter().flat_map(|n| (*n as i32).to_le_bytes()).collect();
+        bytes.extend((0..3 * CELLS).flat_map(|_| 3e41_f64.to_le_bytes()));
+        let table = MerlTable::from_bytes(&bytes).unwrap().as_on_device();
+        let texels = table.device_texels();
+        assert!(texels.iter().flatten().all(|value| value.is_finite()) && table.device_scale.is_finite());
+    }
 
     #[test]
     fn acute_angles_are_arc_tangents() {

@@ -46,7 +46,10 @@ pub trait Model: Sized {
     fn hash_content(&self, hasher: &mut blake3::Hasher);
 }
 
-/// Makes the modules, the enum and its dispatch from the table in models.rs.
+/// The greatest value of a measured table that is kept, in 1/sr: sums of values are to be numbers in single precision.
+pub(crate) const MOST_MEASURED: f32 = 1e30;
+
+/// Makes the modules, the enum and its dispatch from the table in `table.rs`.
 macro_rules! brdf_models {
     ($($name:ident => $Model:ident,)+) => {
         $(#[allow(missing_docs)] pub mod $name; pub use $name::$Model;)+

@@ -18,8 +18,8 @@ use glam::{DVec2, DVec3};
 
 use crate::brdf::cosines::{at_cosine, mean_under_even_light};
 use crate::brdf::microfacet::metals::index_of_refraction;
-use crate::brdf::microfacet::{Distribution, fresnel_conductor};
-use crate::brdf::{Model, Parameters, Roughness, Spacing, hash_numbers};
+use crate::brdf::microfacet::{ALPHA_HELP, Distribution, fresnel_conductor};
+use crate::brdf::{Model, NARROWEST_ALPHA, Parameters, Roughness, Spacing, hash_numbers, reflect};
 use crate::error::Result;
 
 /// A rough metal with multiple scattering.
@@ -82,7 +82,7 @@ fn albedo(alpha: f64, cos_theta: f64) -> f64 {
         for j in 0..PHI_STEPS {
             let h = (DVec2::from_angle(PI * (j as f64 + 0.5) / PHI_STEPS as f64) * sin_theta_h).extend(cos_theta_h);
             let cos_theta_d = w_o.dot(h);
-            let w_i = 2.0 * cos_theta_d * h - w_o;
+            let w_i = reflect(w_o, h);
             if cos_theta_d > 0.0 && w_i.z > 0.0 {
                 // f cos_theta_i dw_i with dw_i = 4 cos_theta_d dw_h, over D cos_theta_h.
                 let g = Distribution::Ggx.g1_over_cos(w_i.z, alpha) * Distribution::Ggx.g1_over_cos(w_o.z, alpha);
@@ -103,8 +103,7 @@ impl Model for MultiscatterConductor {
     }
 
     fn from_parameters(parameters: &mut Parameters) -> Result<Self> {
-        let help = "Roughness of the microfacets, used as it is, not squared: 0.01 is nearly a mirror.";
-        let alpha = parameters.number("alpha", 1e-3..=1.0, Spacing::Logarithmic, help)?;
+        let alpha = parameters.number("alpha", NARROWEST_ALPHA..=1.0, Spacing::Logarithmic, ALPHA_HELP)?;
         let (eta, k) = index_of_refraction(parameters)?;
         Ok(Self::new(alpha, eta, k))
     }

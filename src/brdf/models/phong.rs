@@ -42,7 +42,7 @@ impl Model for Phong {
 
     fn from_parameters(parameters: &mut Parameters) -> Result<Self> {
         let model = Self {
-            diffuse: parameters.colour("diffuse", 0.0..=1.0, "Albedo of the diffuse part, linear Rec. 709.")?,
+            diffuse: parameters.diffuse()?,
             specular: parameters.colour(
                 "specular",
                 0.0..=1.0,

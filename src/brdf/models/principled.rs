@@ -43,7 +43,7 @@ use glam::{DVec2, DVec3, Vec3, Vec4, dvec3};
 
 use crate::brdf::microfacet::roughness::{Axes, ROTATION};
 use crate::brdf::microfacet::{Distribution, fresnel_schlick};
-use crate::brdf::{Model, Parameters, Roughness, Spacing, hash_numbers};
+use crate::brdf::{Model, NARROWEST_ALPHA, Parameters, Roughness, Spacing, hash_numbers};
 use crate::error::Result;
 
 /// Metallic-roughness with sheen and coat.
@@ -98,8 +98,7 @@ impl Convention {
             Convention::OpenPbr => {
                 let aspect = 1.0 - anisotropy;
                 let along = alpha * (2.0 / (1.0 + aspect * aspect)).sqrt();
-                // Narrower than 0.001 no quadrature of this project resolves it, and 0 would be no lobe at all.
-                DVec2::new(along, (aspect * along).max(1e-3))
+                DVec2::new(along, (aspect * along).max(NARROWEST_ALPHA))
             }
         }
     }
@@ -135,7 +134,7 @@ fn f0(ior: f64) -> f64 {
 /// The index of refraction `key`, which may be left out.
 fn index_of_refraction(parameters: &mut Parameters, key: &str) -> Result<f64> {
     let help = "Index of refraction, against air; 1.5 where left out.";
-    if parameters.has(key) { parameters.number(key, 1.0..=3.0, Spacing::Linear, help) } else { Ok(1.5) }
+    parameters.number_or(key, 1.0..=3.0, 1.5, help)
 }
 
 impl Coat {

@@ -25,8 +25,9 @@ use std::array;
 use std::f64::consts::{FRAC_1_PI, FRAC_2_PI};
 use std::sync::Arc;
 
-use glam::{DVec2, DVec3, Vec3, dvec2};
+use glam::{DVec2, DVec3, FloatExt, Vec3, dvec2};
 
+use crate::brdf::theta;
 use crate::brdf::{Model, Parameters};
 use crate::error::{Error, Result};
 
@@ -141,7 +142,7 @@ impl Grid<f32> {
     fn at(&self, u: DVec2) -> f64 {
         let cell = self.cell(u);
         let [low, high] = along_cell(self.corners(0, &cell).map(f64::from), cell.inside.y);
-        lerp(low, high, cell.inside.x)
+        low.lerp_monotonic(high, cell.inside.x)
     }
 }
 
@@ -194,9 +195,9 @@ impl Warp {
             let [before, total] = [cell.first, last].map(|node| [sums[node], sums[node + columns]]);
             [before[0], before[1], total[0], total[1], self.across_rows[square * rows + cell.row]]
         });
-        let before = lerp(before, next_before, cell.inside.y);
+        let before = before.lerp_monotonic(next_before, cell.inside.y);
         let y = above + integral_in_cell(total, next_total, cell.inside.y);
-        let total = lerp(total, next_total, cell.inside.y);
+        let total = total.lerp_monotonic(next_total, cell.inside.y);
         // No normal is visible in a row without density, so any place in it is as good.
         let x = if total > 0.0 { (before + integral_in_cell(low, high, cell.inside.x)) / total } else { u.x };
         dvec2(x, y)
@@ -205,7 +206,7 @@ impl Warp {
 
 /// The values in the middle of the left and of the right side of a cell, `y` of the way along them.
 fn along_cell(corners: [f64; 4], y: f64) -> [f64; 2] {
-    [lerp(corners[0], corners[2], y), lerp(corners[1], corners[3], y)]
+    [corners[0].lerp_monotonic(corners[2], y), corners[1].lerp_monotonic(corners[3], y)]
 }
 
 /// The integral from 0 to `x` of what goes linearly from `low` at 0 to `high` at 1.
@@ -222,10 +223,6 @@ fn integrals(nodes: impl Iterator<Item = f64>) -> impl Iterator<Item = f64> {
     })
 }
 
-fn lerp(a: f64, b: f64, t: f64) -> f64 {
-    a + (b - a) * t
-}
-
 impl Rgl {
     pub(crate) fn of(tables: RglTables) -> Self {
         let mut hasher = blake3::Hasher::new();
@@ -235,6 +232,7 @@ impl Rgl {
         }
         crate::brdf::hash_numbers(&mut hasher, [f64::from(u8::from(tables.has_jacobian))]);
         hasher.update(bytemuck::cast_slice(&tables.values.values));
+        crate::brdf::hash_numbers(&mut hasher, tables.values.size.map(|size| size as f64));
         for grid in [&tables.visible_normals.density, &tables.normals, &tables.projected_area] {
             crate::brdf::hash_numbers(&mut hasher, grid.size.map(|size| size as f64));
             hasher.update(bytemuck::cast_slice(&grid.values));
@@ -321,11 +319,6 @@ fn neighbours(known: &[f64], at: f64) -> [(usize, f64); 2] {
     }
     let weight = (at - known[after - 1]) / (known[after] - known[after - 1]);
     [(after - 1, 1.0 - weight), (after, weight)]
-}
-
-/// The angle between `w` and the normal, in radians, to the last digits near the normal too.
-fn theta(w: DVec3) -> f64 {
-    w.truncate().length().atan2(w.z)
 }
 
 impl std::fmt::Debug for Rgl {

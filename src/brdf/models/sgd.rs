@@ -14,6 +14,7 @@ use std::f64::consts::FRAC_1_PI;
 
 use glam::DVec3;
 
+use crate::brdf::theta;
 use crate::brdf::{Model, Parameters, Scale, hash_numbers};
 use crate::error::Result;
 
@@ -47,8 +48,9 @@ pub struct Sgd {
 impl Sgd {
     /// G1 of the direction `w`.
     fn g1(&self, w: DVec3) -> DVec3 {
-        let theta = w.truncate().length().atan2(w.z);
-        let power = |channel: usize| (theta - self.theta_0[channel]).max(0.0).powf(self.k[channel]);
+        let theta = theta(w);
+        // Beyond all numbers it would be none where c is 0.
+        let power = |channel: usize| (theta - self.theta_0[channel]).max(0.0).powf(self.k[channel]).min(f64::MAX);
         // Beyond e^700 is no double; so deep a shadow is black whatever the rest.
         let exponent = (self.c * DVec3::from_array([0, 1, 2].map(power))).min(DVec3::splat(700.0));
         (1.0 - self.lambda * exponent.map(f64::exp_m1)).clamp(DVec3::ZERO, DVec3::ONE)
@@ -75,7 +77,7 @@ impl Model for Sgd {
         // Scales hold nearly all of what Bagher et al. (2012) fitted to 40 measured materials.
         let (even, factors) = (Scale::linear, Scale::logarithmic);
         Ok(Self {
-            diffuse: parameters.colour("diffuse", 0.0..=1.0, "Albedo of the diffuse part.")?,
+            diffuse: parameters.diffuse()?,
             specular: parameters.colour_on("specular", 0.0..=100.0, factors(1e-3..=10.0), "Factor of the lobe.")?,
             alpha: parameters.colour_on("alpha", 1e-6..=10.0, factors(1e-5..=1.0), "Width of the lobe.")?,
             p: parameters.colour_on("p", -10.0..=10.0, even(0.0..=1.5), "Fall of the lobe: its power.")?,
@@ -119,5 +121,28 @@ impl Model for Sgd {
         for colour in [diffuse, specular, alpha, p, f0, f1, kappa, lambda, c, k, theta_0] {
             hash_numbers(hasher, colour.to_array());
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::dvec3;
+
+    use crate::brdf::tests::samples::of_model;
+
+    #[test]
+    fn without_c_there_is_no_shadow_whatever_the_power() {
+        let sgd = |shadow: &str| {
+            of_model(
+                "sgd",
+                &format!(
+                    "diffuse = 0\nspecular = 1\nalpha = 0.1\np = 0.5\nf0 = 0.5\nf1 = 0\nkappa = 1\nlambda = 0.5\ntheta_0 = -1\n{shadow}"
+                ),
+            )
+        };
+        let w_o = dvec3(1.3_f64.sin(), 0.0, 1.3_f64.cos());
+        let mirrored = dvec3(-w_o.x, 0.0, w_o.z);
+        let [even, steep] = ["c = 0\nk = 1", "c = 0\nk = 1000"].map(|shadow| sgd(shadow).evaluate(mirrored, w_o));
+        assert!(even == steep && even.min_element() > 0.0, "{even} {steep}");
     }
 }

@@ -26,6 +26,12 @@ pub(crate) const SLABS: usize = 3;
 /// Nodes along tan(theta_d / 2).
 const ROWS: usize = MADE_TABLE_SIZE[1] / SLABS;
 
+const _: () = {
+    use crate::shader_constants::tabulated_anisotropic as glsl;
+    assert!(glsl::LAST_COLUMN == (MADE_TABLE_SIZE[0] - 1) as f32 && glsl::ROWS == ROWS as f32);
+    assert!(glsl::SLABS == SLABS as f32 && glsl::RECIPROCAL_KNEE as f64 * KNEE_THETA_D == 1.0);
+};
+
 /// A BRDF as shaders look it up. Cheap to clone.
 #[derive(Clone, Debug)]
 pub struct TabulatedAnisotropic {

@@ -61,7 +61,7 @@ impl Model for TorranceSparrow {
     }
 
     fn from_parameters(parameters: &mut Parameters) -> Result<Self> {
-        let diffuse = parameters.colour("diffuse", 0.0..=1.0, "Albedo of the diffuse part, linear Rec. 709.")?;
+        let diffuse = parameters.diffuse()?;
         let help = "Angle to the normal, in degrees, at which facets are rarer by e.";
         let spread_deg = parameters.number("spread_deg", 0.1..=60.0, Spacing::Logarithmic, help)?;
         let (eta, k) = index_of_refraction(parameters)?;

@@ -65,7 +65,7 @@ impl Model for Ward {
     }
 
     fn from_parameters(parameters: &mut Parameters) -> Result<Self> {
-        let diffuse = parameters.colour("diffuse", 0.0..=1.0, "Albedo of the diffuse part, linear Rec. 709.")?;
+        let diffuse = parameters.diffuse()?;
         let help = "Albedo of the lobe seen along the normal, linear Rec. 709.";
         let specular = parameters.colour("specular", 0.0..=1.0, help)?;
         let help = "Width of the lobe in slopes: 0.01 is nearly a mirror.";

@@ -404,6 +404,14 @@ fn a_parameter_that_others_rule_out_is_not_called_unknown() {
             format!("model = 'layered'\ncoat = {{ alpha = 0.1, ior = 1.5 }}\n[base]\n{principled}coat_ior = 1.4"),
             "base.coat_ior: is a parameter only beside `coat`",
         ),
+        (
+            "model = 'layered'\ncoat = { alpha = 0.1, ior = 1.5 }\nbase = { model = 'lambert', reflectance = 0.5, alpha = 0.1 }".to_owned(),
+            "base.alpha: is not a parameter of `lambert`",
+        ),
+        (
+            "model = 'layered'\ncoat = { alpha = 0.1, ior = 1.5, haze = 1 }\nbase = 'gold'".to_owned(),
+            "coat.haze: is not a parameter of `coat`",
+        ),
     ] {
         let message = from_toml(&text).unwrap_err().to_string();
         assert!(message.contains(said), "{text}: {message}");

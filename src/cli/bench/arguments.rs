@@ -11,7 +11,7 @@ use threadlight::low_level::brdf::Brdf;
 use threadlight::low_level::environment;
 use threadlight::low_level::evaluate::reference::{self, Processor, ReferenceSettings};
 use threadlight::low_level::evaluate::sweep::Measured;
-use threadlight::low_level::evaluate::{Cases, Row, Shard, Sweep, sweep, tables};
+use threadlight::low_level::evaluate::{Cases, Row, Shard, Sweep, ssim, sweep, tables};
 use threadlight::low_level::files;
 use threadlight::low_level::memo::{Memo, Round};
 use threadlight::low_level::method::{Method, Variant};
@@ -33,16 +33,13 @@ pub struct CasesArguments {
     /// Shading methods; `filtered_fixed` and `importance_fixed` are those at one set of points for all pixels.
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = NonEmptyStringValueParser::new())]
     methods: Vec<String>,
-    /// Numbers of threads, or of samples of the other estimators, each 1 to 10000; a method is measured with those that it can have.
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = value_parser!(u32).range(1..=i64::from(MAX_SAMPLES)))]
+    #[arg(long, help = counts(), value_name = "LIST", value_delimiter = ',', value_parser = value_parser!(u32).range(1..=i64::from(MAX_SAMPLES)))]
     counts: Vec<u32>,
     #[arg(long, help = nameable::scenes("Scenes, each a mesh"), value_name = "LIST", value_delimiter = ',', value_parser = NonEmptyStringValueParser::new(), default_value = "sphere")]
     scene: Vec<String>,
-    /// Size of the pictures in pixels, each side 11 to 16384.
-    #[arg(long, value_name = "WxH", value_parser = parse_size, allow_hyphen_values = true)]
+    #[arg(long, help = nameable::size("Size of the pictures", ssim::WINDOW), value_name = "WxH", value_parser = parse_size, allow_hyphen_values = true)]
     size: Option<(u32, u32)>,
-    /// Sub-pixels per axis, 1 to 4; without it, the scene's.
-    #[arg(long, value_name = "S", value_parser = value_parser!(u32).range(1..=i64::from(MAX_SUBPIXELS)))]
+    #[arg(long, help = format!("{}; without it, the scene's", nameable::subpixels("Sub-pixels per axis")), value_name = "S", value_parser = value_parser!(u32).range(1..=i64::from(MAX_SUBPIXELS)))]
     subpixels: Option<u32>,
     /// Seed of everything random.
     #[arg(long, value_name = "N", default_value_t = 0)]
@@ -51,19 +48,31 @@ pub struct CasesArguments {
     pub device: DeviceFlags,
 }
 
+fn counts() -> String {
+    format!(
+        "Numbers of threads, or of samples of the other estimators, each 1 to {MAX_SAMPLES}; a method is measured with those that it can have"
+    )
+}
+
 /// The flags that stand on the command line: others have their defaults. The first field of a command, as the later ones take values away.
 pub struct Given(Vec<String>);
 
 impl Given {
     /// Whether the flag of this name, in which `_` is in the place of `-`, is there.
     pub fn has(&self, name: &str) -> bool {
-        self.0.iter().any(|given| given == name)
+        self.flags().any(|given| given == name)
+    }
+
+    /// Their names, in which `_` is in the place of `-`.
+    pub fn flags(&self) -> impl Iterator<Item = &str> {
+        self.0.iter().map(String::as_str)
     }
 }
 
 impl FromArgMatches for Given {
     fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
-        let names = matches.ids().map(|id| id.as_str());
+        // Groups, which are named as their types are, are no flags.
+        let names = matches.ids().map(|id| id.as_str()).filter(|name| !name.starts_with(char::is_uppercase));
         let given = names.filter(|name| matches.value_source(name) == Some(ValueSource::CommandLine));
         Ok(Self(given.map(str::to_owned).collect()))
     }
@@ -94,6 +103,12 @@ pub struct Defaults {
 }
 
 impl Defaults {
+    /// Of pictures that are shown beside each other.
+    pub fn of_pictures(materials: Vec<&'static str>, counts: &'static [u32]) -> Self {
+        let methods = vec![Method::Fitted, Method::Paper, Method::Importance, Method::Filtered];
+        Self { materials, methods, counts, size: Some((160, 120)) }
+    }
+
     /// Help after that of the flags: these, where pictures are compared the `tolerance` of the references, and what `follows`.
     pub fn help(&self, tolerance: Option<f64>, follows: &str) -> String {
         let names = |given: &[&str], all: Vec<&str>| if given == all { "all".to_owned() } else { given.join(",") };
@@ -345,16 +360,18 @@ impl OutputArguments {
 /// An error if `folder` is none, or cannot be made or written to.
 pub fn check_folder(folder: &Path) -> Result<()> {
     let is_like = |extension: &str| folder.extension().is_some_and(|of| of.eq_ignore_ascii_case(extension));
-    if !folder.exists() && ["svg", "png", "exr", "html"].into_iter().any(is_like) {
+    if folder.is_dir() {
+        return files::check_writable(&folder.join("plot.svg"));
+    }
+    if folder.exists() {
+        return Err(Error::in_file(folder, "is a file, and what is written is a folder of them", "name a folder"));
+    }
+    if ["svg", "png", "exr", "html"].into_iter().any(is_like) {
         let problem = "is named like a file, and what is written is a folder of them";
         return Err(Error::in_file(folder, problem, "name a folder, or make one of this name"));
     }
-    if folder.exists() && !folder.is_dir() {
-        return Err(Error::in_file(folder, "is a file, and what is written is a folder of them", "name a folder"));
-    }
-    // One that is not there yet has to be made; its name may end in a separator.
-    let to_make = || folder.components().collect();
-    files::check_writable(&if folder.exists() { folder.join("plot.svg") } else { to_make() })
+    // It has to be made; its name may end in a separator.
+    files::check_writable(&folder.components().collect::<PathBuf>())
 }
 
 #[cfg(test)]

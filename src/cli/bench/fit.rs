@@ -30,8 +30,7 @@ The JSON is a list of rows with these fields, in this order:
 pub struct BenchFit {
     #[arg(long, help = nameable::materials(), value_name = "LIST", value_delimiter = ',', value_parser = NonEmptyStringValueParser::new(), default_value = "gold")]
     materials: Vec<String>,
-    /// Numbers of threads, each 1 to 128.
-    #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "16,64", value_parser = value_parser!(u32).range(1..=MAX_COUNT as i64))]
+    #[arg(long, help = nameable::fitted_threads("Numbers of threads, each"), value_name = "LIST", value_delimiter = ',', default_value = "16,64", value_parser = value_parser!(u32).range(1..=MAX_COUNT as i64))]
     counts: Vec<u32>,
     /// Fit this often; times are medians.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = value_parser!(u32).range(1..))]

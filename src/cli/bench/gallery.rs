@@ -2,6 +2,7 @@
 use super::arguments::{
     CasesArguments, Defaults, OutputArguments, QUICK_TOLERANCE, TruthArguments, files_of_materials, named_materials,
 };
+use crate::cli::nameable;
 use crate::cli::progress::TerminalProgress;
 use clap::builder::NonEmptyStringValueParser;
 use clap::value_parser;
@@ -11,7 +12,6 @@ use threadlight::low_level::evaluate::gallery::{self, Named};
 use threadlight::low_level::evaluate::sweep::Measured;
 use threadlight::low_level::evaluate::{Cases, Estimator, Sweep, tables};
 use threadlight::low_level::files;
-use threadlight::low_level::method::Method;
 use threadlight::low_level::picture;
 use threadlight::low_level::progress::Observer;
 use threadlight::low_level::threads::MAX_COUNT;
@@ -47,8 +47,7 @@ pub struct BenchGallery {
     /// Draw all materials, and compare no methods.
     #[arg(long, conflicts_with_all = ["compare", "reference_tolerance", "reference_on", "json"])]
     materials_only: bool,
-    /// Threads or samples of the pictures of all materials, 1 to 1024; fitted threads 1 to 128.
-    #[arg(long, value_name = "N", default_value_t = 100, value_parser = value_parser!(u32).range(1..=MAX_COUNT as i64))]
+    #[arg(long, help = threads(), value_name = "N", default_value_t = 100, value_parser = value_parser!(u32).range(1..=MAX_COUNT as i64))]
     threads: u32,
     #[command(flatten)]
     truth: TruthArguments,
@@ -56,13 +55,13 @@ pub struct BenchGallery {
     output: OutputArguments,
 }
 
+fn threads() -> String {
+    let fitted = nameable::fitted_threads("fitted threads");
+    format!("Threads or samples of the pictures of all materials, 1 to {MAX_COUNT}; {fitted}")
+}
+
 fn defaults() -> Defaults {
-    Defaults {
-        materials: Brdf::builtin_names().collect(),
-        methods: vec![Method::Fitted, Method::Paper, Method::Importance, Method::Filtered],
-        counts: &[1, 4, 16, 64, 100],
-        size: Some((160, 120)),
-    }
+    Defaults::of_pictures(Brdf::builtin_names().collect(), &[1, 4, 16, 64, 100])
 }
 
 impl BenchGallery {

@@ -12,7 +12,7 @@ use threadlight::low_level::scene::Scene;
 use threadlight::{Error, Result};
 
 const EXAMPLES: &str = "\
-Without --size, pictures are 80x60.
+Without a scene file and --size, pictures are 80x60.
 
 Examples:
   threadlight bench live --drag gold.alpha --from 0.05 --to 0.6

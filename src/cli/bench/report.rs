@@ -3,8 +3,8 @@ use super::arguments::{
     CasesArguments, Defaults, Given, OutputArguments, QUICK_TOLERANCE, TruthArguments, check_folder,
 };
 use super::error;
-use crate::cli::print;
 use crate::cli::progress::TerminalProgress;
+use crate::cli::{nameable, print};
 use clap::value_parser;
 use std::path::{Path, PathBuf};
 use threadlight::low_level::brdf::Brdf;
@@ -13,7 +13,6 @@ use threadlight::low_level::evaluate::speed::{self, Speed};
 use threadlight::low_level::evaluate::sweep::Measured;
 use threadlight::low_level::evaluate::{Cases, Estimator, Row, Sweep, gallery, merged};
 use threadlight::low_level::files;
-use threadlight::low_level::method::Method;
 use threadlight::low_level::progress::Observer;
 use threadlight::low_level::scene::MaterialSource;
 use threadlight::low_level::threads::MAX_COUNT;
@@ -54,8 +53,7 @@ pub struct BenchReport {
     from: Vec<PathBuf>,
     #[command(flatten)]
     cases: CasesArguments,
-    /// Threads or samples while other things double, 1 to 1024; of a method that can have fewer, its most.
-    #[arg(long, value_name = "N", default_value_t = 64, value_parser = value_parser!(u32).range(1..=MAX_COUNT as i64))]
+    #[arg(long, help = nameable::most_threads("Threads or samples while other things double"), value_name = "N", default_value_t = 64, value_parser = value_parser!(u32).range(1..=MAX_COUNT as i64))]
     threads: u32,
     #[command(flatten)]
     truth: TruthArguments,
@@ -66,37 +64,17 @@ pub struct BenchReport {
     output: OutputArguments,
 }
 
-/// The flags that say what to measure, and how.
-const MEASURING: [&str; 14] = [
-    "materials",
-    "environments",
-    "methods",
-    "counts",
-    "scene",
-    "size",
-    "subpixels",
-    "seed",
-    "device",
-    "no_cache",
-    "threads",
-    "reference_tolerance",
-    "reference_on",
-    "repeat",
-];
+/// The flags that do not say what to measure, or how.
+const NOT_MEASURING: [&str; 4] = ["from", "json", "plot", "verbose"];
 
 fn defaults() -> Defaults {
-    Defaults {
-        materials: vec!["gold", "red-plastic"],
-        methods: vec![Method::Fitted, Method::Paper, Method::Importance, Method::Filtered],
-        counts: &[1, 4, 16, 64],
-        size: Some((160, 120)),
-    }
+    Defaults::of_pictures(vec!["gold", "red-plastic"], &[1, 4, 16, 64])
 }
 
 impl BenchReport {
     pub fn run(mut self) -> anyhow::Result<()> {
         if self.folder.is_none()
-            && let Some(flag) = MEASURING.into_iter().find(|flag| self.given.has(flag))
+            && let Some(flag) = self.given.flags().find(|flag| !NOT_MEASURING.contains(flag))
         {
             let problem = "is of no use to tables of earlier rows: without DIR nothing is measured";
             let remedy = "leave it out, or name a folder for report.html";
@@ -120,7 +98,8 @@ impl BenchReport {
             cases: if earlier.is_empty() { cases.clone() } else { only_first.clone() },
             repeat: self.repeat,
             whole_picture: false,
-            expected: true,
+            // Those of earlier rows have theirs, if any.
+            expected: earlier.is_empty(),
             keep_pictures: true,
         };
         let speed = Speed { cases: only_first.clone(), threads: self.threads, repeat: self.repeat };

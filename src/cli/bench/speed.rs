@@ -1,7 +1,7 @@
 //! `threadlight bench speed`: time of a frame by its number of threads, beside its floor, and as other things grow.
 use super::arguments::{CasesArguments, Defaults, OutputArguments};
-use crate::cli::print;
 use crate::cli::progress::TerminalProgress;
+use crate::cli::{nameable, print};
 use clap::value_parser;
 use threadlight::Error;
 use threadlight::low_level::evaluate::speed::{self, Speed, Timings};
@@ -44,8 +44,7 @@ The plots are SVG, log-log: frame_over_threads.svg, and METHOD_cost_over_growth.
 pub struct BenchSpeed {
     #[command(flatten)]
     cases: CasesArguments,
-    /// Threads or samples while other things grow, 1 to 1024; of a method that can have fewer, its most.
-    #[arg(long, value_name = "N", default_value_t = 100, value_parser = value_parser!(u32).range(1..=MAX_COUNT as i64))]
+    #[arg(long, help = nameable::most_threads("Threads or samples while other things grow"), value_name = "N", default_value_t = 100, value_parser = value_parser!(u32).range(1..=MAX_COUNT as i64))]
     threads: u32,
     /// Render this often; times are medians.
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = value_parser!(u32).range(1..))]

@@ -3,16 +3,18 @@ use super::arguments::JsonArgument;
 use crate::cli::none_of;
 use crate::cli::progress::TerminalProgress;
 use crate::cli::scene_flags::MachineFlags;
-use threadlight::low_level::evaluate::stress::{self, Extent, Stressed};
+use threadlight::low_level::evaluate::stress::{self, Extent, SIZE_PX, Stressed, THREADS};
 
-const EXAMPLES: &str = "\
+fn examples() -> String {
+    format!(
+        "\
 Examples:
   threadlight bench stress
   threadlight bench stress --device swiftshader --json stress.json
   threadlight bench stress --all --only table --only lamps
 
-Materials, surfaces, light, views and pictures at the ends of what they may be, by the three methods that have threads, 8 of them, \
-64 x 48 pixels. With --all also what takes long, by all methods, and all once more under light so bright that pyramids are in \
+Materials, surfaces, light, views and pictures at the ends of what they may be, by the methods that have threads, {THREADS} of them, \
+{} x {} pixels. With --all also what takes long, by all methods, and all once more under light so bright that pyramids are in \
 single precision. Each pixel is compared with the CPU's form of the method, given the same surface. The exit code is 1 where a \
 pixel is NaN or infinite, its display value is not that of its radiance, or the RMS is above its bound.
 
@@ -22,11 +24,14 @@ The JSON is a list of rows with these fields, in this order:
   not_finite              pixels that are NaN or infinite
   wrongly_shown           pixels whose display value is off by more than a step of 8 bits
   rms, most               of the other ones, relative to the largest of their radiance, the picture's
-                          mean, and a millionth of the light's maximum";
+                          mean, and a millionth of the light's maximum",
+        SIZE_PX.0, SIZE_PX.1
+    )
+}
 
 /// Shades hard cases and compares with the CPU; fails where a bound is broken.
 #[derive(clap::Args)]
-#[command(after_help = EXAMPLES)]
+#[command(after_help = examples())]
 pub struct BenchStress {
     #[command(flatten)]
     machine: MachineFlags,

@@ -36,11 +36,9 @@ pub struct BenchTogether {
     materials: Vec<String>,
     #[arg(long, help = nameable::environment("Environments, each"), value_name = "LIST", value_delimiter = ',', value_parser = NonEmptyStringValueParser::new(), default_value = "studio")]
     environments: Vec<String>,
-    /// Fitted threads of each material, 1 to 128.
-    #[arg(long, value_name = "N", default_value_t = 16, value_parser = value_parser!(u32).range(1..=MAX_COUNT as i64))]
+    #[arg(long, help = nameable::fitted_threads("Fitted threads of each material"), value_name = "N", default_value_t = 16, value_parser = value_parser!(u32).range(1..=MAX_COUNT as i64))]
     threads: u32,
-    /// Size of the picture in pixels, each side 1 to 16384.
-    #[arg(long, value_name = "WxH", value_parser = parse_size, allow_hyphen_values = true, default_value = "640x480")]
+    #[arg(long, help = nameable::size("Size of the picture", 1), value_name = "WxH", value_parser = parse_size, allow_hyphen_values = true, default_value = "640x480")]
     size: (u32, u32),
     /// Render each picture this often; times are medians.
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = value_parser!(u32).range(1..))]

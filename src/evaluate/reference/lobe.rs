@@ -3,6 +3,7 @@ use std::f64::consts::FRAC_PI_2;
 
 use glam::{DVec2, DVec3};
 
+use crate::brdf::theta;
 use crate::brdf::{Brdf, LobeShape, MAX_THETA_O_DEG, lobe_radius};
 
 /// View angles at which lobes are looked for: some models have them at grazing views only.
@@ -46,7 +47,7 @@ impl Lobe {
     /// It as seen from unit `w_o`, which is in the frame of the surface: with the least radius at the view angles beside that of `w_o`.
     pub fn seen_from(&self, w_o: DVec3) -> SeenLobe {
         let Self { radii, is_isotropic, narrowness, long_axis, most_slope } = *self;
-        let theta_o_deg = w_o.truncate().length().atan2(w_o.z).to_degrees();
+        let theta_o_deg = theta(w_o).to_degrees();
         let next = VIEWS_DEG.iter().position(|&view| view > theta_o_deg).unwrap_or(VIEWS_DEG.len() - 1);
         let radius = radii[next].min(radii[next - 1]);
         let (long_axis, most_slope) = match is_isotropic && w_o.z <= GRAZING_COS {

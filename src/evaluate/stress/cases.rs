@@ -10,8 +10,10 @@ use crate::scene::{
     Background, Camera, EXPOSURE, GAMMA, INTENSITY, MAX_SIZE_PX, MaterialSource, ObjectSettings, Scene, Source,
 };
 
-const THREADS: u32 = 8;
-const SIZE: (u32, u32) = (64, 48);
+/// Threads, or samples, of each case.
+pub const THREADS: u32 = 8;
+/// Size of the pictures.
+pub const SIZE_PX: (u32, u32) = (64, 48);
 
 /// What is large, made when its turn comes.
 type Made<T> = Box<dyn Fn() -> T>;
@@ -30,7 +32,7 @@ impl Case {
     /// The built-in scene, changed.
     fn scene(name: &str, change: impl FnOnce(&mut Scene)) -> Self {
         let mut scene = Scene::default();
-        (scene.image.width, scene.image.height) = SIZE;
+        (scene.image.width, scene.image.height) = SIZE_PX;
         scene.image.background = Background::None;
         scene.environment.source = Source::Builtin("sky".to_owned());
         scene.shading.threads = Some(THREADS);

@@ -10,6 +10,7 @@ use glam::Vec4;
 use serde::Serialize;
 
 use self::cases::Case;
+pub use self::cases::{SIZE_PX, THREADS};
 use super::cases::by_method;
 use super::metrics::Display;
 use super::rounding::shade;

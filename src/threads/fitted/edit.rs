@@ -7,7 +7,7 @@ use glam::{DVec3, dvec3};
 use super::kernel::{Kernel, WIDEST_LEVEL, scale_rad};
 use super::solve::Fit;
 use crate::brdf::luminance;
-use crate::threads::slice::reflect;
+use crate::brdf::reflect;
 
 /// A kernel with less than this part of the weight of all has nothing to do.
 const IDLE: f64 = 2e-3;
@@ -105,7 +105,7 @@ fn stretched(kernels: &[Kernel], octaves: f64, theta_o: f64) -> Vec<Kernel> {
     let stretch = |kernel: &Kernel| {
         let h = (kernel.direction + w_o).normalize();
         let h = (octaves.exp2() * h.truncate()).extend(h.z).normalize();
-        let mirrored = reflect(w_o, h);
+        let mirrored = reflect(w_o, h).normalize();
         // Mirrors stay mirrors.
         let level = if kernel.level < 0.0 { kernel.level } else { (kernel.level + octaves).clamp(0.0, WIDEST_LEVEL) };
         let is_above = mirrored.z > -scale_rad(level);

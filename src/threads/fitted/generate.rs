@@ -12,12 +12,12 @@ use super::sets::{pixels_have_own, share_of_sets};
 use super::solve::{Effort, Fit};
 use super::stray;
 use super::table::FittedTable;
-use crate::brdf::{BaseProfile, Brdf, LobeShape, SeenBrdf, luminance};
+use crate::brdf::{BaseProfile, Brdf, LobeShape, SeenBrdf, luminance, reflect};
 use crate::error::Result;
 use crate::progress::{Observer, Parts};
 use crate::threads::azimuths::{View, azimuth_count};
 use crate::threads::rim::rim_power;
-use crate::threads::slice::{Resolution, Slice, reflect};
+use crate::threads::slice::{Resolution, Slice};
 use crate::threads::{ThreadKind, ThreadSettings};
 
 /// Steps of the first row, which starts from cells, and of the others.
@@ -315,7 +315,7 @@ pub(super) fn carried(kernels: &[Kernel], from: View, to: View) -> Vec<Kernel> {
     let carry = |kernel: &Kernel| {
         let h = (kernel.direction + w_from).normalize();
         let h = turn.rotate(h.truncate()).extend(h.z);
-        let mirrored = reflect(w_to, h);
+        let mirrored = reflect(w_to, h).normalize();
         let width = scale_rad(kernel.level);
         // Lobes turn with the surface as a whole.
         let follows = (width < FOLLOWS_BELOW_RAD || from.phi_o != to.phi_o) && mirrored.z > -width;

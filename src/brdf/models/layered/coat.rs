@@ -3,7 +3,7 @@ use glam::{DVec2, DVec3, dvec3};
 
 use crate::brdf::cosines::at_cosine;
 use crate::brdf::microfacet::{Distribution, fresnel_dielectric};
-use crate::brdf::{Parameters, Roughness, Spacing, hash_numbers};
+use crate::brdf::{NARROWEST_ALPHA, Parameters, Roughness, Spacing, hash_numbers, reflect};
 use crate::error::Result;
 
 /// Intervals between the cosines (i / n)^2 at which the reflectance of the interface is known.
@@ -28,7 +28,7 @@ pub struct Coat {
 impl Coat {
     pub(super) fn from_parameters(parameters: &mut Parameters) -> Result<Self> {
         let help = "Roughness of the coat, used as it is, not squared: 0.001 is a mirror.";
-        let alpha = parameters.number("alpha", 1e-3..=1.0, Spacing::Logarithmic, help)?;
+        let alpha = parameters.number("alpha", NARROWEST_ALPHA..=1.0, Spacing::Logarithmic, help)?;
         let ior =
             parameters.number("ior", 1.0..=3.0, Spacing::Linear, "Index of refraction of the coat, against air.")?;
         let help = "Thickness of the coat in millimetres; 0 where left out.";
@@ -105,7 +105,7 @@ impl Coat {
             let z = (1.0 - disk.x * disk.x - y * y).max(0.0).sqrt();
             let normal = disk.x * t1 + y * t2 + z * stretched;
             let h = dvec3(self.alpha * normal.x, self.alpha * normal.y, normal.z.max(0.0)).normalize();
-            let w_i = 2.0 * w_o.dot(h) * h - w_o;
+            let w_i = reflect(w_o, h);
             let g1 = |cos: f64| cos * Distribution::Ggx.g1_over_cos(cos, self.alpha);
             if w_i.z > 0.0 { fresnel_dielectric(w_o.dot(h), self.ior) * g1(w_i.z) } else { 0.0 }
         };

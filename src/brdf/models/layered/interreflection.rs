@@ -8,14 +8,16 @@
 //! E + B E + B^2 E + ... = P E,   P = 1 + B + B^2 + ...
 //! ```
 //!
-//! which conserves energy whatever the base. Which way it leaves over azimuth, P does not say. See `layered.rs` for what is made of it.
+//! which conserves energy whatever the base. Which way it leaves over azimuth, P does not say. See `mod.rs` beside this for what is made of it.
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
+use faer::{Col, Mat};
 use glam::{DVec2, DVec3, dvec3};
 
 use super::coat::{Coat, Interface};
 use crate::brdf::cosines::{at_cosine, mean_under_even_light};
-use crate::brdf::{Brdf, Lambert, half_vector_width, lobe_radius};
+use crate::brdf::made_table::{exponential, exponential_slope, knee_of_lobe};
+use crate::brdf::{Brdf, Lambert, half_vector_width, reflect};
 
 /// Angles to the normal of light that comes from outside, at cosines (i / (n - 1))^2 there.
 const OPEN: usize = 40;
@@ -35,7 +37,7 @@ const AZIMUTH_STEP: f64 = 0.754_877_666_246_692_7;
 /// How much of the light that comes later is counted: with so many points, white bases err by up to 0.65 %, and energy is hardly to exceed 1.
 const COUNTED: f64 = 0.995;
 
-/// What light between base and coat adds to what the base reflects once: see `layered.rs`. By the cosine outside, as [`at_cosine`] reads it.
+/// What light between base and coat adds to what the base reflects once: see `mod.rs` beside this. By the cosine outside, as [`at_cosine`] reads it.
 #[derive(Debug)]
 pub(super) struct Interreflection {
     /// Square root of the factor of the base's lobe, times what gets in.
@@ -83,8 +85,8 @@ impl Interreflection {
 
     fn over_any(base: &Brdf, coat: &Coat, interface: &Interface) -> Self {
         let angles = Angles::new(coat);
-        let width = half_vector_width(base).min(lobe_radius(base, 0.0));
-        let seen_from = |i: usize| Shares::seen_from(&angles, angles.cos_inside(i), base, coat, interface, width);
+        let knee = knee_of_lobe(base, half_vector_width(base));
+        let seen_from = |i: usize| Shares::seen_from(&angles, angles.cos_inside(i), base, coat, interface, knee);
         let shares = each_on_own_threads(angles.count(), &seen_from);
         let near = angles.near();
         let [red, green, blue] = [0, 1, 2].map(|channel| of_channel(&shares, &near, channel));
@@ -148,10 +150,10 @@ impl Angles {
     }
 
     /// How near angles are to each other: 1 within 3 degrees, less beyond.
-    fn near(&self) -> Matrix {
+    fn near(&self) -> Mat<f64> {
         let theta = |i: usize| self.cos_inside(i).acos();
         let weight = |i: usize, j: usize| (-((theta(i) - theta(j)) / NEAR_RAD).powi(2)).exp();
-        (0..self.count()).map(|i| (0..self.count()).map(|j| weight(i, j)).collect()).collect()
+        Mat::from_fn(self.count(), self.count(), weight)
     }
 
     /// The two angles between which a cosine is, and the share of the second.
@@ -176,17 +178,8 @@ struct Shares {
 }
 
 impl Shares {
-    /// By a Fibonacci lattice over the half vector: theta_h = 90 deg t with t = knee (e^(range x) - 1), dense where the base's lobe is.
-    fn seen_from(
-        angles: &Angles,
-        cos_theta: f64,
-        base: &Brdf,
-        coat: &Coat,
-        interface: &Interface,
-        lobe_width: f64,
-    ) -> Self {
-        let knee = (0.25 * lobe_width).clamp(1e-4, 1.0);
-        let range = knee.recip().ln_1p();
+    /// By a Fibonacci lattice over the half vector, dense where the base's lobe is.
+    fn seen_from(angles: &Angles, cos_theta: f64, base: &Brdf, coat: &Coat, interface: &Interface, knee: f64) -> Self {
         let w_o = dvec3((1.0 - cos_theta * cos_theta).sqrt(), 0.0, cos_theta);
         let none = || vec![DVec3::ZERO; angles.count()];
         let mut shares = Self { off_base: none(), back: none(), out: none() };
@@ -197,13 +190,14 @@ impl Shares {
             base.evaluate(turned(w), turned(w_o))
         };
         for i in 0..POINTS {
-            let t = knee * (range * (i as f64 + 0.5) / POINTS as f64).exp_m1();
-            let (sin_theta_h, cos_theta_h) = (FRAC_PI_2 * t).sin_cos();
-            let solid_angle = sin_theta_h * FRAC_PI_2 * (t + knee) * range * TAU / POINTS as f64;
+            // In right angles.
+            let theta_h = exponential((i as f64 + 0.5) / POINTS as f64, knee);
+            let (sin_theta_h, cos_theta_h) = (FRAC_PI_2 * theta_h).sin_cos();
+            let solid_angle = sin_theta_h * FRAC_PI_2 * exponential_slope(theta_h, knee) * TAU / POINTS as f64;
             let phi = TAU * ((i * GENERATOR % POINTS) as f64 + 0.5) / POINTS as f64;
             let h = (DVec2::from_angle(phi) * sin_theta_h).extend(cos_theta_h);
             let cos_theta_d = w_o.dot(h);
-            let w = 2.0 * cos_theta_d * h - w_o;
+            let w = reflect(w_o, h);
             if cos_theta_d > 0.0 && w.z > 0.0 {
                 // dw = 4 (w_o . h) dw_h.
                 let share = f(w, i) * (w.z * 4.0 * cos_theta_d * solid_angle);
@@ -236,62 +230,38 @@ impl Shares {
 }
 
 /// For each angle from which light leaves: square root of the factor of the base's lobe, and what leaves evenly, as a share of what got in.
-fn of_channel(shares: &[Shares], near: &Matrix, channel: usize) -> Vec<(f64, f64)> {
-    let matrix = |of: fn(&Shares) -> &Vec<DVec3>| -> Matrix {
-        shares.iter().map(|row| of(row).iter().map(|share| share[channel]).collect()).collect()
-    };
+fn of_channel(shares: &[Shares], near: &Mat<f64>, channel: usize) -> Vec<(f64, f64)> {
+    let count = shares.len();
+    let matrix = |of: fn(&Shares) -> &Vec<DVec3>| Mat::from_fn(count, count, |i, j| of(&shares[i])[j][channel]);
     let [off_base, back, out] = [matrix(|row| &row.off_base), matrix(|row| &row.back), matrix(|row| &row.out)];
     let all_orders = geometric_series(&back);
-    let later = product(&all_orders, &product(&back, &off_base));
-    let once: Vec<f64> = out.iter().map(|row| row.iter().sum()).collect();
-    let total = times(&all_orders, &once);
+    let later = &all_orders * &back * &off_base;
+    let once = &out * Col::<f64>::ones(count);
+    let total = &all_orders * &once;
     // Of light about the mirror direction, how much comes later to what comes at once.
     let ratio = |i: usize| {
-        let [later, at_once] = [&later[i], &off_base[i]].map(|row| dot(row, &near[i]));
+        let [later, at_once] = [&later, &off_base].map(|shares| shares.row(i) * near.row(i).transpose());
         if at_once > 0.0 { later / at_once } else { 0.0 }
     };
-    let factors: Vec<f64> = (0..shares.len()).map(|i| ratio(i).max(0.0).sqrt()).collect();
-    let of_lobe: Vec<f64> = times(&out, &factors).iter().zip(&factors).map(|(sum, factor)| sum * factor).collect();
+    let factors = Col::from_fn(count, |i| ratio(i).max(0.0).sqrt());
+    let by_lobe = &out * &factors;
     let left = |i: usize| COUNTED * (total[i] - once[i]).max(0.0);
     // No more may leave by the lobe than leaves at all.
-    let capped = |i: usize| if of_lobe[i] > left(i) { factors[i] * left(i) / of_lobe[i] } else { factors[i] };
-    let factors: Vec<f64> = (0..shares.len()).map(capped).collect();
-    let of_lobe = times(&out, &factors);
-    let first_open = shares.len() - OPEN;
-    (first_open..shares.len()).map(|i| (factors[i], (left(i) - factors[i] * of_lobe[i]).max(0.0))).collect()
-}
-
-/// Rows of numbers.
-type Matrix = Vec<Vec<f64>>;
-
-fn product(a: &Matrix, b: &Matrix) -> Matrix {
-    let row = |row: &Vec<f64>| {
-        let mut sum = vec![0.0; b[0].len()];
-        for (factor, line) in row.iter().zip(b) {
-            sum.iter_mut().zip(line).for_each(|(sum, value)| *sum += factor * value);
-        }
-        sum
+    let capped = |i: usize| {
+        let of_lobe = factors[i] * by_lobe[i];
+        if of_lobe > left(i) { factors[i] * left(i) / of_lobe } else { factors[i] }
     };
-    a.iter().map(row).collect()
-}
-
-fn times(a: &Matrix, vector: &[f64]) -> Vec<f64> {
-    a.iter().map(|row| dot(row, vector)).collect()
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
+    let factors = Col::from_fn(count, capped);
+    let by_lobe = &out * &factors;
+    (count - OPEN..count).map(|i| (factors[i], (left(i) - factors[i] * by_lobe[i]).max(0.0))).collect()
 }
 
 /// 1 + B + ... + B^(2^DOUBLINGS - 1), doubled again and again: with no loss at all there is no end to it.
-fn geometric_series(b: &Matrix) -> Matrix {
-    let unit = |i: usize| (0..b.len()).map(|j| f64::from(u8::from(i == j))).collect();
-    let mut sum: Matrix = (0..b.len()).map(unit).collect();
-    let mut power = b.clone();
+fn geometric_series(b: &Mat<f64>) -> Mat<f64> {
+    let (mut sum, mut power) = (Mat::identity(b.nrows(), b.ncols()), b.clone());
     for _ in 0..DOUBLINGS {
-        let next = product(&power, &sum);
-        sum.iter_mut().flatten().zip(next.iter().flatten()).for_each(|(sum, next)| *sum += next);
-        power = product(&power, &power);
+        sum = &sum + &power * &sum;
+        power = &power * &power;
     }
     sum
 }
