@@ -82,6 +82,9 @@ impl DeviceScene {
     pub fn new(device: &Arc<Device>, prepared: &Prepared, round: &Round) -> Result<Self> {
         let &Prepared { method, sampling, ref view, ref environment, .. } = prepared;
         let shader = shade_shader(method)?;
+        if prepared.show_environment {
+            BackgroundMap::check_size(device, environment)?;
+        }
         // Held, so that it is opened once for all that is compiled.
         pipelines(round, device)?;
         let way_around = round.ask(&CheckDevice(device))?.way_around(device)?;

@@ -41,7 +41,9 @@ pub use microfacet::{
     Axes, Distribution, NARROWEST_ALPHA, Roughness, Tap, fresnel_conductor, fresnel_dielectric, ggx_lobe,
 };
 pub use models::custom::CustomBrdf;
-pub use models::layered::{Coat, base_files, base_files_of, change_base_files, resolve_base_files};
+pub use models::layered::{
+    Coat, base_file, base_file_in, base_files, base_files_from, base_files_of, change_base_files, resolve_base_files,
+};
 pub use models::*;
 pub use parameters::{Domain, Parameter, Parameters, Scale, Spacing, as_number, channels, parameter, set_parameter};
 pub use record::{MaterialRecord, ThreadTableRecord};

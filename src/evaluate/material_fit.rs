@@ -57,6 +57,8 @@ impl Fit {
     pub fn to_toml(&self, name: &str) -> String {
         let Self { model, parameters, error, error_of_black } = self;
         let relative = 100.0 * error / error_of_black;
+        // It stands in a comment, of one line.
+        let name = name.escape_debug();
         format!(
             "# The {model} nearest to {name}: RMS of ln(1 + f cos theta_i) {error:.5}, {relative:.2} % of that of {name} itself.\n\
              model = \"{model}\"\n{parameters}"
@@ -75,7 +77,7 @@ pub fn names() -> Vec<&'static str> {
 /// Fits each model that `name`, one of [`names`], stands for, with each of its choices, to `brdf`; the nearest is first.
 ///
 /// # Errors
-/// Another name; a BRDF that is anisotropic, or black.
+/// Another name; a BRDF that is anisotropic, black, or nearer to black than to any of the models.
 pub fn fit(brdf: &Brdf, name: &str) -> Result<Vec<Fit>> {
     let refused = |problem, remedy| Err(Error::input("the BRDF", problem, remedy));
     if !brdf.is_isotropic() {
@@ -88,7 +90,13 @@ pub fn fit(brdf: &Brdf, name: &str) -> Result<Vec<Fit>> {
     let mut fits =
         candidates(name)?.into_iter().map(|candidate| candidate.fit(&samples)).collect::<Result<Vec<_>>>()?;
     fits.sort_by(|a, b| a.error.total_cmp(&b.error));
-    Ok(fits)
+    match fits.first() {
+        Some(nearest) if nearest.error >= nearest.error_of_black => refused(
+            "is so dark that black is nearer to it than what the model can be",
+            "fit a material that reflects more",
+        ),
+        _ => Ok(fits),
+    }
 }
 
 /// A model of which some parameters are given.

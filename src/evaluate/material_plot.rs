@@ -8,7 +8,7 @@ use plotters::prelude::*;
 use rayon::prelude::*;
 
 use super::material_curves::{CELLS, CHANNELS, LIGHTS, Side, albedo_angles_deg, in_plane};
-use super::plots::{GRID, TEXT};
+use super::plots::{GRID, TEXT, without_controls};
 use crate::brdf::Brdf;
 use crate::error::{Error, Result};
 
@@ -30,7 +30,7 @@ pub fn svg(brdf: &Brdf, name: &str, path: &Path) -> Result<String> {
         let area = SVGBackend::with_string(&mut svg, (3 * SIDE_PX, sides.len() as u32 * SIDE_PX)).into_drawing_area();
         draw(&area, &sides, name).map_err(|cause| Error::unwritable(path, cause.to_string()))?;
     }
-    Ok(svg)
+    Ok(without_controls(&svg))
 }
 
 /// What captions say of a side among `count`.

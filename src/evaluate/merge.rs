@@ -46,7 +46,8 @@ pub fn merged<'a>(files: impl IntoIterator<Item = (&'a Path, Vec<Row>)>) -> Resu
                 let of = (method.clone(), *threads, scene.clone(), shard.count, combinations);
                 parts.entry(of).or_default().push(shard);
             }
-            all.push(Row { shard: None, combinations: None, ..row });
+            // Together they are a whole one.
+            all.push(Row { shard: row.combinations.map(|_| Shard::WHOLE), ..row });
         }
     }
     for ((method, threads, scene, count, combinations), there) in parts {
@@ -56,7 +57,10 @@ pub fn merged<'a>(files: impl IntoIterator<Item = (&'a Path, Vec<Row>)>) -> Resu
             if rows < wanted {
                 let extent = if rows == 0 { String::new() } else { format!("{} of the {wanted} of ", wanted - rows) };
                 let problem = format!("lack {extent}{shard} of {method} with {threads} on {scene}");
-                let remedy = format!("measure it with --shard {shard}, and give all parts");
+                let remedy = match shard {
+                    Shard::WHOLE => "measure the sweep to its end".to_owned(),
+                    part => format!("measure it with --shard {part}, and give all parts"),
+                };
                 return Err(Error::input("the parts of a sweep", problem, remedy));
             }
         }
@@ -86,7 +90,7 @@ mod tests {
         };
         let merge = |rows: Vec<Row>| merged([(Path::new("a.json"), rows)]);
         let all = [part("gold", "1/3"), part("clay", "2/3"), part("satin", "3/3")];
-        assert!(merge(all.to_vec()).unwrap().iter().all(|row| row.shard.is_none()));
+        assert!(merge(all.to_vec()).unwrap().iter().all(|row| row.shard == Some(Shard::WHOLE)));
         for (missing, name) in ["1/3", "2/3", "3/3"].iter().enumerate() {
             let mut rows = all.to_vec();
             rows.remove(missing);
@@ -102,7 +106,10 @@ mod tests {
         let error = merge([&interrupted[..], &[second]].concat()).unwrap_err().to_string();
         assert!(error.contains("lack 1 of the 2 of 3/3 of paper with 4 on s"), "{error}");
         let rest = ["2/3", "3/3"].map(|shard| of_five(&part(shard, shard)));
-        assert!(merge([&interrupted[..], &rest].concat()).unwrap().iter().all(|row| row.combinations.is_none()));
+        assert!(merge([&interrupted[..], &rest].concat()).unwrap().iter().all(|row| row.combinations == Some(5)));
+        let alone = Row { combinations: Some(2), ..part("gold", "1/1") };
+        let error = merge(vec![alone]).unwrap_err().to_string();
+        assert!(error.contains("lack 1 of the 2 of 1/1 of paper") && error.contains("to its end"), "{error}");
         let error = merge(vec![Row { combinations: Some(1), ..part("gold", "1/99999999999999999") }]).unwrap_err();
         assert!(error.to_string().contains("part 1/99999999999999999 of a sweep of 1 comb"), "{error}");
         // Another method may have been shared by others.

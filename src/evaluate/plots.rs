@@ -263,7 +263,7 @@ impl Chart {
             let area = SVGBackend::with_string(&mut svg, self.size_px()).into_drawing_area();
             self.draw(&area).map_err(|cause| cause.to_string())?;
         }
-        Ok(svg)
+        Ok(without_controls(&svg))
     }
 
     /// Width and height, with room for all names.
@@ -331,6 +331,11 @@ impl Chart {
         area.present()?;
         Ok(())
     }
+}
+
+/// `svg` without the control characters that names may have and XML may not.
+pub(super) fn without_controls(svg: &str) -> String {
+    svg.chars().map(|c| if c.is_control() && !c.is_whitespace() { char::REPLACEMENT_CHARACTER } else { c }).collect()
 }
 
 /// Those of `ticks` in `range` that are far enough from the one before for both to be labelled.
@@ -414,6 +419,11 @@ mod tests {
         for rows in [vec![], vec![one], vec![zero]] {
             write(&error_charts(&rows), folder.path()).unwrap();
         }
+    }
+
+    #[test]
+    fn names_with_control_characters_are_xml() {
+        assert_eq!(without_controls("a\u{1}b\u{1b}\n<text>"), "a\u{fffd}b\u{fffd}\n<text>");
     }
 
     #[test]

@@ -75,7 +75,7 @@ pub struct Row {
     pub shade_ms: f64,
     /// How it was measured.
     pub settings: Settings,
-    /// Which part of a sweep it is of; none of a whole one.
+    /// Which part of a sweep it is of; a whole one is its only part, 1/1. None of what is in no sweep.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shard: Option<Shard>,
     /// How many combinations of materials and environments the whole sweep has; none where `shard` is none.
@@ -175,8 +175,7 @@ pub fn run(
             let part = |sample: &TrueSample| if sweep.whole_picture { sample.covered_part() } else { 1.0 };
             let expected_rms =
                 sample.as_ref().map(|sample| part(sample).sqrt() * sample.expected_rms(&rendering.radiance));
-            let shard = Some(sweep.cases.shard).filter(|shard| *shard != Shard::WHOLE);
-            let combinations = shard.map(|_| sweep.cases.combination_count());
+            let (shard, combinations) = (Some(sweep.cases.shard), Some(sweep.cases.combination_count()));
             let row = row(place, sweep.settings(place.prepared), &metrics, &rendering);
             measured.rows.push(Row { shard, combinations, expected_rms, ..row });
             if sweep.keep_pictures {

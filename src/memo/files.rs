@@ -40,6 +40,16 @@ impl Files {
         Err(Error::in_file(path, "was changed since it was opened", "open it again"))
     }
 
+    /// What `find` makes of the contents that [`Self::key`] names, which stay as they are kept.
+    pub fn look<T>(&self, path: &Path, find: impl FnOnce(&[u8]) -> T) -> Result<T> {
+        let bytes = self.bytes(path)?;
+        let found = find(&bytes);
+        if let Some((_, kept)) = self.lock().get_mut(path) {
+            kept.get_or_insert(bytes);
+        }
+        Ok(found)
+    }
+
     /// Lets go of contents that nobody took.
     pub fn release(&self) {
         self.lock().values_mut().for_each(|(_, bytes)| *bytes = None);

@@ -94,6 +94,8 @@ pub struct Memo {
     folder: Option<PathBuf>,
     known: Mutex<HashMap<Key, Weak<dyn Any + Send + Sync>>>,
     files: Files,
+    /// What files of these contents name: see [`Memo::file_named_in`].
+    named: Mutex<HashMap<(PathBuf, Key), Option<PathBuf>>>,
 }
 
 /// Where an output came from.
@@ -152,6 +154,21 @@ impl Memo {
     /// A file that cannot be read, or has been changed since.
     pub fn file_bytes(&self, path: &Path) -> Result<Vec<u8>> {
         self.files.bytes(path)
+    }
+
+    /// The file that the one at `path` names, by `find` in the contents that [`Self::file_key`] is the key of; found once for these.
+    ///
+    /// # Errors
+    /// A file that cannot be read, or has been changed since.
+    pub fn file_named_in(&self, path: &Path, find: impl FnOnce(&[u8]) -> Option<PathBuf>) -> Result<Option<PathBuf>> {
+        let named = || self.named.lock().unwrap_or_else(PoisonError::into_inner);
+        let key = (path.to_owned(), self.file_key(path)?);
+        if let Some(found) = named().get(&key) {
+            return Ok(found.clone());
+        }
+        let found = self.files.look(path, find)?;
+        named().insert(key, found.clone());
+        Ok(found)
     }
 
     /// The file at `path` is read anew where its key is asked for next: someone has named it again.

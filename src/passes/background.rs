@@ -53,13 +53,18 @@ struct ClearPush {
 type TileRegion = [[u32; 2]; 2];
 
 impl BackgroundMap {
+    /// An error for an environment that is larger than the device's images can be: better found out before it is filtered.
+    pub fn check_size(device: &Device, environment: &Environment) -> Result<()> {
+        let remedy = "scale it down, or leave the background out (none)";
+        check_map_size(device, environment, [environment.width, environment.height], remedy)
+    }
+
     /// Uploads the map.
     ///
     /// # Errors
     /// No device memory left, or a map wider or higher than the device's images can be.
     pub fn new(device: &Arc<Device>, environment: &Environment) -> Result<Self> {
-        let remedy = "scale it down, or leave the background out (none)";
-        check_map_size(device, environment, [environment.width, environment.height], remedy)?;
+        Self::check_size(device, environment)?;
         let texels = environment.texels.par_iter().map(|&[r, g, b]| [r, g, b, 1.0]);
         let single = vk::Format::R32G32B32A32_SFLOAT;
         let (format, bytes) = if !in_half_floats(environment) && device.filters_linearly(single) {

@@ -158,6 +158,10 @@ pub fn parse_exr(path: &Path, bytes: &[u8]) -> Result<PictureFile> {
         )
     };
     let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(broken)?;
+    if let Some([left, top, right, bottom]) = stored_display_window(bytes).filter(|[l, t, r, b]| r < l || b < t) {
+        let problem = format!("has a display window without a pixel, from {left}, {top} to {right}, {bottom}");
+        return Err(Error::in_file(path, problem, "save it again, with the display window around the picture"));
+    }
     check_sizes(path, &meta, bytes.len())?;
     check_dwa_chunks(&meta, bytes).map_err(broken)?;
     let image: FlatImage = exr::prelude::read()
@@ -213,6 +217,15 @@ pub fn parse_exr(path: &Path, bytes: &[u8]) -> Result<PictureFile> {
         format: Format::Exr,
         attributes: attribute_texts(&image, layer),
     })
+}
+
+/// The display window as it is stored: left, top, right and bottom. The crate takes one without a pixel for another.
+fn stored_display_window(bytes: &[u8]) -> Option<[i32; 4]> {
+    // Its name, its kind and its size.
+    const ATTRIBUTE: &[u8] = b"displayWindow\0box2i\0\x10\0\0\0";
+    let at = bytes.windows(ATTRIBUTE.len()).position(|window| window == ATTRIBUTE)? + ATTRIBUTE.len();
+    let numbers: [[u8; 4]; 4] = bytes.get(at..at + 16)?.as_chunks().0.try_into().ok()?;
+    Some(numbers.map(i32::from_le_bytes))
 }
 
 /// Columns times rows.
@@ -301,8 +314,9 @@ type FlatLayer = Layer<AnyChannels<FlatSamples>>;
 
 type FlatChannel = AnyChannel<FlatSamples>;
 
-/// What red, green, blue, alpha and luminance are called, in any case, after the last dot of a channel's name.
-const COMPONENTS: [&[&str]; 5] = [&["r", "red"], &["g", "green"], &["b", "blue"], &["a", "alpha"], &["y"]];
+/// What red, green, blue, alpha, luminance, and what makes that a colour, are called, in any case, after the last dot of a channel's name.
+const COMPONENTS: [&[&str]; 6] =
+    [&["r", "red"], &["g", "green"], &["b", "blue"], &["a", "alpha"], &["y"], &["x", "ry", "by"]];
 
 /// What renderers call the picture itself, in any case, beside its passes.
 const PICTURES: [&str; 3] = ["combined", "rgba", "beauty"];
@@ -313,13 +327,13 @@ struct Group<'a> {
     /// Without its last dot; may be empty.
     prefix: String,
     /// In the order of [`COMPONENTS`].
-    channels: [Option<&'a FlatChannel>; 5],
+    channels: [Option<&'a FlatChannel>; COMPONENTS.len()],
 }
 
 impl<'a> Group<'a> {
     /// All of them, in the order of their prefixes.
     fn all(layer: &'a FlatLayer) -> impl Iterator<Item = Self> {
-        let mut groups = BTreeMap::<String, [Option<&FlatChannel>; 5]>::new();
+        let mut groups = BTreeMap::<String, [Option<&FlatChannel>; COMPONENTS.len()]>::new();
         for channel in &layer.channel_data.list {
             let name = string(&channel.name);
             let (prefix, last) = name.rsplit_once('.').unwrap_or(("", &name));
@@ -336,9 +350,10 @@ impl<'a> Group<'a> {
         Some([r?, g?, b?])
     }
 
-    /// The luminance, in the place of colour.
+    /// The luminance, in the place of colour: not that of luminance and chroma, or of X, Y and Z.
     fn grey(&self) -> Option<[&'a FlatChannel; 3]> {
-        self.channels[4].map(|luminance| [luminance; 3])
+        let [.., luminance, of_colour] = self.channels;
+        luminance.filter(|_| of_colour.is_none()).map(|luminance| [luminance; 3])
     }
 
     /// That of the channels, or else of the part of the file.
@@ -421,6 +436,33 @@ mod tests {
     }
 
     #[test]
+    fn a_display_window_without_a_pixel_is_an_error() {
+        let picture =
+            Image::from_channels((2, 1), SpecificChannels::rgb(|_: Vec2<usize>| (1.0_f32, 0.5_f32, 0.25_f32)));
+        let mut bytes = Cursor::new(Vec::new());
+        picture.write().to_buffered(&mut bytes).unwrap();
+        let bytes = bytes.into_inner();
+        assert_eq!(stored_display_window(&bytes), Some([0, 0, 1, 0]));
+        let name = b"displayWindow";
+        let at = bytes.windows(name.len()).position(|window| window == name).unwrap() + name.len() + 1 + 6 + 4;
+        for window in [[0, 0, -1, 0], [0, 0, 1, -1], [1, 0, 0, 0]] {
+            let mut bytes = bytes.clone();
+            bytes[at..at + 16].copy_from_slice(&window.map(i32::to_le_bytes).concat());
+            let error = parse_exr(Path::new("test.exr"), &bytes).unwrap_err().to_string();
+            assert!(error.contains("has a display window without a pixel"), "{window:?}: {error}");
+        }
+    }
+
+    #[test]
+    fn luminance_is_grey_only_where_there_is_no_colour_beside_it() {
+        assert_eq!(red_of(&[(None, &["Y", "Z", "A"])]), 1.0);
+        for colour in [&["X", "Y", "Z"][..], &["Y", "RY", "BY"]] {
+            let error = picture_of(&[(None, colour)]).unwrap_err().to_string();
+            assert!(error.contains("has no channels R, G, B"), "{colour:?}: {error}");
+        }
+    }
+
+    #[test]
     fn colours_of_other_primaries_are_converted_and_alpha_is_not() {
         let red = Vec2(0.713, 0.293);
         let (green, blue, white) = (Vec2(0.165, 0.830), Vec2(0.128, 0.044), Vec2(0.32168, 0.33767));
@@ -430,8 +472,8 @@ mod tests {
         assert!(picture.rgba[0].iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-3), "{:?}", picture.rgba);
     }
 
-    /// The red of a picture of one pixel, of channels of these names in parts of these names, whose values are 1, 2, 3 and so on.
-    fn red_of(parts: &[(Option<&str>, &[&str])]) -> f32 {
+    /// A picture of one pixel, of channels of these names in parts of these names, whose values are 1, 2, 3 and so on.
+    fn picture_of(parts: &[(Option<&str>, &[&str])]) -> Result<PictureFile> {
         let mut value = 0.0;
         let layer = |(name, channels): &(Option<&str>, &[&str])| {
             let channel = |name: &&str| {
@@ -446,7 +488,11 @@ mod tests {
         let image = Image::from_layers(ImageAttributes::with_size((1, 1)), layers);
         let mut bytes = Cursor::new(Vec::new());
         image.write().to_buffered(&mut bytes).unwrap();
-        parse_exr(Path::new("test.exr"), &bytes.into_inner()).unwrap().rgba[0][0]
+        parse_exr(Path::new("test.exr"), &bytes.into_inner())
+    }
+
+    fn red_of(parts: &[(Option<&str>, &[&str])]) -> f32 {
+        picture_of(parts).unwrap().rgba[0][0]
     }
 
     #[test]

@@ -297,7 +297,7 @@ impl Prepared {
                     "an object of \"{name}\", which is anisotropic, has no `tangent`: it is brushed around its y axis"
                 ),
                 Some(_) => tracing::warn!(
-                    "{} has no texture coordinates for its `tangent`: \"{name}\" is brushed around its y axis",
+                    "{} has no texture coordinates that its `tangent` could go by: \"{name}\" is brushed around its y axis",
                     settings.mesh
                 ),
             }

@@ -181,8 +181,8 @@ mod tests {
             let custom = CustomMesh::new("test", CORNERS.to_vec(), TRIANGLES.to_vec(), normals, uvs).unwrap();
             let (path, text) = (Path::new("test.obj"), obj(has_normals, has_uvs));
             assert_eq!(custom.mesh(false).unwrap().mesh, Mesh::FILES.parse(path, text.as_bytes()).unwrap());
-            let brushed = custom.mesh(true).unwrap().with_tangents();
-            assert_eq!(brushed, TexturedMesh::FILES.parse(path, text.as_bytes()).unwrap().with_tangents());
+            let brushed = custom.mesh(true).unwrap().with_tangents("custom");
+            assert_eq!(brushed, TexturedMesh::FILES.parse(path, text.as_bytes()).unwrap().with_tangents("test.obj"));
             assert_eq!((brushed.indices.len(), brushed.tangents.is_empty()), (9, !has_uvs));
         }
     }

@@ -1,9 +1,10 @@
 //! The scene file: TOML to and from [`Scene`], with errors that name file, line and key.
 use std::collections::HashSet;
+use std::fmt;
 use std::ops::{RangeBounds, RangeInclusive};
 use std::path::{Path, PathBuf};
 
-use serde::de::{Deserializer, Error as _};
+use serde::de::{Deserializer, Error as _, Visitor};
 use serde::{Deserialize, Serialize};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -349,10 +350,32 @@ where
     if range.contains(&value) { Ok(value) } else { Err(D::Error::custom(format!("{value:?} must be {what}"))) }
 }
 
-/// An integer in `range`: read as wide as TOML has them, so that -1 and 10^12 get the same message as 0.
+/// An integer in `range`: -1, 10^12 and 10^30 get the same message as 0.
 fn integer<'de, D: Deserializer<'de>>(deserializer: D, range: RangeInclusive<u32>) -> Result<u32, D::Error> {
-    let (low, high) = (i64::from(*range.start()), i64::from(*range.end()));
-    checked(deserializer, low..=high, &format!("{low} to {high}")).map(|value| value as u32)
+    deserializer.deserialize_any(IntegerIn(range))
+}
+
+struct IntegerIn(RangeInclusive<u32>);
+
+impl Visitor<'_> for IntegerIn {
+    type Value = u32;
+
+    fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        write!(f, "a whole number from {} to {}", self.0.start(), self.0.end())
+    }
+
+    fn visit_i64<E: serde::de::Error>(self, value: i64) -> Result<u32, E> {
+        self.visit_i128(value.into())
+    }
+
+    fn visit_u64<E: serde::de::Error>(self, value: u64) -> Result<u32, E> {
+        self.visit_i128(value.into())
+    }
+
+    fn visit_i128<E: serde::de::Error>(self, value: i128) -> Result<u32, E> {
+        let of_range = u32::try_from(value).ok().filter(|value| self.0.contains(value));
+        of_range.ok_or_else(|| E::custom(format!("{value} must be {} to {}", self.0.start(), self.0.end())))
+    }
 }
 
 /// Width or height of an image.

@@ -648,7 +648,7 @@ mod tests {
                     textured.mesh.indices.len() == mesh.indices.len()
                         && textured.uvs.len() == textured.mesh.positions.len()
                 );
-                let brushed = textured.with_tangents();
+                let brushed = textured.with_tangents("test.obj");
                 assert!(brushed.indices.len() == mesh.indices.len(), "{text}");
                 assert!(brushed.tangents.iter().all(|tangent| tangent.is_normalized()), "{text}");
                 brushed_meshes += usize::from(!brushed.tangents.is_empty());

@@ -18,8 +18,8 @@ impl TexturedMesh {
         FileKind { what: "mesh", formats: &[TEXTURED_FORMAT], builtin_names: || mesh::builtin_names().to_vec() };
 
     /// The mesh with its tangents, or without if no triangle has texture coordinates with an area. Vertices are split where tangents differ.
-    /// Where others have none, tangents go by [`TangentRule::DEFAULT`], and a warning says so.
-    pub fn with_tangents(self) -> Mesh {
+    /// Where others have none, tangents go by [`TangentRule::DEFAULT`], and a warning says so of the mesh of this `name`.
+    pub fn with_tangents(self, name: impl std::fmt::Display) -> Mesh {
         let Self { mesh, uvs } = self;
         let corners = Corners::of(&mesh, &uvs);
         let missing = corners.tangents.iter().filter(|tangent| tangent.is_none()).count();
@@ -28,7 +28,7 @@ impl TexturedMesh {
         }
         if missing > 0 {
             tracing::warn!(
-                "{missing} of {} corners of a mesh have no texture coordinates to go by: they are brushed around the y axis",
+                "{name}: {missing} of {} corners have no texture coordinates to go by: they are brushed around the y axis",
                 mesh.indices.len()
             );
         }
@@ -122,7 +122,7 @@ mod tests {
     use super::*;
 
     fn brushed(obj: &str) -> Mesh {
-        TexturedMesh::FILES.parse(Path::new("test.obj"), obj.as_bytes()).unwrap().with_tangents()
+        TexturedMesh::FILES.parse(Path::new("test.obj"), obj.as_bytes()).unwrap().with_tangents("test.obj")
     }
 
     /// Two squares side by side that face +z, whose texture is the second's mirror image in the first.

@@ -1,9 +1,9 @@
 //! Fitted threads. Twin of glsl/methods/fitted.glsl, by functions of the same names.
-use std::f32::consts::{FRAC_PI_2, PI};
+use std::f32::consts::PI;
 
 use glam::{DVec3, IVec2, Mat3, Vec2, Vec3, Vec4};
 
-use super::{CpuShader, Point, Surface, smoothstep, turned};
+use super::{CpuShader, Point, Surface, rows_around, smoothstep, turned};
 use crate::brdf::{MIN_COS_THETA_D, MaterialRecord, NARROWING_COSINES};
 use crate::environment::sources::clearance;
 use crate::environment::{LightMap, SourceRecord};
@@ -317,9 +317,8 @@ struct Rows {
 impl Rows {
     /// Twin of `rows_at`.
     fn at(surface: &Surface, threads: &FittedTable) -> Self {
-        let row = (surface.theta_o * ((threads.rows - 1) as f32 / FRAC_PI_2)).min((threads.rows - 1) as f32);
-        let (below, t) = (row as usize, row.fract());
-        let above = (below + 1).min(threads.rows - 1);
+        let (row, [below, above]) = rows_around(surface.theta_o, threads.rows);
+        let t = row.fract();
         let mut rows = Self::even(surface, threads, [below, above], t);
         let towards = towards_row_above(row, threads.rows, threads.rim_power);
         if towards != t {

@@ -4,7 +4,7 @@ use std::f32::consts::{FRAC_1_PI, FRAC_PI_2, FRAC_PI_4, PI, TAU};
 use glam::{Vec2, Vec3};
 
 use super::random::to_unit;
-use super::turned;
+use super::{rows_around, turned};
 use crate::shader_constants::importance_sampling::DIFFUSE_SHARE;
 use crate::threads::SliceTable;
 use crate::threads::azimuths::Azimuths;
@@ -73,13 +73,9 @@ impl<'a> SliceRows<'a> {
     /// Twin of `slice_rows`.
     pub(super) fn new(table: &'a SliceTable, w_o: Vec3, phi_o: Vec2) -> Self {
         let count = table.rows;
-        let position = (w_o.x.atan2(w_o.z) * ((count - 1) as f32 / FRAC_PI_2)).min((count - 1) as f32);
-        let below = position as usize;
-        let rows = |azimuth: usize| {
-            let rows = [below, (below + 1).min(count - 1)].map(|row| azimuth * count + row);
-            rows.map(|row| &table.cdfs[row * ROW_SIZE..][..ROW_SIZE])
-        };
-        let t = position - below as f32;
+        let (position, around) = rows_around(w_o.x.atan2(w_o.z), count);
+        let rows = |azimuth: usize| around.map(|row| &table.cdfs[(azimuth * count + row) * ROW_SIZE..][..ROW_SIZE]);
+        let t = position.fract();
         if table.azimuths == 1 {
             let [below, above] = rows(0);
             return Self { below, above, t, next: None };

@@ -18,6 +18,7 @@ use crate::threads::{FittedTable, SliceTable, SplitSum, Threads};
 use glam::{Mat3, UVec2, Vec2, Vec3, Vec4};
 use low_discrepancy::Stream;
 use random::random_bits;
+use std::f32::consts::FRAC_PI_2;
 
 mod cosine;
 mod environment;
@@ -97,6 +98,13 @@ impl Surface {
         let cos_theta_o = self.frame.z_axis.dot(self.w_o).max(MAX_THETA_O_DEG.to_radians().cos() as f32);
         Vec3::new(self.frame.x_axis.dot(self.w_o), 0.0, cos_theta_o).normalize()
     }
+}
+
+/// Where a view angle (radians) is among `count` rows, in single precision as shaders have it; and the rows below and above.
+fn rows_around(theta_o: f32, count: usize) -> (f32, [usize; 2]) {
+    let last = (count - 1) as f32;
+    let row = (theta_o * (last / FRAC_PI_2)).min(last);
+    (row, [row as usize, (row as usize + 1).min(count - 1)])
 }
 
 /// GLSL's function of this name, between two edges.

@@ -1,9 +1,7 @@
 //! The paper's estimate, equation (2). Twin of glsl/methods/paper.glsl, by functions of the same names.
-use std::f32::consts::FRAC_PI_2;
-
 use glam::{Mat3, Vec2, Vec3, Vec4};
 
-use super::{Point, Surface, smoothstep, turned};
+use super::{Point, Surface, rows_around, smoothstep, turned};
 use crate::shader_constants::paper::{FACING_DEG, TURNING_DEG};
 use crate::tangent::tangent_along;
 use crate::threads::rim::towards_row_above;
@@ -53,12 +51,9 @@ pub(super) fn estimate(point: &Point) -> Vec3 {
 
 impl Paper<'_> {
     fn rows_at(&self, surface: &Surface) -> Rows {
-        let count = self.threads.rows;
-        let last = (count - 1) as f32;
-        let row = (surface.theta_o * (last / FRAC_PI_2)).min(last);
-        let below = row as usize;
-        let towards = towards_row_above(row, count, self.threads.rim_power);
-        Rows { below, above: (below + 1).min(count - 1), t: row - below as f32, towards }
+        let (row, [below, above]) = rows_around(surface.theta_o, self.threads.rows);
+        let towards = towards_row_above(row, self.threads.rows, self.threads.rim_power);
+        Rows { below, above, t: row.fract(), towards }
     }
 
     fn thread(&self, row: usize, k: usize) -> Vec4 {

@@ -1,9 +1,7 @@
 //! The split sum. Twin of glsl/methods/split_sum.glsl, by functions of the same names.
-use std::f32::consts::FRAC_PI_2;
-
 use glam::Vec3;
 
-use super::Point;
+use super::{Point, rows_around};
 use crate::environment::level_of_alpha;
 use crate::threads::rim::towards_row_above;
 use crate::threads::split_sum::ROWS;
@@ -13,8 +11,8 @@ pub(super) fn estimate(point: &Point) -> Vec3 {
     let surface = &point.surface;
     let split_sum = point.split_sum();
     let light = point.twin.light.prefiltered.as_ref().expect("the method looks prefiltered light up");
-    let row = (surface.theta_o * ((ROWS - 1) as f32 / FRAC_PI_2)).min((ROWS - 1) as f32);
-    let [below, above] = [row as usize, (row as usize + 1).min(ROWS - 1)].map(|row| split_sum.albedos[row]);
+    let (row, rows) = rows_around(surface.theta_o, ROWS);
+    let [below, above] = rows.map(|row| split_sum.albedos[row]);
     let towards = towards_row_above(row, ROWS, split_sum.rim_power);
     let [diffuse, specular] = [0, 1].map(|part| below[part].as_vec3().lerp(above[part].as_vec3(), towards));
     let w_o = surface.view_direction();

@@ -1,12 +1,13 @@
 //! Loads what scenes name: meshes, environments and BRDFs, with their tables. A file is its contents, so an edited one is another.
 use crate::Result;
-use crate::brdf::{Brdf, LobeShape, base_files, base_files_of, tabulate};
+use crate::brdf::{Brdf, LobeShape, base_file, base_file_in, base_files_from, tabulate};
 use crate::environment::{CustomEnvironment, Environment};
 use crate::error::Error;
 use crate::files::FileKind;
 use crate::memo::{Key, Keyed, Memo, Round, Step};
 use crate::scene::{CustomMesh, EnvironmentSource, MaterialSource, Mesh, MeshSource, Source, TexturedMesh};
 use crate::threads::SliceTable;
+use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 
 /// The key of what `source` names, in a file of one of the formats `files`, or with the digest that `digest` tells.
@@ -27,6 +28,27 @@ fn key_of<T, C>(
 fn file_key<T>(memo: &Memo, files: &FileKind<T>, path: &Path) -> Result<Key> {
     let format = files.format_of(path)?;
     Ok(Key::builder("file").text(format.extension).key(memo.file_key(path)?).build())
+}
+
+/// The base `first` and those below it, as their contents were when they were looked at.
+fn bases(memo: &Memo, first: Option<PathBuf>) -> Result<Vec<PathBuf>> {
+    let problem = RefCell::new(Ok(()));
+    let base_of = |path: &Path| {
+        base_of(memo, path).unwrap_or_else(|error| {
+            *problem.borrow_mut() = Err(error.within("base"));
+            None
+        })
+    };
+    let bases = base_files_from(first, base_of);
+    problem.into_inner().map(|()| bases)
+}
+
+/// The base that the file at `path` names.
+fn base_of(memo: &Memo, path: &Path) -> Result<Option<PathBuf>> {
+    if !Brdf::is_model_file(path) {
+        return Ok(None);
+    }
+    memo.file_named_in(path, |bytes| base_file_in(path, bytes))
 }
 
 /// The key of what `key` names over these files as its bases.
@@ -74,11 +96,11 @@ impl Step for LoadBrushedMesh<'_> {
         match self.0 {
             Source::File(path) => {
                 let bytes = round.memo().file_bytes(path)?;
-                Ok(TexturedMesh::FILES.parse_watched(path, &bytes, round.observer())?.with_tangents())
+                Ok(TexturedMesh::FILES.parse_watched(path, &bytes, round.observer())?.with_tangents(path.display()))
             }
             // None has texture coordinates.
             Source::Builtin(name) => Mesh::builtin(name),
-            Source::Custom(custom) => Ok(custom.mesh(true)?.with_tangents()),
+            Source::Custom(custom) => Ok(custom.mesh(true)?.with_tangents(self.0)),
         }
     }
 }
@@ -122,11 +144,12 @@ impl Step for LoadMaterial<'_> {
         Ok(match self.0 {
             MaterialSource::File(path) => {
                 let file = file_key(memo, &Brdf::FILES, path)?;
-                with_files(memo, file, &base_files_of(path)).map_err(|error| error.within(path.display()))?
+                let over = |first| with_files(memo, file, &bases(memo, first)?);
+                over(base_of(memo, path)?).map_err(|error| error.within(path.display()))?
             }
-            MaterialSource::Model { model, parameters } if !base_files(parameters).is_empty() => {
+            MaterialSource::Model { model, parameters } if base_file(parameters).is_some() => {
                 let key = Key::builder("layered").text(model).text(&parameters.to_string()).build();
-                with_files(memo, key, &base_files(parameters))?
+                with_files(memo, key, &bases(memo, base_file(parameters))?)?
             }
             // Other models are made at once, so they are known by what they are.
             source => Key::builder("model").bytes(load(memo, source)?.fingerprint().as_bytes()).build(),
@@ -144,10 +167,10 @@ impl Step for LoadMaterial<'_> {
 
 fn load(memo: &Memo, source: &MaterialSource) -> Result<Brdf> {
     // Bases are read by their names where a coat is made: they have to be what its key names.
-    let check_bases = |bases: &[PathBuf]| bases.iter().try_for_each(|base| memo.file_bytes(base).map(drop));
+    let check_bases = |first| bases(memo, first)?.iter().try_for_each(|base| memo.file_bytes(base).map(drop));
     match source {
         MaterialSource::File(path) => {
-            check_bases(&base_files_of(path))?;
+            check_bases(base_of(memo, path)?)?;
             Brdf::FILES.parse(path, &memo.file_bytes(path)?)
         }
         MaterialSource::Builtin(name) => Brdf::builtin(name).ok_or_else(|| {
@@ -155,7 +178,7 @@ fn load(memo: &Memo, source: &MaterialSource) -> Result<Brdf> {
             Error::input(format!("material \"{name}\""), "is neither built in nor a file", remedy)
         }),
         MaterialSource::Model { model, parameters } => {
-            check_bases(&base_files(parameters))?;
+            check_bases(base_file(parameters))?;
             Brdf::from_parameters(model, parameters.clone())
         }
         MaterialSource::Custom(custom) => Ok(Brdf::Custom(custom.clone())),
@@ -259,5 +282,21 @@ mod tests {
         assert!(error.contains("base.toml") && error.contains("was changed"), "{error}");
         memo.look_again(&base);
         ask(0.3).unwrap();
+
+        // Another base in the file of a coat, which nobody has named again.
+        let coat = folder.path().join("coat.toml");
+        let write = |base: &str| {
+            std::fs::write(&coat, format!("model = 'layered'\nbase = '{base}'\ncoat = {{ alpha = 0.1, ior = 1.5 }}"))
+        };
+        write("base.toml").unwrap();
+        let source = MaterialSource::File(coat.clone());
+        let round = memo.round(&());
+        let first = round.ask(&LoadMaterial(&source)).unwrap().fingerprint();
+        for other in ["clay", "absent.toml"] {
+            write(other).unwrap();
+            assert_eq!(round.ask(&LoadMaterial(&source)).unwrap().fingerprint(), first, "{other}");
+        }
+        memo.look_again(&coat);
+        assert!(round.ask(&LoadMaterial(&source)).unwrap_err().to_string().contains("absent.toml"));
     }
 }

@@ -144,6 +144,7 @@ fn galleries_and_reports_that_cannot_be_made_are_refused() {
     fs::write(folder.path().join("empty.json"), "[]").unwrap();
     fs::write(folder.path().join("other.json"), "{\"rows\": 3}").unwrap();
     fs::write(folder.path().join("rows.json"), ROWS).unwrap();
+    fs::write(folder.path().join("below.json"), ROWS.replacen("0.1", "-0.1", 1)).unwrap();
     for (arguments, names) in [
         ("gallery", &["--plot"][..]),
         ("gallery --plot small.png", &["small.png"]),
@@ -166,6 +167,7 @@ fn galleries_and_reports_that_cannot_be_made_are_refused() {
         ("report out --from small.png", &["small.png", "bench error --json"]),
         ("report out --from empty.json", &["empty.json", "no measurements"]),
         ("report out --from other.json", &["other.json", "no measurements"]),
+        ("report out --from below.json", &["below.json", "a negative number in row 0"]),
         ("report out --from rows.json", &["rows.json", "my-nickel", "--materials"]),
         ("report out --environments mars", &["mars"]),
         ("report out --size 10x", &["--size"]),

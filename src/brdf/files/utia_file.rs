@@ -5,7 +5,8 @@
 //! degrees, from 0 to 75. (The database's own reader, as asztr/UTIA-brdf restates it. jdupuy/dj_brdf has the same layout, but other values:
 //! the chapter on usage.)
 //!
-//! At nodes f is what the database's reader finds; values below 0 count as 0. Between them that reader is linear in the azimuth of the
+//! At nodes f is what the database's reader finds; values below 0 count as 0, and where light or view is along the normal those of all azimuths are
+//! one. Between them that reader is linear in the azimuth of the
 //! view where `goniometric.rs` is linear in the azimuth between light and view, and beyond 75 degrees it goes on in a straight line where
 //! f stays as it is at 75 here. Of GGX with alpha 0.1 x 0.4, 0.2 x 0.5 and 0.3, tabulated like that, it errs by 27, 9 and 5.5 % of the
 //! light, and this by 24, 8 and 4.5. Reading takes no more memory than the file.
@@ -15,6 +16,7 @@ use glam::Vec3;
 
 use crate::brdf::Brdf;
 use crate::brdf::goniometric::{Axes, Goniometric, Nodes};
+use crate::brdf::models::MOST_MEASURED;
 use crate::error::{Error, Result};
 use crate::files::FileFormat;
 
@@ -48,13 +50,29 @@ fn table(bytes: &[u8]) -> Result<Goniometric, String> {
         let value = f64::from_le_bytes(values[place]);
         return Err(format!("holds {value:e} in plane {plane}, row {row}, column {column}"));
     }
+    let mut values: Vec<_> =
+        values.iter().map(|value| (f64::from_le_bytes(*value) as f32).clamp(0.0, MOST_MEASURED)).collect();
+    values.chunks_exact_mut(SIDE * SIDE).for_each(make_one_along_the_normal);
+
     let phis = Nodes { count: PHIS, first: 0.0, step: 7.5f64.to_radians(), is_circle: true };
     let thetas = Nodes { count: THETAS, first: 0.0, step: 15f64.to_radians(), is_circle: false };
     Goniometric::of(Axes { thetas, azimuths: phis, turns: phis }, |[theta_i, theta_o, azimuth, phi_i]| {
         let (row, column) = (phi_i + PHIS * theta_i, (phi_i + azimuth) % PHIS + PHIS * theta_o);
-        let value = |plane: usize| f64::from_le_bytes(values[column + SIDE * (row + SIDE * plane)]) as f32;
-        Some(Vec3::new(value(0), value(1), value(2)))
+        Some(Vec3::from([0, 1, 2].map(|plane| values[column + SIDE * (row + SIDE * plane)])))
     })
+}
+
+/// Makes the values of a plane one where light or view is along the normal, which has no azimuth: their mean. As they were measured, of 48 azimuths
+/// each, they differ by noise, which would be a lobe of no width.
+fn make_one_along_the_normal(plane: &mut [f32]) {
+    for column in 0..SIDE {
+        let mean = (0..PHIS).map(|row| plane[column + SIDE * row]).sum::<f32>() / PHIS as f32;
+        (0..PHIS).for_each(|row| plane[column + SIDE * row] = mean);
+    }
+    for row in plane.chunks_exact_mut(SIDE) {
+        let mean = row[..PHIS].iter().sum::<f32>() / PHIS as f32;
+        row[..PHIS].fill(mean);
+    }
 }
 
 #[cfg(test)]
@@ -76,8 +94,9 @@ mod tests {
     fn nodes_are_where_the_database_has_them() {
         let bytes = made(|plane, theta_i, phi_i, theta_v, phi_v| match plane {
             0 => (10 * theta_i + theta_v) as f64,
-            1 => phi_i as f64,
-            _ => phi_v as f64,
+            // One along the normal.
+            1 => (phi_i * theta_i.min(1)) as f64,
+            _ => (phi_v * theta_v.min(1)) as f64,
         });
         let brdf = parse(Path::new("x.bin"), &bytes).unwrap();
         for (theta_i, phi_i, theta_o, phi_o) in
@@ -85,12 +104,35 @@ mod tests {
         {
             let found = brdf.evaluate(direction(theta_i, phi_i), direction(theta_o, phi_o));
             let steps = |theta: f64| theta.min(75.0) / 15.0;
-            let expected = dvec3(10.0 * steps(theta_i) + steps(theta_o), phi_i / 7.5, phi_o / 7.5);
+            let phi_steps = |theta: f64, phi: f64| steps(theta).min(1.0) * phi / 7.5;
+            let expected =
+                dvec3(10.0 * steps(theta_i) + steps(theta_o), phi_steps(theta_i, phi_i), phi_steps(theta_o, phi_o));
             assert!((found - expected).abs().max_element() < 1e-4, "{theta_i} {phi_i} {theta_o} {phi_o}: {found}");
         }
         // From the last azimuth to the first, which is the next, both turning together.
         let found = brdf.evaluate(direction(30.0, 356.25), direction(30.0, 356.25 - 90.0));
         assert!((found - dvec3(22.0, 23.5, 35.5)).abs().max_element() < 1e-4, "{found}");
+    }
+
+    #[test]
+    fn along_the_normal_all_azimuths_are_their_mean() {
+        // 0, 2, 0, 2 and so on by the azimuth of the light, of the view, and of both.
+        let odd = |phi: usize| 2.0 * (phi % 2) as f64;
+        let bytes = made(|plane, _, phi_i, _, phi_v| match plane {
+            0 => odd(phi_i),
+            1 => odd(phi_v),
+            _ => odd(phi_i + phi_v),
+        });
+        let brdf = parse(Path::new("x.bin"), &bytes).unwrap();
+        for (theta_i, theta_o, expected) in [
+            (0.0, 0.0, [1.0, 1.0, 1.0]),
+            (0.0, 30.0, [1.0, 2.0, 1.0]),
+            (30.0, 0.0, [0.0, 1.0, 1.0]),
+            (30.0, 30.0, [0.0, 2.0, 2.0]),
+        ] {
+            let found = brdf.evaluate(direction(theta_i, 15.0), direction(theta_o, 7.5));
+            assert!((found - glam::DVec3::from(expected)).abs().max_element() < 1e-5, "{theta_i} {theta_o}: {found}");
+        }
     }
 
     #[test]

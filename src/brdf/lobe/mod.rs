@@ -129,7 +129,8 @@ fn lobe_axes(brdf: &Brdf) -> (f64, DVec2) {
     let term = |azimuth: DVec2| azimuth.rotate(azimuth) / exact_width(brdf, azimuth).powi(2);
     let narrow = DVec2::from_angle(0.5 * azimuths(false).map(term).sum::<DVec2>().to_angle());
     let wide = narrow.perp();
-    (exact_width(brdf, narrow) / exact_width(brdf, wide), wide)
+    // Of a table of noise it might be any.
+    ((exact_width(brdf, narrow) / exact_width(brdf, wide)).max(NARROWEST_ALPHA), wide)
 }
 
 /// [`half_vector_width`] towards one azimuth, to a millionth.

@@ -52,6 +52,9 @@ impl std::fmt::Debug for MerlTable {
     }
 }
 
+/// The planes of a file, in their order.
+const CHANNELS: [&str; 3] = ["red", "green", "blue"];
+
 impl MerlTable {
     /// The table in the bytes of a `.binary` file; the error is what is wrong with them: other dimensions, wrong size, a value that is
     /// not finite, nothing but zeros or invalid cells.
@@ -78,9 +81,9 @@ impl MerlTable {
                     // What is below the horizon means nothing.
                     let is_above = horizon.is_above(phi_d);
                     if let Some(channel) = (0..3).find(|&channel| is_above && !rgb[channel].is_finite()) {
-                        let name = ["red", "green", "blue"][channel];
+                        let name = CHANNELS[channel];
                         return Err(format!(
-                            "holds {} in the {name} cell theta_h {theta_h}, theta_d {theta_d}, phi_d {phi_d}",
+                            "holds {:e} in the {name} cell theta_h {theta_h}, theta_d {theta_d}, phi_d {phi_d}",
                             stored[channel]
                         ));
                     }
@@ -91,7 +94,14 @@ impl MerlTable {
             }
         }
         if texels.iter().all(|texel| texel.truncate() == Vec3::ZERO) {
-            return Err("holds nothing but zero or invalid cells".into());
+            // A cell counts where all of its channels do.
+            let are_void = [0, 1, 2].map(|channel| (0..CELLS).all(|cell| stored(channel, cell) < 0.0));
+            return Err(match are_void.iter().position(|is_void| *is_void) {
+                Some(channel) if are_void.contains(&false) => {
+                    format!("holds nothing but invalid cells in {}", CHANNELS[channel])
+                }
+                _ => "holds nothing but zero or invalid cells".to_owned(),
+            });
         }
         Ok(Self::from_texels(texels, PHI_D_BINS, 1.0))
     }

@@ -336,6 +336,8 @@ fn merl_files_that_are_no_tables_are_refused_with_a_reason() {
     assert!(reason(&nan).contains("NaN in the red cell theta_h 0, theta_d 1, phi_d 1"), "{}", reason(&nan));
     assert!(reason(&constant(0.0)).contains("nothing but zero"));
     assert!(reason(&constant(-1.0)).contains("nothing but zero"));
+    assert!(reason(&merl_bytes_of_stored(|_| [1.0, -1.0, 1.0])).contains("nothing but invalid cells in green"));
+    assert!(reason(&constant(1e300)).contains("holds 1e300 in the red cell"));
 }
 
 #[test]

@@ -27,7 +27,7 @@ The JSON is a list of rows with these fields, in this order:
   lookups, covered_pixels                           lookups in the environment, and pixels that see a surface
   shade_ms                                          what of gpu_ms is shading
   settings                                          width, height, subpixels, seed, repeat and whole_picture of the run
-  shard, combinations                               only with --shard: which part it is of; of how many combinations of
+  shard, combinations                               which part it is of, 1/1 without --shard; of how many combinations of
                                                     materials and environments in all
   expected_rms                                      only with --expected: what rms was expected to be
 

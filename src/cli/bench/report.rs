@@ -152,6 +152,14 @@ fn read_rows(path: &Path) -> Result<Vec<Row>> {
     let remedy = "give a file that `threadlight bench error --json` wrote";
     let rows: Vec<Row> = serde_json::from_slice(&bytes)
         .map_err(|cause| Error::in_file(path, format!("holds no measurements ({cause})"), remedy))?;
+    let is_negative = |row: &Row| {
+        [row.rms, row.rms_linear, row.flip, row.max, row.gpu_ms, row.shade_ms, row.frame_ms]
+            .iter()
+            .any(|value| *value < 0.0)
+    };
+    if let Some(row) = rows.iter().position(is_negative) {
+        return Err(Error::in_file(path, format!("holds a negative number in row {row}"), remedy));
+    }
     if rows.is_empty() {
         return Err(Error::in_file(path, "holds no measurements", remedy));
     }

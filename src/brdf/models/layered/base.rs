@@ -4,8 +4,10 @@ use std::path::{Path, PathBuf};
 use glam::DVec3;
 use toml::{Table, Value};
 
+use crate::brdf::files::parse_model;
 use crate::brdf::{Brdf, Domain, Lambert, Parameters};
 use crate::error::{Error, Result};
+use crate::files::read as read_file;
 
 const KEY: &str = "base";
 
@@ -74,35 +76,36 @@ pub fn resolve_base_files(parameters: &mut Table, folder: &Path) -> Result<()> {
     })
 }
 
-/// The files that the parameters name as bases, and those that these name in turn, as far as they can be read.
+/// The file that the parameters name as a base, also below tables.
+pub fn base_file(parameters: &Table) -> Option<PathBuf> {
+    match parameters.get(KEY)? {
+        Value::Table(inner) => base_file(inner),
+        Value::String(text) if is_file(text) => Some(text.into()),
+        _ => None,
+    }
+}
+
+/// The file that a material's file at `path`, of these contents, names as a base: none of a measured one. What cannot be read has none, too; whoever
+/// loads it will say why.
+pub fn base_file_in(path: &Path, bytes: &[u8]) -> Option<PathBuf> {
+    base_file(&parse_model(path, bytes).ok()?.1)
+}
+
+/// `first` and the files below it, by what each names as its base, as far as there may be layers.
+pub fn base_files_from(first: Option<PathBuf>, base_of: impl Fn(&Path) -> Option<PathBuf>) -> Vec<PathBuf> {
+    std::iter::successors(first, |path| base_of(path)).take(MAX_LAYERS).collect()
+}
+
+/// The files that the parameters name as bases, and those that these name in turn, as they are on disk.
 pub fn base_files(parameters: &Table) -> Vec<PathBuf> {
-    let mut files = Vec::new();
-    add_files(parameters, MAX_LAYERS, &mut files);
-    files
+    base_files_from(base_file(parameters), base_file_of)
 }
 
-fn add_files(parameters: &Table, layers: usize, files: &mut Vec<PathBuf>) {
-    match parameters.get(KEY) {
-        Some(Value::Table(inner)) => add_files(inner, layers, files),
-        Some(Value::String(text)) if is_file(text) => {
-            files.push(text.into());
-            add_files_below(Path::new(text), layers, files);
-        }
-        _ => {}
-    }
-}
-
-fn add_files_below(path: &Path, layers: usize, files: &mut Vec<PathBuf>) {
-    let is_model = Brdf::is_model_file(path);
-    // What cannot be read has none; whoever loads it will say why.
-    if let (true, Some(layers), Ok((_, parameters))) = (is_model, layers.checked_sub(1), Brdf::load_model(path)) {
-        add_files(&parameters, layers, files);
-    }
-}
-
-/// The files that a material's file names as bases, and those that these name in turn: none of a measured one.
+/// The files that a material's file names as bases, and those that these name in turn, as they are on disk.
 pub fn base_files_of(path: &Path) -> Vec<PathBuf> {
-    let mut files = Vec::new();
-    add_files_below(path, MAX_LAYERS, &mut files);
-    files
+    base_files_from(base_file_of(path), base_file_of)
+}
+
+fn base_file_of(path: &Path) -> Option<PathBuf> {
+    Brdf::is_model_file(path).then(|| read_file(path).ok()).flatten().and_then(|bytes| base_file_in(path, &bytes))
 }

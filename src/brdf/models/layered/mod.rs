@@ -38,7 +38,9 @@ mod base;
 mod coat;
 mod interreflection;
 
-pub use base::{base_files, base_files_of, change_base_files, resolve_base_files};
+pub use base::{
+    base_file, base_file_in, base_files, base_files_from, base_files_of, change_base_files, resolve_base_files,
+};
 pub use coat::Coat;
 use coat::Interface;
 use interreflection::Interreflection;
