@@ -20,7 +20,7 @@ pub struct Rendering {
     pub counters: Counters,
     /// Lookups in the environment that shading made.
     pub lookups: u64,
-    /// Time on the GPU by pass, median over the repetitions; empty where the device cannot tell.
+    /// Time on the GPU by pass, median over the repetitions; where the device cannot tell, from submission until it is done.
     pub passes: Vec<PassTime>,
     /// From the start of recording until the GPU is done, in milliseconds: median over the repetitions.
     pub frame_ms: f64,

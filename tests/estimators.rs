@@ -1,7 +1,9 @@
 //! The estimators against their CPU twins, against the reference, and under light that is hard to draw from.
 mod common;
 
-use common::{EVERYTHING, Validated, analytic_materials, difference, model, pixels, ready, sphere, texels_of};
+use common::{
+    EVERYTHING, Farthest, Validated, analytic_materials, difference, model, pixels, ready, sphere, texels_of,
+};
 use glam::{DVec3, UVec2, Vec3, Vec4};
 use rayon::prelude::*;
 use std::path::Path;
@@ -306,7 +308,7 @@ fn the_mean_over_seeds_of_unbiased_estimators_is_the_reference() {
                 let deviation = (mean - truth) / (variance / SEEDS as f64).map(f64::sqrt);
                 sum += deviation.element_sum();
                 squares += deviation.length_squared();
-                worst = worst.max(deviation.abs().max_element());
+                worst = worst.max(deviation.farthest());
             }
             let count = (3 * truth.len()) as f64;
             let (mean, mean_square) = (sum / count, squares / count);
@@ -389,7 +391,7 @@ fn a_white_furnace_shows_the_albedo_through_importance_sampling() {
             // The spread of f cos / p is at most a third, of 1024 samples in 30 pixels.
             let mean_error = errors.sum::<Vec3>() / surfaces.len() as f32;
             println!("{name}, {}: {mean_error}", method.name());
-            assert!(mean_error.abs().max_element() < 6e-3, "{name}, {}: {mean_error}", method.name());
+            assert!(mean_error.farthest() < 6e-3, "{name}, {}: {mean_error}", method.name());
         }
     }
     gpu.finish();

@@ -2,8 +2,8 @@
 mod common;
 
 use common::{
-    EVERYTHING, MATT_ALONG_ITS_NORMAL, Validated, analytic_materials, difference, model, pixels, ready, sphere,
-    texels_of,
+    EVERYTHING, Farthest, MATT_ALONG_ITS_NORMAL, Validated, analytic_materials, difference, model, pixels, ready,
+    sphere, texels_of,
 };
 use glam::{DVec3, UVec2, Vec3, Vec4};
 use rayon::prelude::*;
@@ -341,7 +341,7 @@ fn furnace_error(gpu: &Validated, scene: &Scene, albedos: &[Vec3]) -> (f32, f64)
         let found = Vec4::from(rendering.radiance[(pixel.y * size.x + pixel.x) as usize]).truncate();
         assert!(found.is_finite(), "{found} at {pixel}");
         covered += 1;
-        let error = ((found - albedo) / albedo).abs().max_element();
+        let error = ((found - albedo) / albedo).farthest();
         if error > worst.0 {
             worst = (error, f64::from(theta_o_deg));
         }
@@ -438,7 +438,7 @@ fn the_split_sum_of_a_metal_is_its_albedos_times_light_weighted_by_ggx_and_by_th
         let expected = between(0) * irradiance.0 / irradiance.1 + between(1) * by_ggx.0 / by_ggx.1;
         let found = Vec4::from(rendering.radiance[(pixel.y * 80 + pixel.x) as usize]).truncate().as_dvec3();
         // Texels of the prefiltered map are 6 degrees wide where its lobes are 17.
-        assert!(((found - expected) / expected).abs().max_element() < 0.02, "{found} {expected} at {row} degrees");
+        assert!(((found - expected) / expected).farthest() < 0.02, "{found} {expected} at {row} degrees");
         compared += 1;
     }
     assert!(compared > 10, "{compared}");

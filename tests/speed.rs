@@ -1,7 +1,7 @@
 //! Times on the device: what is measured is what was asked for, and the floor makes the lookups that it says.
 mod common;
 
-use common::{Validated, analytic_materials, ready, sphere};
+use common::{Farthest, Validated, analytic_materials, ready, sphere};
 use threadlight::Error;
 use threadlight::glam::Vec4;
 use threadlight::low_level::environment::Pyramid;
@@ -72,7 +72,7 @@ fn bare_lookups_are_of_the_row_the_turn_and_the_level_that_their_cpu_form_has() 
     for (pixel, sum) in sums.iter().enumerate().step_by(101) {
         let expected = bare_sum(counts, &rows, &pyramid, pixel as u32) / pyramid.radiance_scale();
         // Weights of a lookup have 8 bits.
-        let off = (Vec4::from(*sum).truncate() / expected - 1.0).abs().max_element();
+        let off = (Vec4::from(*sum).truncate() / expected - 1.0).farthest();
         assert!(off < 5e-3, "{pixel}: {sum:?}, expected {expected}");
     }
     drop((bare, cache));

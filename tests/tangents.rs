@@ -1,7 +1,7 @@
 //! Anisotropic materials on the device: where their tangents go, against the CPU twin, and against what must not matter.
 mod common;
 
-use common::{EVERYTHING, Validated, difference, model, pixels, ready, sphere, texels_of};
+use common::{EVERYTHING, Farthest, Validated, difference, model, pixels, ready, sphere, texels_of};
 use glam::{DAffine3, DMat3, DVec3, EulerRot, Mat3, UVec2, Vec3, Vec4};
 use threadlight::Method;
 use threadlight::low_level::evaluate::reference::{ReferenceSettings, reference};
@@ -223,7 +223,7 @@ fn a_white_furnace_shows_the_albedo_of_every_azimuth() {
             let below = (phi_o_deg / 5.0).floor() * 5.0;
             let between = albedo_from(below).lerp(albedo_from(below + 5.0), ((phi_o_deg - below) / 5.0) as f32);
             let found = Vec4::from(rendering.radiance[(pixel.y * 80 + pixel.x) as usize]).truncate();
-            let error = |expected: Vec3| ((found - expected) / expected).abs().max_element();
+            let error = |expected: Vec3| ((found - expected) / expected).farthest();
             assert!(
                 error(between) < 4e-3,
                 "{roughness} at {pixel}, {phi_o_deg}: {found}, not {between} between azimuths"

@@ -1,7 +1,7 @@
 //! The pyramid of vMF kernels: the device's against the CPU's, and what both keep of the environment's light.
 mod common;
 
-use common::Validated;
+use common::{Farthest, Validated};
 use glam::{DVec3, Vec3};
 use std::f64::consts::TAU;
 use threadlight::low_level::environment::{Environment, Pyramid, VmfPyramid};
@@ -46,7 +46,7 @@ fn compare_maps(gpu: &Validated, cache: &PipelineCache, environment: &Environmen
         assert!(found.as_flattened().iter().all(|value| value.is_finite()), "map {map}");
         let error = found.iter().zip(expected).map(|(found, expected)| {
             let (found, expected) = (Vec3::from(*found), Vec3::from(*expected));
-            ((found - expected).abs() / expected).max_element()
+            ((found - expected).abs() / expected).farthest()
         });
         let worst = error.fold(0.0, f32::max);
         println!("map {map}: at most {worst:.1e} of the texel");

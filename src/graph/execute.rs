@@ -1,6 +1,6 @@
 //! Execute: the plan's resources as Vulkan objects, its passes and barriers as commands.
 use super::error::GraphError;
-use super::plan::{Barrier, MemoryRequirement, Plan, PlannedPass};
+use super::plan::{Barrier, Block, MemoryRequirement, Plan, PlannedPass};
 use super::resource::{Handle, ResourceInfo, ResourceKind};
 use super::store::{Made, Store, bind, make};
 use super::work::{DeviceResource, FrameGraph, Resources, Work};
@@ -242,12 +242,9 @@ fn memory_of(device: &Arc<Device>, plan: &Plan<Work<'_>>) -> Result<Vec<Arc<Memo
             resource.placement.is_some_and(|at| at.block == index)
                 && matches!(resource.info.kind, ResourceKind::Buffer(_))
         });
-        let requirements = vk::MemoryRequirements {
-            size: block.size_bytes,
-            alignment: block.alignment,
-            memory_type_bits: block.memory_type_bits,
-        };
-        Ok(Memory::new(device, &format!("transient memory {index}"), requirements, for_buffers)?)
+        let &Block { size_bytes, alignment, memory_type_bits } = block;
+        let needs = MemoryRequirement { size_bytes, alignment, memory_type_bits };
+        Ok(Memory::new(device, &format!("transient memory {index}"), needs.into(), for_buffers)?)
     });
     memory.collect()
 }

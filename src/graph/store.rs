@@ -29,12 +29,7 @@ impl Store {
             return Ok(object.clone());
         }
         let (object, needs) = make(device, info)?;
-        let requirements = vk::MemoryRequirements {
-            size: needs.size_bytes,
-            alignment: needs.alignment,
-            memory_type_bits: needs.memory_type_bits,
-        };
-        let memory = Memory::new(device, &info.name, requirements, !info.is_image())?;
+        let memory = Memory::new(device, &info.name, needs.into(), !info.is_image())?;
         let object = bind(object, &memory, 0)?;
         self.objects.insert(info.name.clone(), (info.clone(), object.clone()));
         Ok(object)
@@ -78,4 +73,10 @@ pub(super) fn make(device: &Arc<Device>, info: &ResourceInfo) -> Result<(Made, M
     };
     let vk::MemoryRequirements { size: size_bytes, alignment, memory_type_bits } = needs;
     Ok((object, MemoryRequirement { size_bytes, alignment, memory_type_bits }))
+}
+
+impl From<MemoryRequirement> for vk::MemoryRequirements {
+    fn from(MemoryRequirement { size_bytes, alignment, memory_type_bits }: MemoryRequirement) -> Self {
+        Self { size: size_bytes, alignment, memory_type_bits }
+    }
 }

@@ -34,7 +34,7 @@ use serde::{Deserialize, Serialize};
 
 use super::change::Change;
 use super::comparison::Other;
-use crate::brdf::Brdf;
+use crate::brdf::{Brdf, resolve_base_files};
 use crate::environment::Environment;
 use crate::error::{Error, Result};
 use crate::files::{self, FileKind};
@@ -167,7 +167,7 @@ pub fn parse_replay(text: &str, path: &Path) -> Result<Vec<Input>> {
             let problem = format!("line {number} (`{line}`): {cause}");
             Error::in_file(path, problem, "the guide has all that a line can be, in src/viewer/input.rs")
         })?;
-        Ok(input.relative_to(folder))
+        input.relative_to(folder)
     };
     events.map(parse).collect()
 }
@@ -178,8 +178,8 @@ impl Input {
         matches!(self, Self::Drag(_) | Self::Scroll(_) | Self::Set(_))
     }
 
-    /// The same with paths that begin at `folder`.
-    fn relative_to(mut self, folder: &Path) -> Self {
+    /// The same with paths that begin at `folder`, those of bases under coats too.
+    fn relative_to(mut self, folder: &Path) -> Result<Self> {
         match &mut self {
             Self::Drop(path)
             | Self::SavePicture(path)
@@ -190,9 +190,19 @@ impl Input {
                 | Change::Environment(Source::File(path))
                 | Change::Mesh(Source::File(path)),
             ) => *path = folder.join(&*path),
+            Self::Set(
+                Change::Material(MaterialSource::Model { parameters, .. })
+                | Change::OneMaterial { source: MaterialSource::Model { parameters, .. }, .. },
+            ) => resolve_base_files(parameters, folder)?,
+            Self::Set(Change::Parameter { key, value, .. }) => {
+                let last = key.rsplit('.').next().unwrap_or(key);
+                let mut parameters = toml::Table::from_iter([(last.to_owned(), value.clone())]);
+                resolve_base_files(&mut parameters, folder)?;
+                *value = parameters.remove(last).unwrap_or_else(|| value.clone());
+            }
             _ => {}
         }
-        self
+        Ok(self)
     }
 }
 
@@ -285,6 +295,28 @@ mod tests {
         ];
         assert_eq!(events, expected);
         assert_eq!(parse("").unwrap(), []);
+    }
+
+    #[test]
+    fn bases_of_a_replay_are_beside_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.jsonl");
+        let coat = r#""coat": {"alpha": 0.1, "ior": 1.5}"#;
+        let text = format!(
+            r#"{{"set": {{"material": {{"model": {{"model": "layered", "parameters": {{"base": "base.toml", {coat}}}}}}}}}}}
+{{"set": {{"parameter": {{"material": "m", "key": "base", "value": "base.toml"}}}}}}"#
+        );
+        std::fs::write(&path, text).unwrap();
+        let beside = toml::Value::from(folder.path().join("base.toml").to_str().unwrap());
+        let events = read_replay(&path).unwrap();
+        let [
+            Input::Set(Change::Material(MaterialSource::Model { parameters, .. })),
+            Input::Set(Change::Parameter { value, .. }),
+        ] = &events[..]
+        else {
+            panic!("{events:?}")
+        };
+        assert_eq!((&parameters["base"], value), (&beside, &beside));
     }
 
     #[test]

@@ -32,7 +32,7 @@ pub struct ShownPicture<'a> {
 
 /// What became of a frame.
 pub struct Drawn {
-    /// Time of each pass: of an earlier frame, where frames are in flight. Empty where the device cannot tell.
+    /// Time of each pass: of an earlier frame, where frames are in flight. Where the device cannot tell, from submission until it is done.
     pub passes: Vec<PassTime>,
     /// Names of the passes that ran, in their order.
     pub ran: Vec<String>,

@@ -26,7 +26,7 @@ const DESCRIPTOR_KINDS: [vk::DescriptorType; 5] = [
 pub struct PassTime {
     /// Name of the pass.
     pub name: String,
-    /// Milliseconds between the timestamps before and after it.
+    /// Milliseconds between the timestamps before and after it; where the device has none, from submission until it is done.
     pub gpu_ms: f64,
 }
 

@@ -11,6 +11,7 @@
 //! physical_device, deletion    what there is to choose from; what waits for being destroyed
 //! device, identity             the chosen one: its queue and its submissions; which object is which
 //! memory, image                buffers; images and samplers
+//! glslc, hot_reload            (feature hot-reload) the compiler of shaders; those that were edited
 //! shader                       SPIR-V and what it declares (reflection)
 //! pipeline_cache, pipeline     compiled ones on disk; layouts from reflection
 //! shader_statistics            what compilers say of shaders, on devices that only compile

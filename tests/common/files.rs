@@ -10,6 +10,16 @@ pub fn folder_of_run() -> Option<PathBuf> {
     std::env::var_os("THREADLIGHT_TEST_CACHE").map(PathBuf::from)
 }
 
+/// The file of Mesa's driver for AMD's GPUs, by the names of Debian's and of newer Mesa; none, and a word of that, where there is none.
+pub fn radv() -> Option<&'static str> {
+    let names = ["/usr/share/vulkan/icd.d/radeon_icd.x86_64.json", "/usr/share/vulkan/icd.d/radeon_icd.json"];
+    let found = names.into_iter().find(|name| std::path::Path::new(name).is_file());
+    if found.is_none() {
+        println!("skipped: there is no {}", names.join(" or "));
+    }
+    found
+}
+
 /// What is at `name` in the folder of measured data beside the project, where it is there.
 pub fn data(name: &str) -> Option<PathBuf> {
     let folder = std::env::var_os("THREADLIGHT_DATA").map_or_else(|| PathBuf::from("../shared/data"), PathBuf::from);

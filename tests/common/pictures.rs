@@ -1,5 +1,5 @@
 //! What is asked of a rendering, and how its pixels are looked at.
-use glam::{UVec2, Vec4};
+use glam::{DVec3, UVec2, Vec3, Vec4};
 use threadlight::low_level::pipeline::Wanted;
 use threadlight::low_level::prepare::Prepared;
 use threadlight::low_level::rendering::Rendering;
@@ -13,12 +13,27 @@ pub fn texels_of(prepared: &Prepared, rendering: &Rendering, pixel: UVec2) -> Ve
     texels_of_pixel(&prepared.view, &rendering.geometry, pixel)
 }
 
-/// How far `found` is from `expected`, in the channel that is farthest. Fails where that is no number: maxima of vectors pass over those.
+/// Maxima of vectors pass over what is no number, and so would tests.
+pub trait Farthest<T> {
+    /// The greatest part, without signs. Fails where one is no number.
+    fn farthest(self) -> T;
+}
+
+macro_rules! farthest {
+    ($($Vector:ty: $Number:ty),*) => { $(
+        impl Farthest<$Number> for $Vector {
+            fn farthest(self) -> $Number {
+                assert!(self.is_finite(), "{self}");
+                self.abs().max_element()
+            }
+        }
+    )* };
+}
+farthest!(Vec3: f32, Vec4: f32, DVec3: f64);
+
+/// How far `found` is from `expected`, in the channel that is farthest. Fails where that is no number.
 pub fn difference(found: impl Into<Vec4>, expected: Vec4) -> f32 {
-    let found = found.into();
-    let difference = (found - expected).abs();
-    assert!(difference.is_finite(), "{found}, not {expected}");
-    difference.max_element()
+    (found.into() - expected).farthest()
 }
 
 /// All pixels, row by row.

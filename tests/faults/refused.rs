@@ -107,6 +107,8 @@ fn a_cache_that_vanishes_again_and_again_is_no_matter() {
     let picture = place.picture();
     let is_over = AtomicBool::new(false);
     std::thread::scope(|scope| {
+        // Also where an assertion fails: the scope waits for the thread.
+        let _ends = OnDrop(|| is_over.store(true, Ordering::Relaxed));
         scope.spawn(|| {
             while !is_over.load(Ordering::Relaxed) {
                 let _ = std::fs::remove_dir_all(place.path("cache"));
@@ -116,8 +118,16 @@ fn a_cache_that_vanishes_again_and_again_is_no_matter() {
         for _ in 0..moments(1) {
             assert_made(&place, place.threadlight(&RENDER), picture);
         }
-        is_over.store(true, Ordering::Relaxed);
     });
+}
+
+/// Does something when it goes out of scope.
+struct OnDrop<F: Fn()>(F);
+
+impl<F: Fn()> Drop for OnDrop<F> {
+    fn drop(&mut self) {
+        (self.0)();
+    }
 }
 
 #[test]
