@@ -11,7 +11,6 @@
 //! which conserves energy whatever the base. Which way it leaves over azimuth, P does not say. See `mod.rs` beside this for what is made of it.
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-use faer::{Col, Mat};
 use glam::{DVec2, DVec3, dvec3};
 
 use super::coat::{Coat, Interface};
@@ -150,10 +149,10 @@ impl Angles {
     }
 
     /// How near angles are to each other: 1 within 3 degrees, less beyond.
-    fn near(&self) -> Mat<f64> {
+    fn near(&self) -> Matrix {
         let theta = |i: usize| self.cos_inside(i).acos();
         let weight = |i: usize, j: usize| (-((theta(i) - theta(j)) / NEAR_RAD).powi(2)).exp();
-        Mat::from_fn(self.count(), self.count(), weight)
+        (0..self.count()).map(|i| (0..self.count()).map(|j| weight(i, j)).collect()).collect()
     }
 
     /// The two angles between which a cosine is, and the share of the second.
@@ -230,38 +229,62 @@ impl Shares {
 }
 
 /// For each angle from which light leaves: square root of the factor of the base's lobe, and what leaves evenly, as a share of what got in.
-fn of_channel(shares: &[Shares], near: &Mat<f64>, channel: usize) -> Vec<(f64, f64)> {
-    let count = shares.len();
-    let matrix = |of: fn(&Shares) -> &Vec<DVec3>| Mat::from_fn(count, count, |i, j| of(&shares[i])[j][channel]);
+fn of_channel(shares: &[Shares], near: &Matrix, channel: usize) -> Vec<(f64, f64)> {
+    let matrix = |of: fn(&Shares) -> &Vec<DVec3>| -> Matrix {
+        shares.iter().map(|row| of(row).iter().map(|share| share[channel]).collect()).collect()
+    };
     let [off_base, back, out] = [matrix(|row| &row.off_base), matrix(|row| &row.back), matrix(|row| &row.out)];
     let all_orders = geometric_series(&back);
-    let later = &all_orders * &back * &off_base;
-    let once = &out * Col::<f64>::ones(count);
-    let total = &all_orders * &once;
+    let later = product(&all_orders, &product(&back, &off_base));
+    let once: Vec<f64> = out.iter().map(|row| row.iter().sum()).collect();
+    let total = times(&all_orders, &once);
     // Of light about the mirror direction, how much comes later to what comes at once.
     let ratio = |i: usize| {
-        let [later, at_once] = [&later, &off_base].map(|shares| shares.row(i) * near.row(i).transpose());
+        let [later, at_once] = [&later[i], &off_base[i]].map(|row| dot(row, &near[i]));
         if at_once > 0.0 { later / at_once } else { 0.0 }
     };
-    let factors = Col::from_fn(count, |i| ratio(i).max(0.0).sqrt());
-    let by_lobe = &out * &factors;
+    let factors: Vec<f64> = (0..shares.len()).map(|i| ratio(i).max(0.0).sqrt()).collect();
+    let of_lobe: Vec<f64> = times(&out, &factors).iter().zip(&factors).map(|(sum, factor)| sum * factor).collect();
     let left = |i: usize| COUNTED * (total[i] - once[i]).max(0.0);
     // No more may leave by the lobe than leaves at all.
-    let capped = |i: usize| {
-        let of_lobe = factors[i] * by_lobe[i];
-        if of_lobe > left(i) { factors[i] * left(i) / of_lobe } else { factors[i] }
+    let capped = |i: usize| if of_lobe[i] > left(i) { factors[i] * left(i) / of_lobe[i] } else { factors[i] };
+    let factors: Vec<f64> = (0..shares.len()).map(capped).collect();
+    let of_lobe = times(&out, &factors);
+    let first_open = shares.len() - OPEN;
+    (first_open..shares.len()).map(|i| (factors[i], (left(i) - factors[i] * of_lobe[i]).max(0.0))).collect()
+}
+
+/// Rows of numbers. Not of a library: such small ones need no blocks, for which that of the fits takes 4 MB.
+type Matrix = Vec<Vec<f64>>;
+
+fn product(a: &Matrix, b: &Matrix) -> Matrix {
+    let row = |row: &Vec<f64>| {
+        let mut sum = vec![0.0; b[0].len()];
+        for (factor, line) in row.iter().zip(b) {
+            sum.iter_mut().zip(line).for_each(|(sum, value)| *sum += factor * value);
+        }
+        sum
     };
-    let factors = Col::from_fn(count, capped);
-    let by_lobe = &out * &factors;
-    (count - OPEN..count).map(|i| (factors[i], (left(i) - factors[i] * by_lobe[i]).max(0.0))).collect()
+    a.iter().map(row).collect()
+}
+
+fn times(a: &Matrix, vector: &[f64]) -> Vec<f64> {
+    a.iter().map(|row| dot(row, vector)).collect()
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 /// 1 + B + ... + B^(2^DOUBLINGS - 1), doubled again and again: with no loss at all there is no end to it.
-fn geometric_series(b: &Mat<f64>) -> Mat<f64> {
-    let (mut sum, mut power) = (Mat::identity(b.nrows(), b.ncols()), b.clone());
+fn geometric_series(b: &Matrix) -> Matrix {
+    let unit = |i: usize| (0..b.len()).map(|j| f64::from(u8::from(i == j))).collect();
+    let mut sum: Matrix = (0..b.len()).map(unit).collect();
+    let mut power = b.clone();
     for _ in 0..DOUBLINGS {
-        sum = &sum + &power * &sum;
-        power = &power * &power;
+        let next = product(&power, &sum);
+        sum.iter_mut().flatten().zip(next.iter().flatten()).for_each(|(sum, next)| *sum += next);
+        power = product(&power, &power);
     }
     sum
 }
