@@ -9,7 +9,7 @@ use threadlight::low_level::evaluate::bare_lookups::time_bare_lookups;
 use threadlight::low_level::evaluate::speed::{self, Growth, Speed, Timings};
 use threadlight::low_level::evaluate::{Cases, Shard};
 use threadlight::low_level::method::Method;
-use threadlight::low_level::passes::{BareLookup, BareLookups, bare_sum};
+use threadlight::low_level::passes::{BareLookup, BareLookups};
 use threadlight::low_level::scene::{Camera, Scene, Source};
 use threadlight::low_level::vulkan::PipelineCache;
 
@@ -70,7 +70,7 @@ fn bare_lookups_are_of_the_row_the_turn_and_the_level_that_their_cpu_form_has() 
     let bare = BareLookups::new(&gpu.device, &cache, &pyramid, counts, &rows, None).unwrap();
     let (_, sums) = time_bare_lookups(&gpu.device, &bare).unwrap();
     for (pixel, sum) in sums.iter().enumerate().step_by(101) {
-        let expected = bare_sum(counts, &rows, &pyramid, pixel as u32) / pyramid.radiance_scale();
+        let expected = bare.sum(&rows, &pyramid, pixel as u32) / pyramid.radiance_scale();
         // Weights of a lookup have 8 bits.
         let off = (Vec4::from(*sum).truncate() / expected - 1.0).farthest();
         assert!(off < 5e-3, "{pixel}: {sum:?}, expected {expected}");

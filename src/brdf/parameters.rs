@@ -261,7 +261,7 @@ impl Parameters {
         let value = read(&mut inner).map_err(|error| inside(error, key))?;
         let of_inner = |parameter: Parameter| Parameter { key: format!("{key}.{}", parameter.key), ..parameter };
         self.read.extend(inner.read.drain(..).map(of_inner));
-        let of = inner.model.clone();
+        let of = inner.model.take();
         inner.finish(of.as_deref().unwrap_or(key)).map_err(|error| inside(error, key))?;
         Ok(value)
     }

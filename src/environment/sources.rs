@@ -12,9 +12,7 @@ use crate::brdf::luminance;
 use crate::shader_constants::light_source;
 
 /// Most sources of an environment, and most bright regions that it has them of.
-pub const MAX_SOURCES: usize = 48;
-
-const _: () = assert!(light_source::MAX_SOURCE_NODES as usize == 2 * MAX_SOURCES);
+pub const MAX_SOURCES: usize = light_source::MAX_SOURCE_NODES as usize / 2;
 const MAX_REGIONS: usize = 12;
 
 /// Pixels so many times brighter than the mean over the sphere of all that are not are of a source.

@@ -2,7 +2,7 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use super::metrics::check_comparable_size;
+use super::metrics::{Differences, check_comparable_size};
 use super::reference::{ReferenceSettings, reference};
 use super::tables::{Section, Table};
 use super::{Comparable, Display, compare};
@@ -160,8 +160,7 @@ fn comparable(prepared: &Prepared, radiance: &[[f32; 4]]) -> Comparable {
 }
 
 fn largest_change(before: &Comparable, after: &Comparable) -> f64 {
-    let values = before.display.as_flattened().iter().zip(after.display.as_flattened());
-    largest(values.map(|(before, after)| f64::from((after - before).abs())))
+    Differences::of_pictures(&before.display, &after.display).max
 }
 
 /// One row of medians and worst cases.

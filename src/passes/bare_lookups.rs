@@ -74,20 +74,20 @@ impl BareLookups {
     pub fn sums_bytes(&self) -> u64 {
         u64::from((self.push.pixel_count - 1).min(self.push.sum_mask) + 1) * SUM_BYTES
     }
-}
 
-/// What the pass sees from `pixel` of so many, by so many lookups of a row of `rows`. Twin of glsl/bare_lookups.comp.
-pub fn bare_sum([pixel_count, lookup_count]: [u32; 2], rows: &[BareLookup], pyramid: &Pyramid, pixel: u32) -> Vec3 {
-    const GROUP: u32 = 64;
-    let (group, group_count) = (pixel / GROUP, (pixel_count - 1) / GROUP + 1);
-    let row_count = rows.len() as u32 / lookup_count;
-    let row = (group as f32 / group_count as f32 * row_count as f32) as usize;
-    let turns = (pixel_count as f32 / TAU).sqrt();
-    let turn = Vec2::from_angle(TAU * (turns * (pixel as f32 / pixel_count as f32)).fract());
-    let looked_up = |BareLookup { direction: [x, y, z], level }: &BareLookup| {
-        pyramid.lookup(turn.rotate(Vec2::new(*x, *y)).extend(*z), *level)
-    };
-    rows[row * lookup_count as usize..][..lookup_count as usize].iter().map(looked_up).sum()
+    /// What the pass sees from `pixel` by the `rows` and in the `pyramid` that it was made with, in units of radiance. Twin of glsl/bare_lookups.comp.
+    pub fn sum(&self, rows: &[BareLookup], pyramid: &Pyramid, pixel: u32) -> Vec3 {
+        let Push { pixel_count, lookup_count, row_count, .. } = self.push;
+        let size = self.pipeline.group_size()[0];
+        let (group, group_count) = (pixel / size, pixel_count.div_ceil(size));
+        let row = (group as f32 / group_count as f32 * row_count as f32) as usize;
+        let turns = (pixel_count as f32 / TAU).sqrt();
+        let turn = Vec2::from_angle(TAU * (turns * (pixel as f32 / pixel_count as f32)).fract());
+        let looked_up = |BareLookup { direction: [x, y, z], level }: &BareLookup| {
+            pyramid.lookup(turn.rotate(Vec2::new(*x, *y)).extend(*z), *level)
+        };
+        rows[row * lookup_count as usize..][..lookup_count as usize].iter().map(looked_up).sum()
+    }
 }
 
 /// Looks up; leaves for each pixel the sum of what it saw, RGB in units of the pyramid's texels, and 1; where the device has no buffer of that size, for

@@ -25,7 +25,7 @@ mod view;
 mod vmf_pyramid;
 
 pub use background::{Background, BackgroundMap, background};
-pub use bare_lookups::{BareLookup, BareLookups, bare_lookups, bare_sum};
+pub use bare_lookups::{BareLookup, BareLookups, bare_lookups};
 pub use classify::{
     CLASSIFY_PASS, Classify, Counters, MAX_SHADERS, SMOOTH_DEG, ShaderOfMaterial, SmoothVariance, Tiles, classify,
     most_shaders, upload_shaders,

@@ -159,12 +159,8 @@ fn read_obj(text: &str, is_textured: bool, observer: &dyn Observer) -> Result<Ob
         // What tobj says of it names no line.
         unsound => {
             let fault = |(index, line)| Some(format!("line {}: {}", index + 1, fault(line, is_textured)?));
-            let cause = || {
-                unsound
-                    .err()
-                    .map_or_else(|| "is not a sound OBJ".to_owned(), |cause| format!("is not a sound OBJ: {cause}"))
-            };
-            Err(text.lines().enumerate().find_map(fault).unwrap_or_else(cause))
+            let cause = unsound.err().map_or_else(String::new, |cause| format!(": {cause}"));
+            Err(text.lines().enumerate().find_map(fault).unwrap_or(format!("is not a sound OBJ{cause}")))
         }
     }
 }

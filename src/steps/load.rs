@@ -7,7 +7,6 @@ use crate::files::FileKind;
 use crate::memo::{Key, Keyed, Memo, Round, Step};
 use crate::scene::{CustomMesh, EnvironmentSource, MaterialSource, Mesh, MeshSource, Source, TexturedMesh};
 use crate::threads::SliceTable;
-use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 
 /// The key of what `source` names, in a file of one of the formats `files`, or with the digest that `digest` tells.
@@ -32,15 +31,7 @@ fn file_key<T>(memo: &Memo, files: &FileKind<T>, path: &Path) -> Result<Key> {
 
 /// The base `first` and those below it, as their contents were when they were looked at.
 fn bases(memo: &Memo, first: Option<PathBuf>) -> Result<Vec<PathBuf>> {
-    let problem = RefCell::new(Ok(()));
-    let base_of = |path: &Path| {
-        base_of(memo, path).unwrap_or_else(|error| {
-            *problem.borrow_mut() = Err(error.within("base"));
-            None
-        })
-    };
-    let bases = base_files_from(first, base_of);
-    problem.into_inner().map(|()| bases)
+    base_files_from(first, |path| base_of(memo, path).map_err(|error| error.within("base")))
 }
 
 /// The base that the file at `path` names.

@@ -5,11 +5,9 @@ use super::theta_o;
 use crate::brdf::{Brdf, Symmetry};
 use crate::shader_constants::azimuths::AZIMUTH_STEP_DEG;
 
-/// From one to the next, in radians: 5 degrees. `AZIMUTH_STEP` in glsl/azimuths.glsl. With steps of 10 degrees, half the memory and half the time to
+/// From one to the next, in radians. With steps of 10 degrees, half the memory and half the time to
 /// fit, four brushed materials in three maps err by a tenth more with 16 fitted threads, and by an eighth more with 64.
-pub const STEP_RAD: f64 = PI / 36.0;
-
-const _: () = assert!((AZIMUTH_STEP_DEG as f64 * PI / 180.0 - STEP_RAD).abs() < 1e-12);
+pub const STEP_RAD: f64 = AZIMUTH_STEP_DEG as f64 * PI / 180.0;
 
 /// How many azimuths of the view there are rows for: 1 if it does not matter; else every [`STEP_RAD`] from the tangent on, both
 /// ends included, to 90 degrees if the BRDF has mirror planes along and across the tangent, to 180 if half a turn leaves it as it is, to 360.

@@ -5,10 +5,9 @@
 //! degrees, from 0 to 75. (The database's own reader, as asztr/UTIA-brdf restates it. jdupuy/dj_brdf has the same layout, but other values:
 //! the chapter on usage.)
 //!
-//! At nodes f is what the database's reader finds; values below 0 count as 0, and where light or view is along the normal those of all azimuths are
-//! one. Between them that reader is linear in the azimuth of the
-//! view where `goniometric.rs` is linear in the azimuth between light and view, and beyond 75 degrees it goes on in a straight line where
-//! f stays as it is at 75 here. Of GGX with alpha 0.1 x 0.4, 0.2 x 0.5 and 0.3, tabulated like that, it errs by 27, 9 and 5.5 % of the
+//! At nodes f is what the database's reader finds; values below 0 count as 0, and where light or view is along the normal the mean over its azimuths
+//! takes the place of each. Between nodes that reader is linear in the azimuth of the view where `goniometric.rs` is linear in the azimuth between
+//! light and view, and beyond 75 degrees it goes on in a straight line where f stays as it is at 75 here. Of GGX with alpha 0.1 x 0.4, 0.2 x 0.5 and 0.3, tabulated like that, it errs by 27, 9 and 5.5 % of the
 //! light, and this by 24, 8 and 4.5. Reading takes no more memory than the file.
 use std::path::Path;
 
@@ -62,8 +61,8 @@ fn table(bytes: &[u8]) -> Result<Goniometric, String> {
     })
 }
 
-/// Makes the values of a plane one where light or view is along the normal, which has no azimuth: their mean. As they were measured, of 48 azimuths
-/// each, they differ by noise, which would be a lobe of no width.
+/// Where light or view is along the normal, which has no azimuth, replaces the values of a plane by their mean over azimuths. As they were measured,
+/// they differ by noise, and f would jump at the normal as a lobe of no width does.
 fn make_one_along_the_normal(plane: &mut [f32]) {
     for column in 0..SIDE {
         let mean = (0..PHIS).map(|row| plane[column + SIDE * row]).sum::<f32>() / PHIS as f32;

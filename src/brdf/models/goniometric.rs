@@ -10,8 +10,7 @@ use std::sync::Arc;
 use glam::{DVec3, Vec3, Vec4};
 
 use crate::brdf::models::MOST_MEASURED;
-use crate::brdf::theta;
-use crate::brdf::{Model, Parameters};
+use crate::brdf::{Model, Parameters, theta};
 use crate::error::{Error, Result};
 
 /// A measured BRDF. Cheap to clone.

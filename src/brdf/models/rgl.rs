@@ -27,8 +27,7 @@ use std::sync::Arc;
 
 use glam::{DVec2, DVec3, FloatExt, Vec3, dvec2};
 
-use crate::brdf::theta;
-use crate::brdf::{Model, Parameters};
+use crate::brdf::{Model, Parameters, theta};
 use crate::error::{Error, Result};
 
 /// From here on to the horizon f is as it is here, so that it is finite: f cos theta_i is, which all that is seen is a sum of.

@@ -14,8 +14,7 @@ use std::f64::consts::FRAC_1_PI;
 
 use glam::DVec3;
 
-use crate::brdf::theta;
-use crate::brdf::{Model, Parameters, Scale, hash_numbers};
+use crate::brdf::{Model, Parameters, Scale, hash_numbers, theta};
 use crate::error::Result;
 
 /// The model of Bagher, Soler and Holzschuch; all per channel.

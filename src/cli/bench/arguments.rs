@@ -1,6 +1,6 @@
 //! What the measurements have in common on the command line: what to measure, on which device, and where to write it.
 use crate::cli::render::processor;
-use crate::cli::scene_flags::{DeviceFlags, parse_size};
+use crate::cli::scene_flags::{DeviceFlags, parse_size, subpixels};
 use crate::cli::{json, nameable, number, print, stem};
 use clap::builder::NonEmptyStringValueParser;
 use clap::parser::ValueSource;
@@ -17,8 +17,7 @@ use threadlight::low_level::memo::{Memo, Round};
 use threadlight::low_level::method::{Method, Variant};
 use threadlight::low_level::progress::Observer;
 use threadlight::low_level::scene::{
-    EnvironmentSource, MAX_SAMPLES, MAX_SUBPIXELS, MaterialSettings, MaterialSource, ObjectSettings, Scene, Source,
-    mesh,
+    EnvironmentSource, MAX_SAMPLES, MaterialSettings, MaterialSource, ObjectSettings, Scene, Source, mesh,
 };
 use threadlight::low_level::vulkan::Device;
 use threadlight::{Error, Result};
@@ -39,7 +38,7 @@ pub struct CasesArguments {
     scene: Vec<String>,
     #[arg(long, help = nameable::size("Size of the pictures", ssim::WINDOW), value_name = "WxH", value_parser = parse_size, allow_hyphen_values = true)]
     size: Option<(u32, u32)>,
-    #[arg(long, help = format!("{}; without it, the scene's", nameable::subpixels("Sub-pixels per axis")), value_name = "S", value_parser = value_parser!(u32).range(1..=i64::from(MAX_SUBPIXELS)))]
+    #[arg(long, help = format!("{}; without it, the scene's", nameable::subpixels("Sub-pixels per axis")), value_name = "S", value_parser = subpixels())]
     subpixels: Option<u32>,
     /// Seed of everything random.
     #[arg(long, value_name = "N", default_value_t = 0)]

@@ -3,8 +3,7 @@ use std::f64::consts::FRAC_PI_2;
 
 use glam::{DVec2, DVec3};
 
-use crate::brdf::theta;
-use crate::brdf::{Brdf, LobeShape, MAX_THETA_O_DEG, lobe_radius};
+use crate::brdf::{Brdf, LobeShape, MAX_THETA_O_DEG, lobe_radius, theta};
 
 /// View angles at which lobes are looked for: some models have them at grazing views only.
 const VIEWS_DEG: [f64; 8] = [0.0, 30.0, 60.0, 75.0, 85.0, 88.0, 89.5, MAX_THETA_O_DEG];

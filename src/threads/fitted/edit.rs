@@ -6,8 +6,7 @@ use glam::{DVec3, dvec3};
 
 use super::kernel::{Kernel, WIDEST_LEVEL, scale_rad};
 use super::solve::Fit;
-use crate::brdf::luminance;
-use crate::brdf::reflect;
+use crate::brdf::{luminance, reflect};
 
 /// A kernel with less than this part of the weight of all has nothing to do.
 const IDLE: f64 = 2e-3;

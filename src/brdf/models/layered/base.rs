@@ -1,4 +1,5 @@
 //! What lies under a coat: a built-in material, a file, or a model with its parameters in a table of its own.
+use std::convert::Infallible;
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
@@ -92,18 +93,34 @@ pub fn base_file_in(path: &Path, bytes: &[u8]) -> Option<PathBuf> {
 }
 
 /// `first` and the files below it, by what each names as its base, as far as there may be layers.
-pub fn base_files_from(first: Option<PathBuf>, base_of: impl Fn(&Path) -> Option<PathBuf>) -> Vec<PathBuf> {
-    std::iter::successors(first, |path| base_of(path)).take(MAX_LAYERS).collect()
+///
+/// # Errors
+/// Those of `base_of`.
+pub fn base_files_from<E>(
+    first: Option<PathBuf>,
+    base_of: impl Fn(&Path) -> Result<Option<PathBuf>, E>,
+) -> Result<Vec<PathBuf>, E> {
+    let (mut files, mut next) = (Vec::new(), first);
+    while let Some(file) = next.take().filter(|_| files.len() < MAX_LAYERS) {
+        next = base_of(&file)?;
+        files.push(file);
+    }
+    Ok(files)
 }
 
 /// The files that the parameters name as bases, and those that these name in turn, as they are on disk.
 pub fn base_files(parameters: &Table) -> Vec<PathBuf> {
-    base_files_from(base_file(parameters), base_file_of)
+    on_disk_from(base_file(parameters))
 }
 
 /// The files that a material's file names as bases, and those that these name in turn, as they are on disk.
 pub fn base_files_of(path: &Path) -> Vec<PathBuf> {
-    base_files_from(base_file_of(path), base_file_of)
+    on_disk_from(base_file_of(path))
+}
+
+fn on_disk_from(first: Option<PathBuf>) -> Vec<PathBuf> {
+    let Ok(files) = base_files_from(first, |path| Ok::<_, Infallible>(base_file_of(path)));
+    files
 }
 
 fn base_file_of(path: &Path) -> Option<PathBuf> {
