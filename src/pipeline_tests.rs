@@ -52,3 +52,24 @@ fn wherever_the_device_fails_it_is_said_and_nothing_is_left() {
         }
     }
 }
+
+#[test]
+fn pictures_of_8_megapixels_are_shaded_at_once_by_64_threads_unless_there_are_lamps() {
+    let (device, _) = test_device::open_validated();
+    let memo = Memo::default();
+    let portions = |environment: &str, width: u32, height: u32, threads: u32| {
+        let mut scene = Scene::default();
+        (scene.image.width, scene.image.height) = (8, 6);
+        scene.environment.source = Source::Builtin(environment.to_owned());
+        scene.shading.threads = Some(threads);
+        let round = memo.round(&());
+        let prepared = prepare(&scene, &round).expect("a scene that can be prepared");
+        let of_device = DeviceScene::new(&device, &prepared, &round).expect("a scene that fits the device");
+        let view = View { width, height, ..of_device.view.clone() };
+        of_device.shade.portion_count(&view)
+    };
+    assert_eq!(portions("white", 4096, 2048, 64), 1);
+    assert_eq!(portions("white", 4096, 2049, 64), 2);
+    assert_eq!(portions("sun", 2560, 1440, 16), 1);
+    assert_eq!(portions("sun", 3840, 2160, 16), 2);
+}

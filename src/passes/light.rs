@@ -18,14 +18,15 @@ pub struct DeviceLight {
     sources: Option<Buffer>,
     map: Option<vulkan::Image>,
     aliases: Option<Buffer>,
+    has_lamps: bool,
     /// Level 0 of the blurred environment on the scale of kernels; 0 if there is none.
     pub(super) finest_level: f32,
 }
 
 impl DeviceLight {
-    /// Whether small bright sources are shaded by the BRDF.
-    pub(super) fn has_sources(&self) -> bool {
-        self.sources.is_some()
+    /// Whether there are small bright sources that are shaded by the BRDF.
+    pub(crate) fn has_lamps(&self) -> bool {
+        self.has_lamps
     }
 }
 
@@ -138,6 +139,7 @@ impl DeviceLight {
         let upload = |name, pyramid: &Pyramid| DevicePyramid::new(device, name, pyramid, scale, way_around).map(Some);
         self.pyramid = upload("environment pyramid", pyramid)?;
         self.source_pyramid = upload("source pyramid", source_pyramid)?;
+        self.has_lamps = environment.has_small_sources();
         let (words, uniform) = (environment.small_sources().device_words(scale), vk::BufferUsageFlags::UNIFORM_BUFFER);
         self.sources = Some(Buffer::with_contents(device, "light sources", uniform, bytemuck::cast_slice(&words))?);
         Ok(())

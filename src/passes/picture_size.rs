@@ -34,10 +34,10 @@ pub(crate) fn check_lists(device: &Device, size_px: [u32; 2], shaders: usize) ->
 
 /// An error for a geometry cache of so many columns and rows of sub-pixels, if images of `device` cannot be so large.
 pub(crate) fn check_cache_size(device: &Device, [width, height]: [u32; 2]) -> Result<()> {
-    let largest = device.limits().max_image_dimension2_d;
+    let largest = device.longest_target_side();
     if width.max(height) <= largest {
         return Ok(());
     }
-    let problem = format!("needs {width} x {height} sub-pixels, this device's images have at most {largest} a side");
+    let problem = format!("needs {width} x {height} sub-pixels, this device draws at most {largest} a side");
     Err(Error::input("image size", problem, "use a smaller size or fewer sub-pixels"))
 }

@@ -48,22 +48,22 @@ pub struct Shade {
 const MOST_SAMPLES: u64 = 1 << 25;
 
 /// Lamps by the BRDF are the work of so many samples in each of 2 x 2 sub-pixels: alumina-oxide takes 4 ms for them on that GPU, where 1.4 million
-/// pixels see a dragon. A quarter of it counts, as of all that sub-pixels have of their own.
-const SAMPLES_OF_SOURCES: u64 = 3;
+/// pixels see a dragon, as 20 samples of each of these pixels would. A quarter of it counts, as of all that sub-pixels have of their own.
+const SAMPLES_OF_LAMPS: u64 = 5;
 
 impl Shade {
     /// In how many portions a picture is shaded, so that no submission takes too long. Fitted threads are a sixteenth of the work of a sample or
     /// less, those of the paper a seventh (512 take 3.7 ms on that GPU, 512 samples 26 ms), samples of `ris` are four times that. At edges each
     /// sub-pixel has all samples and all lamps: where all pixels are edges, 2 x 2 of them take as long as may be, and more count as more.
-    fn portion_count(&self, view: &View) -> u32 {
+    pub(crate) fn portion_count(&self, view: &View) -> u32 {
         let pixels = u64::from(view.width) * u64::from(view.height);
         let samples = u64::from(self.sampling.count);
         let times_edges = (u64::from(view.subpixels).pow(2) / 4).max(1);
-        let of_sources = if self.light.has_sources() { SAMPLES_OF_SOURCES } else { 0 };
+        let of_lamps = if self.light.has_lamps() { SAMPLES_OF_LAMPS } else { 0 };
         let work = match self.method {
             Method::Ris => 4 * samples * times_edges * pixels,
             Method::Paper => samples * times_edges * pixels / 7,
-            method if method.threads().is_some() => (samples + 16 * of_sources) * times_edges * pixels / 16,
+            method if method.threads().is_some() => (samples + 16 * of_lamps) * times_edges * pixels / 16,
             _ => samples * times_edges * pixels,
         };
         work.div_ceil(MOST_SAMPLES).max(1) as u32

@@ -117,7 +117,7 @@ impl Viewer {
             record: Record::default(),
             drafts: Vec::new(),
             dynamic_resolution: DynamicResolution::default(),
-            longest_side: device.limits().max_image_dimension2_d,
+            longest_side: device.longest_target_side(),
             is_compiled: false,
             #[cfg(feature = "hot-reload")]
             shaders: super::shader_watch::ShaderWatch::new(move || wake_for_shaders()),

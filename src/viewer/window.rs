@@ -199,7 +199,7 @@ impl Open {
 
     /// Columns or rows that a window can have: it is drawn as one image.
     fn longest_side(&self) -> u32 {
-        self.viewer.device().limits().max_image_dimension2_d
+        self.viewer.device().longest_target_side()
     }
 
     /// Asks the window system for a window whose picture has this size.

@@ -40,6 +40,7 @@ pub struct Device {
     pub(super) queue_family: u32,
     pub(super) properties: vk::PhysicalDeviceProperties,
     pub(super) timestamp_valid_bits: u32,
+    pub(super) most_buffer_bytes: u64,
     driver: vk::DriverId,
     description: DeviceDescription,
     #[cfg(feature = "viewer")]
@@ -198,6 +199,7 @@ impl Device {
             queue_family: chosen.queue_family,
             properties: chosen.properties,
             timestamp_valid_bits: chosen.timestamp_valid_bits,
+            most_buffer_bytes: chosen.most_buffer_bytes,
             driver: chosen.driver,
             description: chosen.description,
             #[cfg(feature = "viewer")]
@@ -252,6 +254,14 @@ impl Device {
     /// Limits, as the driver states them.
     pub fn limits(&self) -> &vk::PhysicalDeviceLimits {
         &self.properties.limits
+    }
+
+    /// Columns or rows that an image can have which is drawn into.
+    pub fn longest_target_side(&self) -> u32 {
+        let limits = self.limits();
+        let [viewport_width, viewport_height] = limits.max_viewport_dimensions;
+        let framebuffer = limits.max_framebuffer_width.min(limits.max_framebuffer_height);
+        limits.max_image_dimension2_d.min(framebuffer).min(viewport_width).min(viewport_height)
     }
 
     /// Whether images of `format` can be sampled with linear filtering.

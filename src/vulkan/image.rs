@@ -258,7 +258,9 @@ fn check_shape(
     let has_levels = (1..=levels.min(limits.max_mip_levels)).contains(&shape.levels);
     let is_square = width == height || matches!(shape.kind, ImageKind::Plane | ImageKind::Volume);
     let has_layers = (1..=limits.max_array_layers).contains(&shape.layers()) && is_square;
-    if has_extent && has_levels && has_layers { Ok(()) } else { Err(refused()) }
+    // An image takes no less than its texels do.
+    let has_bytes = shape.level_bytes(0).is_none_or(|bytes| bytes <= limits.max_resource_size);
+    if has_extent && has_levels && has_layers && has_bytes { Ok(()) } else { Err(refused()) }
 }
 
 impl Drop for Image {

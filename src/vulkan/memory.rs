@@ -155,8 +155,13 @@ impl Buffer {
         if size_bytes == 0 || usage.is_empty() || !Self::USAGES.contains(usage) {
             return Err(VulkanError::unfit(name, format!("no buffer has {size_bytes} bytes for {usage:?}")));
         }
+        let most = device.most_buffer_bytes;
+        if size_bytes > most {
+            let problem = format!("it has {size_bytes} bytes, and buffers of this device have {most} at most");
+            return Err(VulkanError::unfit(name, problem));
+        }
         let info = vk::BufferCreateInfo::default().size(size_bytes).usage(usage);
-        // SAFETY: size and usage are valid on every device; destroyed through the deletion queue.
+        // SAFETY: the size is one that the device has, usage is valid on every device; destroyed through the deletion queue.
         let raw = call("vkCreateBuffer", name, || unsafe { device.raw.create_buffer(&info, None) })?;
         device.set_name(raw, name);
         let (name, identity, device) = (name.to_owned(), Identity::new(), device.clone());

@@ -91,6 +91,8 @@ pub(super) struct Candidate {
     pub properties: vk::PhysicalDeviceProperties,
     pub queue_family: u32,
     pub timestamp_valid_bits: u32,
+    /// The largest buffer; what needs more memory is refused by allocation where the device does not say.
+    pub most_buffer_bytes: u64,
     pub driver: vk::DriverId,
     pub extensions: Vec<&'static CStr>,
 }
@@ -115,6 +117,18 @@ pub(super) fn candidates(instance: &Instance) -> Result<Vec<Candidate>> {
         return Err(VulkanError::NoDriver);
     }
     physical_devices.into_iter().enumerate().map(|(index, physical)| candidate(instance, index, physical)).collect()
+}
+
+/// How large buffers can be: Vulkan 1.3 tells.
+fn most_buffer_bytes(instance: &Instance, physical: vk::PhysicalDevice, api_version: u32) -> u64 {
+    if api_version < vk::API_VERSION_1_3 {
+        return u64::MAX;
+    }
+    let mut limits = vk::PhysicalDeviceMaintenance4Properties::default();
+    let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut limits);
+    // SAFETY: `physical` comes from this instance, and has these properties.
+    unsafe { instance.raw.get_physical_device_properties2(physical, &mut properties) };
+    limits.max_buffer_size
 }
 
 fn candidate(instance: &Instance, index: usize, physical: vk::PhysicalDevice) -> Result<Candidate> {
@@ -153,6 +167,7 @@ fn candidate(instance: &Instance, index: usize, physical: vk::PhysicalDevice) ->
         properties,
         queue_family,
         timestamp_valid_bits,
+        most_buffer_bytes: most_buffer_bytes(instance, physical, properties.api_version),
         driver: driver.driver_id,
         extensions,
     })

@@ -229,7 +229,7 @@ impl Swapchain {
             other => other?,
         };
         let vk::SurfaceCapabilitiesKHR { current_extent, min_image_extent, max_image_extent, .. } = capabilities;
-        let longest = self.device.limits().max_image_dimension2_d;
+        let longest = self.device.longest_target_side();
         // Where the images decide the size of the window (Wayland), the extent is said to be undefined.
         let extent = match current_extent.width {
             u32::MAX => vk::Extent2D {
@@ -295,7 +295,8 @@ impl Swapchain {
             .pre_transform(capabilities.current_transform)
             .composite_alpha(composite)
             .present_mode(self.mode.raw())
-            .clipped(true)
+            // Screenshots read what is behind other windows, too.
+            .clipped(false)
             .old_swapchain(old.as_ref().map_or(vk::SwapchainKHR::null(), |old| old.raw));
         // SAFETY: the surface is alive; the old swapchain is destroyed after this, and not used before.
         let raw = bare_call("vkCreateSwapchainKHR", || unsafe { self.functions.create_swapchain(&info, None) });
@@ -344,7 +345,7 @@ impl Swapchain {
         // SAFETY: plain query of the device's own physical device.
         let properties =
             unsafe { self.device.instance.raw.get_physical_device_format_properties(self.device.physical, format) };
-        let needed = vk::FormatFeatureFlags::BLIT_DST | vk::FormatFeatureFlags::COLOR_ATTACHMENT;
+        let needed = vk::FormatFeatureFlags::BLIT_DST | vk::FormatFeatureFlags::COLOR_ATTACHMENT_BLEND;
         properties.optimal_tiling_features.contains(needed)
     }
 
