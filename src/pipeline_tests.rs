@@ -3,7 +3,7 @@ use super::*;
 use crate::memo::Memo;
 use crate::method::Method;
 use crate::prepare::prepare;
-use crate::scene::{Scene, Source};
+use crate::scene::{MaterialSource, Scene, Source};
 use crate::vulkan::faults::{Fault, with_fault};
 use crate::vulkan::test_device;
 use ash::vk::Result as Call;
@@ -72,4 +72,26 @@ fn pictures_of_8_megapixels_are_shaded_at_once_by_64_threads_unless_there_are_la
     assert_eq!(portions("white", 4096, 2049, 64), 2);
     assert_eq!(portions("sun", 2560, 1440, 16), 1);
     assert_eq!(portions("sun", 3840, 2160, 16), 2);
+}
+
+#[test]
+fn only_what_sharp_kernels_need_at_grazing_views_makes_a_second_shader() {
+    let (device, _) = test_device::open_validated();
+    let memo = Memo::default();
+    let shaders = |material: MaterialSource| {
+        let mut scene = Scene::default();
+        (scene.image.width, scene.image.height) = (8, 6);
+        scene.environment.source = Source::Builtin("lamps-70".to_owned());
+        scene.materials[0].source = material;
+        let round = memo.round(&());
+        let prepared = prepare(&scene, &round).expect("a scene that can be prepared");
+        let of_device = DeviceScene::new(&device, &prepared, &round).expect("a scene that fits the device");
+        // One for each class of pixels: interior ones and those at edges.
+        of_device.shade.pipelines.len() / 2
+    };
+    // Above 80 degrees it has kernels sharper than the pyramid.
+    let parameters = "distribution = 'beckmann'\nalpha = 0.015\nior = 1.5\ndiffuse = [0.6, 0.6, 0.55]";
+    let parameters = parameters.parse().expect("TOML");
+    assert_eq!(shaders(MaterialSource::Model { model: "plastic".to_owned(), parameters }), 2);
+    assert_eq!(shaders(MaterialSource::Builtin("clay".to_owned())), 1);
 }

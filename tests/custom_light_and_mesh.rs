@@ -100,9 +100,11 @@ fn pictures_are_to_the_byte_those_of_files_of_the_same_numbers() {
     for scene in [scene, matt] {
         let picture = |environment: &EnvironmentSource, mesh: &MeshSource| {
             // One each, so that none is made of what was made for another.
-            let gpu = Validated::new();
+            let gpu = Validated::with_own_memo();
             let wanted = Wanted { radiance: true, display: true, geometry: true };
-            let rendering = gpu.render(&ready(&scene(environment.clone(), mesh.clone())), wanted);
+            let prepared = prepare(&scene(environment.clone(), mesh.clone()), &gpu.round()).expect("a scene");
+            let rendering = gpu.render(&prepared, wanted);
+            drop(prepared);
             gpu.finish();
             let bits: Vec<_> = rendering.radiance.iter().map(|texel| texel.map(f32::to_bits)).collect();
             (bits, rendering.display, rendering.geometry)

@@ -198,9 +198,10 @@ fn shaders_look_measured_anisotropy_up_in_a_table() {
         let twin = CpuShader::new(&prepared, &gpu.round()).unwrap();
         let relative = |(pixel, found): (UVec2, &[f32; 4])| {
             let expected = twin.shade(pixel, &texels_of(&prepared, &rendering, pixel));
-            difference(*found, expected) / (1.0 + expected.max_element())
+            let radiance = expected.truncate().max_element();
+            (expected.w > 0.0).then(|| difference(*found, expected) / radiance.max(f32::MIN_POSITIVE))
         };
-        let mut differences: Vec<_> = pixels(&prepared).zip(&rendering.radiance).map(relative).collect();
+        let mut differences: Vec<_> = pixels(&prepared).zip(&rendering.radiance).filter_map(relative).collect();
         differences.sort_by(f32::total_cmp);
         // A sample on the other side of a step of a CDF makes another pixel: seldom.
         let most = differences[differences.len() * if method == Method::Fitted { 100 } else { 97 } / 100 - 1];

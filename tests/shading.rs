@@ -165,7 +165,9 @@ fn fitted_threads_are_shaded_as_by_the_cpu_twin() {
     expect_as_by_the_twin(vec![
         (Method::Fitted, 4, 2, lamp, materials.iter().collect()),
         // Without sources another shader runs; of one wide lobe and one narrow one, kernels both blurred and sharp.
-        (Method::Fitted, 4, 3, soft, named(&materials, &["conductor 0.5", "narrow"])),
+        (Method::Fitted, 4, 3, soft.clone(), named(&materials, &["conductor 0.5", "narrow"])),
+        // As many sub-pixels as there can be, in the four sets of an edge and of a pixel within one surface.
+        (Method::Fitted, 16, 4, soft, named(&materials, &["conductor 0.5", "narrow"])),
     ]);
 }
 

@@ -308,6 +308,10 @@ pub(super) fn take_model(table: &mut Table) -> Result<String> {
     match table.remove("model") {
         Some(Value::String(model)) => Ok(model),
         Some(_) => Err(Error::input("model", "is not a string", remedy())),
+        None if table.contains_key("material") => {
+            let remedy = "give a file that has `model` and the parameters of one material, without [[material]]";
+            Err(Error::input("material", "makes this a scene, where one material is asked for", remedy))
+        }
         None => Err(Error::input("model", "is missing, and without one it is no material", remedy())),
     }
 }

@@ -159,3 +159,56 @@ fn number(range: RangeInclusive<f64>, what: &'static str) -> impl Fn(&str) -> Re
 fn stem(path: &Path) -> String {
     path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The words of a command as a shell has them, of those that have no quotes but double ones around whole words.
+    fn words(command: &str) -> Vec<&str> {
+        let in_and_out = command.split('"').enumerate();
+        let words = in_and_out.flat_map(|(i, part)| match i % 2 {
+            0 => part.split_whitespace().collect(),
+            _ => vec![part],
+        });
+        words.collect()
+    }
+
+    /// The program's commands in the shell's blocks of a text.
+    fn commands(text: &str) -> Vec<String> {
+        let mut lines = text.lines();
+        let mut commands = Vec::new();
+        while lines.any(|line| line.starts_with("```sh")) {
+            let block: Vec<&str> = lines.by_ref().take_while(|line| !line.starts_with("```")).collect();
+            for line in block.join("\n").replace("\\\n", " ").lines() {
+                let line = line.split("  #").next().unwrap_or_default();
+                let parts = line.split(['|', ';']).flat_map(|part| part.split("&&")).map(str::trim);
+                commands.extend(parts.filter(|part| part.starts_with("threadlight ")).map(str::to_owned));
+            }
+        }
+        commands
+    }
+
+    #[test]
+    fn commands_of_the_guide_are_understood() {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+        let chapters = std::fs::read_dir(root.join("src/guide")).expect("the guide's folder");
+        let chapters = chapters.map(|entry| entry.expect("a readable folder").path());
+        let mut count = 0;
+        for path in chapters.chain([root.join("README.md")]) {
+            let text = std::fs::read_to_string(&path).expect("a readable text");
+            // The program may be built without its window.
+            let is_here = |command: &String| cfg!(feature = "viewer") || !command.starts_with("threadlight view ");
+            for command in commands(&text).into_iter().filter(is_here) {
+                // What it prints is no mistake.
+                if let Err(error) = Arguments::try_parse_from(words(&command))
+                    && error.use_stderr()
+                {
+                    panic!("{}: {command}: {error}", path.display());
+                }
+                count += 1;
+            }
+        }
+        assert!(count > 60, "only {count}");
+    }
+}

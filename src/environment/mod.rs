@@ -256,6 +256,7 @@ fn to_dvec3(texel: &[f32; 3]) -> DVec3 {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
+    use crate::brdf::tests::Farthest;
 
     /// An environment of the given pixels, for tests.
     pub(crate) fn environment(width: usize, height: usize, texel: impl Fn(usize, usize) -> [f32; 3]) -> Environment {
@@ -331,7 +332,7 @@ pub(crate) mod tests {
                 let direction = map.direction(column * width as f64 - 0.5, row * height as f64 - 0.5);
                 let [expected, found] = [&map, &fine].map(|map| map.radiance(direction));
                 let error = (found - expected).abs() / expected.max(DVec3::ONE);
-                assert!(error.max_element() < 1e-6, "{width} x {height}, {direction}: {found} {expected}");
+                assert!(error.farthest() < 1e-6, "{width} x {height}, {direction}: {found} {expected}");
             }
         }
         for (width, height, texel) in [(128, 64, 1.0), (9000, 1, 1.0), (300, 150, 1.0), (8, 4, 0.0)] {
@@ -374,7 +375,7 @@ pub(crate) mod tests {
         ] {
             let Some(map) = reference_environment(name) else { continue };
             let error = map.radiance(DVec3::from_array(direction)) - DVec3::from_array(expected);
-            assert!(error.abs().max_element() < 5e-6, "{name} {error}");
+            assert!(error.farthest() < 5e-6, "{name} {error}");
         }
     }
 }

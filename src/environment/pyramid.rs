@@ -284,6 +284,7 @@ fn coarser_level(finer: &[[f32; 3]], size: usize) -> Vec<[f32; 3]> {
 mod tests {
     use super::super::tests::{environment, reference_environment};
     use super::*;
+    use crate::brdf::tests::Farthest;
     use std::sync::Arc;
 
     /// The mean over the sphere of a level.
@@ -300,7 +301,7 @@ mod tests {
         let pyramid = Pyramid::box_filtered(environment);
         let expected = environment.mean_radiance();
         for level in 0..pyramid.levels.len() {
-            let error = ((mean(&pyramid, level) - expected) / expected).abs().max_element();
+            let error = ((mean(&pyramid, level) - expected) / expected).farthest();
             assert!(error < tolerance, "{}: level {level} misses {error:e} of the energy", environment.name);
         }
     }
@@ -322,7 +323,7 @@ mod tests {
             for i in 0..1000 {
                 let direction = Vec3::new((i as f32).sin(), (1.7 * i as f32).cos(), (0.3 * i as f32).sin() + 0.01);
                 let radiance = pyramid.lookup(direction, i as f32 * 0.007 - 0.5);
-                assert!((radiance / Vec3::new(1.0, 0.1, 1e6) - 1.0).abs().max_element() < 2e-7);
+                assert!((radiance / Vec3::new(1.0, 0.1, 1e6) - 1.0).farthest() < 2e-7);
             }
         }
     }
@@ -413,7 +414,7 @@ mod tests {
             let direction = DVec3::new(angle.cos() * (1.0 - z * z).sqrt(), z, angle.sin() * (1.0 - z * z).sqrt());
             let error = (pyramid.lookup(direction.as_vec3(), 0.0).as_dvec3() - map.radiance(direction)).abs();
             // The means over texels of 0.06 rad, blurred once more by the lookup.
-            assert!(error.max_element() < 0.015, "{direction}: {error}");
+            assert!(error.farthest() < 0.015, "{direction}: {error}");
         }
     }
 
@@ -439,7 +440,7 @@ mod tests {
                     weight_sum += weight;
                 }
                 let error = (to_dvec3(&pyramid.levels[0][texel]) - sum / weight_sum) / DVec3::new(100.0, 4.0, 2.0);
-                assert!(error.abs().max_element() < 0.0005, "{width}x{height}: {face} {row} {column}: {error}");
+                assert!(error.farthest() < 0.0005, "{width}x{height}: {face} {row} {column}: {error}");
             }
         }
     }
@@ -493,7 +494,7 @@ mod tests {
                 let largest = 2.0 * 11.0 * step_rad * size * 3f64.sqrt() + 1e-5;
                 for i in 0..steps {
                     let at = |i: i32| pyramid.lookup(circle(axis, cos, TAU * f64::from(i) / f64::from(steps)), level);
-                    let change = (at(i + 1) - at(i)).abs().max_element();
+                    let change = (at(i + 1) - at(i)).farthest();
                     assert!(f64::from(change) < largest, "axis {axis}, step {i}, level {level}: {change} > {largest}");
                 }
             }

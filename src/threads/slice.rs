@@ -368,6 +368,7 @@ fn climb(mut h: DVec3, mut step: f64, height: impl Fn(DVec3) -> f64) -> DVec3 {
 mod tests {
     use super::*;
     use crate::brdf::Brdf;
+    use crate::brdf::tests::Farthest;
     use crate::brdf::tests::samples::of_model;
     use crate::threads::test_materials;
 
@@ -378,7 +379,7 @@ mod tests {
                 let theta_o = theta_o_deg.to_radians();
                 let (slice, exact) =
                     (Slice::new(&SeenBrdf::from_all_around(&brdf), theta_o).albedo(), brdf.albedo(theta_o));
-                let error = ((slice - exact) / exact).abs().max_element();
+                let error = ((slice - exact) / exact).farthest();
                 assert!(error < 2e-3, "{name} at {theta_o_deg}: {slice}, {exact}");
             }
         }
@@ -397,7 +398,7 @@ mod tests {
                 let bounds = [(Resolution::FULL, 1e-3), (Resolution::OF_AZIMUTHS, 2e-3), (Resolution::DRAFT, 2e-3)];
                 for (resolution, bound) in bounds {
                     let [slice, _] = Slice::with_lobes_of_view(&brdf, &lobe, View { theta_o, phi_o }, resolution);
-                    let error = ((slice.albedo() - exact) / exact).abs().max_element();
+                    let error = ((slice.albedo() - exact) / exact).farthest();
                     assert!(
                         error < bound,
                         "{alpha_x} x {alpha_y} at {theta_o}, {phi_o}, {} rings: {error}",

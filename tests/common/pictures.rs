@@ -13,23 +13,9 @@ pub fn texels_of(prepared: &Prepared, rendering: &Rendering, pixel: UVec2) -> Ve
     texels_of_pixel(&prepared.view, &rendering.geometry, pixel)
 }
 
-/// Maxima of vectors pass over what is no number, and so would tests.
-pub trait Farthest<T> {
-    /// The greatest part, without signs. Fails where one is no number.
-    fn farthest(self) -> T;
-}
-
-macro_rules! farthest {
-    ($($Vector:ty: $Number:ty),*) => { $(
-        impl Farthest<$Number> for $Vector {
-            fn farthest(self) -> $Number {
-                assert!(self.is_finite(), "{self}");
-                self.abs().max_element()
-            }
-        }
-    )* };
-}
-farthest!(Vec3: f32, Vec4: f32, DVec3: f64);
+#[path = "../../src/brdf/tests/farthest.rs"]
+mod farthest;
+pub use farthest::Farthest;
 
 /// How far `found` is from `expected`, in the channel that is farthest. Fails where that is no number.
 pub fn difference(found: impl Into<Vec4>, expected: Vec4) -> f32 {

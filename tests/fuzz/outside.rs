@@ -1,7 +1,7 @@
 //! Readers that take more than a function: the program, which reads its standard input, and a device, which reads its pipeline cache.
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::process::Stdio;
+use std::process::{Command, Stdio};
 use std::sync::{Arc, OnceLock};
 
 use threadlight::low_level::vulkan::{Device, PipelineCache};
@@ -9,9 +9,18 @@ use threadlight::low_level::vulkan::{Device, PipelineCache};
 use crate::common::{bare_device, program};
 use crate::readers::Reader;
 
+/// What of the processor's time and of addresses the program may take, in seconds and KiB, where there is a shell: its own threads and blocks of
+/// memory take 1 GiB of these.
+const LIMITS: &str = "ulimit -t 1 && ulimit -v 2097152 && exec \"$0\" \"$@\"";
+
 /// Gives the program `bytes` on its standard input; the error is what it says.
 fn evaluate(arguments: &[&str], bytes: &[u8]) -> Result<(), String> {
-    let mut program = program(env!("CARGO_TARGET_TMPDIR"))
+    let unlimited = program(env!("CARGO_TARGET_TMPDIR"));
+    let mut program = Command::new("sh")
+        .args(["-c", LIMITS])
+        .arg(unlimited.get_program())
+        .envs(unlimited.get_envs().filter_map(|(name, value)| Some((name, value?))))
+        .env_remove("RUST_LOG")
         .args(["materials", "evaluate", "clay"])
         .args(arguments)
         .stdin(Stdio::piped())

@@ -397,6 +397,10 @@ fn a_parameter_that_others_rule_out_is_not_called_unknown() {
         ),
         (format!("{principled}coat_ior = 1.4"), "coat_ior: is a parameter only beside `coat`"),
         (format!("{principled}sheen_roughness = 0.3"), "sheen_roughness: is a parameter only beside `sheen`"),
+        (
+            "[[material]]\nname = 'a'\nmodel = 'lambert'\nreflectance = 0.5".to_owned(),
+            "material: makes this a scene, where one material is asked for; give a file that has `model`",
+        ),
         // What is misspelt goes first.
         (format!("{principled}cowt = 1\ncoat_ior = 1.4"), "cowt: is not a parameter of `principled`"),
         (format!("{lafortune}c_z_2 = 0.9"), "c_z_2: is a parameter only beside `c_xy_2`"),

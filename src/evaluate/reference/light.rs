@@ -248,6 +248,7 @@ fn tent_integrals(start: f64, size: f64, count: usize, measure: impl Fn(f64) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::brdf::tests::Farthest;
     use crate::environment::tests::environment;
 
     /// The integral of radiance times g over a cell, by midpoints.
@@ -282,7 +283,7 @@ mod tests {
                     .sum();
                 let exact = midpoints(&map, place, g);
                 let size = midpoints(&map, place, |s, t| g(s, t).abs()).max_element();
-                let error = (found - exact).abs().max_element();
+                let error = (found - exact).farthest();
                 assert!(error <= 1e-4 * size, "{width} x {height}, {place:?}: {found} {exact}");
             }
         }
@@ -295,7 +296,7 @@ mod tests {
         for level in FIRST_LEVEL..8 {
             let sum: DVec3 = CellPlace::all(level).flat_map(|place| light.weights(place)).map(Vec3::as_dvec3).sum();
             let exact = map.mean_radiance() * 4.0 * PI;
-            assert!(((sum - exact) / exact).abs().max_element() < 1e-6, "level {level}: {sum} {exact}");
+            assert!(((sum - exact) / exact).farthest() < 1e-6, "level {level}: {sum} {exact}");
         }
     }
 
