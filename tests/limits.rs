@@ -74,11 +74,11 @@ fn cube() -> Scene {
     ball().with_mesh(mesh(corners, &sides))
 }
 
-/// Prints a row for each number of threads, whose RMS has to be below the number beside it.
-fn measure(gpu: &Validated, name: &str, material: &str, light: EnvironmentSource, scene: Scene, bounds: &[(u32, f64)]) {
+/// Prints a row for each number of threads, whose RMS has to be about the number beside it: that of the chapter, which is rounded, or less.
+fn measure(gpu: &Validated, name: &str, material: &str, light: EnvironmentSource, scene: Scene, stated: &[(u32, f64)]) {
     let cases = Cases {
         methods: vec![Method::Fitted.into()],
-        counts: bounds.iter().map(|&(threads, _)| threads).collect(),
+        counts: stated.iter().map(|&(threads, _)| threads).collect(),
         materials: vec![(material.into(), model(material))],
         environments: vec![("light".into(), light)],
         scenes: vec![("scene".into(), scene)],
@@ -90,9 +90,12 @@ fn measure(gpu: &Validated, name: &str, material: &str, light: EnvironmentSource
     let truth = |prepared: &Prepared, round: &Round| reference(prepared, &gpu.device, &settings, round);
     let mut measured = Measured::default();
     sweep::run(&sweep, &gpu.device, &gpu.memo, &truth, &(), &mut measured).unwrap();
-    for (row, &(threads, bound)) in measured.rows.iter().zip(bounds) {
+    assert_eq!(measured.rows.len(), stated.len(), "{name}");
+    for (row, &(threads, stated)) in measured.rows.iter().zip(stated) {
         println!("{name:34}{threads:8}{:8.4}{:7.2}", row.rms, row.max);
-        assert!(row.threads == threads && row.rms < bound, "{name}: {row:?}");
+        // Other processors fit a little otherwise.
+        let is_as_stated = (0.7 * stated..1.3 * stated).contains(&row.rms);
+        assert!(row.threads == threads && is_as_stated, "{name}, stated {stated}: {row:?}");
     }
 }
 
@@ -116,25 +119,31 @@ fn errors_are_those_of_the_chapter_on_limits() {
     let [studio, many_lamps] = ["studio", "lamps-70"].map(|name| move || EnvironmentSource::Builtin(name.to_owned()));
     println!("{:34}{:>8}{:>8}{:>7}", "case", "threads", "RMS", "most");
     let measure =
-        |name, material: &str, light, scene, bounds: &[_]| measure(&gpu, name, material, light, scene, bounds);
+        |name, material: &str, light, scene, stated: &[_]| measure(&gpu, name, material, light, scene, stated);
     let few_and_many = |few, many| [(16, few), (64, many)];
     measure(
         "300 lamps, chromium at the limb",
         &chromium,
         lamps(300, 2, 5.0),
         limb(),
-        &[(16, 0.02), (64, 0.01), (128, 0.01)],
+        &[(16, 0.0065), (64, 0.0020), (128, 0.0018)],
     );
-    measure("400 stars, chromium", &chromium, lamps(400, 1, 100.0), ball(), &[(16, 0.1), (64, 0.04), (128, 0.03)]);
-    measure("window, flat porcelain", &porcelain, window(-1.0, 30.0, 1.0, 0.1), ground(), &few_and_many(0.07, 0.01));
-    measure("line, flat porcelain", &porcelain, line(), ground(), &few_and_many(0.2, 0.1));
-    measure("line, flat plastic", &plastic, line(), ground(), &few_and_many(0.2, 0.1));
-    measure("window and 1/100 of it, gold", &gold, window(1.0, 20.0, 10.0, 0.1), ball(), &few_and_many(0.01, 0.003));
-    measure("window and 1/300 of it, gold", &gold, window(1.0, 20.0, 30.0, 0.1), ball(), &few_and_many(0.02, 0.006));
-    measure("window, sheen", sheen, window(1.0, 20.0, 1.0, 0.0), ball(), &[(16, 0.06), (48, 0.01)]);
-    measure("studio, long lobe", &aluminium, studio(), ball(), &few_and_many(0.03, 0.01));
-    measure("70 lamps, long lobe", &aluminium, many_lamps(), ball(), &few_and_many(0.1, 0.05));
-    measure("studio, sheen over a long lobe", brushed, studio(), ball(), &few_and_many(0.06, 0.02));
-    measure("studio, cube of porcelain", &porcelain, studio(), cube(), &few_and_many(0.04, 0.04));
+    measure("400 stars, chromium", &chromium, lamps(400, 1, 100.0), ball(), &[(16, 0.041), (64, 0.015), (128, 0.010)]);
+    measure(
+        "window, flat porcelain",
+        &porcelain,
+        window(-1.0, 30.0, 1.0, 0.1),
+        ground(),
+        &few_and_many(0.0041, 0.0005),
+    );
+    measure("line, flat porcelain", &porcelain, line(), ground(), &few_and_many(0.087, 0.051));
+    measure("line, flat plastic", &plastic, line(), ground(), &few_and_many(0.082, 0.051));
+    measure("window and 1/100 of it, gold", &gold, window(1.0, 20.0, 10.0, 0.1), ball(), &few_and_many(0.0045, 0.0023));
+    measure("window and 1/300 of it, gold", &gold, window(1.0, 20.0, 30.0, 0.1), ball(), &few_and_many(0.0095, 0.0050));
+    measure("window, sheen", sheen, window(1.0, 20.0, 1.0, 0.0), ball(), &[(16, 0.031), (48, 0.007)]);
+    measure("studio, long lobe", &aluminium, studio(), ball(), &few_and_many(0.027, 0.004));
+    measure("70 lamps, long lobe", &aluminium, many_lamps(), ball(), &few_and_many(0.043, 0.016));
+    measure("studio, sheen over a long lobe", brushed, studio(), ball(), &few_and_many(0.029, 0.007));
+    measure("studio, cube of porcelain", &porcelain, studio(), cube(), &[(16, 0.0020)]);
     gpu.finish();
 }

@@ -5,9 +5,8 @@ use glam::dvec3;
 use rayon::prelude::*;
 
 use super::*;
-use crate::brdf::tests::Farthest;
 use crate::brdf::base_files_of;
-use crate::brdf::tests::{direction, from_toml};
+use crate::brdf::tests::{Farthest, direction, from_toml};
 use crate::brdf::{fresnel_dielectric, merl_bytes};
 
 fn read(text: &str) -> Result<Brdf> {
@@ -109,10 +108,7 @@ fn a_coat_of_air_is_not_there() {
         let Brdf::Layered(layered) = &coated else { panic!("a coat") };
         for (w_i, w_o) in pairs() {
             let [f, bare] = [coated.evaluate(w_i, w_o), layered.base.evaluate(w_i, w_o)];
-            assert!(
-                (f - bare).farthest() <= 1e-9 * (1.0 + bare.max_element()),
-                "{base} {w_i} {w_o}: {f} {bare}"
-            );
+            assert!((f - bare).farthest() <= 1e-9 * (1.0 + bare.max_element()), "{base} {w_i} {w_o}: {f} {bare}");
         }
     }
 }
