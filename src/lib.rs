@@ -40,6 +40,8 @@
 
 mod error;
 mod facade;
+#[cfg(test)]
+mod farthest;
 pub mod guide;
 pub mod low_level;
 

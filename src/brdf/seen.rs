@@ -88,8 +88,8 @@ mod tests {
     use glam::dvec3;
 
     use super::*;
-    use crate::brdf::tests::Farthest;
     use crate::brdf::tests::samples::of_model;
+    use crate::farthest::Farthest;
 
     #[test]
     fn the_mean_of_a_long_lobe_is_that_over_a_great_many_azimuths() {

@@ -257,7 +257,7 @@ mod tests {
     use super::super::tests::environment;
     use super::super::to_dvec3;
     use super::*;
-    use crate::brdf::tests::Farthest;
+    use crate::farthest::Farthest;
     use glam::DVec3;
 
     /// About that of a plastic.

@@ -105,7 +105,7 @@ impl LightMap {
 mod tests {
     use super::super::tests::environment;
     use super::*;
-    use crate::brdf::tests::Farthest;
+    use crate::farthest::Farthest;
 
     #[test]
     fn the_map_is_the_environment() {

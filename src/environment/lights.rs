@@ -121,8 +121,8 @@ pub(super) fn windows_and_bulbs(count: usize) -> Vec<Light> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::brdf::tests::Farthest;
     use crate::environment::RepairCounts;
+    use crate::farthest::Farthest;
 
     #[test]
     fn a_window_sheds_the_light_of_its_solid_angle_wherever_it_is() {

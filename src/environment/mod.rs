@@ -256,7 +256,7 @@ fn to_dvec3(texel: &[f32; 3]) -> DVec3 {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
-    use crate::brdf::tests::Farthest;
+    use crate::farthest::Farthest;
 
     /// An environment of the given pixels, for tests.
     pub(crate) fn environment(width: usize, height: usize, texel: impl Fn(usize, usize) -> [f32; 3]) -> Environment {

@@ -125,7 +125,7 @@ mod tests {
     use std::f64::consts::PI;
 
     use super::*;
-    use crate::brdf::tests::Farthest;
+    use crate::farthest::Farthest;
 
     #[test]
     fn every_built_in_can_be_made_and_is_radiance() {

@@ -284,7 +284,7 @@ fn coarser_level(finer: &[[f32; 3]], size: usize) -> Vec<[f32; 3]> {
 mod tests {
     use super::super::tests::{environment, reference_environment};
     use super::*;
-    use crate::brdf::tests::Farthest;
+    use crate::farthest::Farthest;
     use std::sync::Arc;
 
     /// The mean over the sphere of a level.

@@ -128,9 +128,9 @@ mod tests {
     use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
     use super::*;
-    use crate::brdf::tests::Farthest;
     use crate::brdf::tests::samples::of_model;
     use crate::error::Error;
+    use crate::farthest::Farthest;
     use crate::threads::{MAX_COUNT, MAX_ROWS, ThreadKind, test_materials};
 
     fn small(count: usize, rows: usize) -> ThreadSettings {

@@ -368,8 +368,8 @@ fn climb(mut h: DVec3, mut step: f64, height: impl Fn(DVec3) -> f64) -> DVec3 {
 mod tests {
     use super::*;
     use crate::brdf::Brdf;
-    use crate::brdf::tests::Farthest;
     use crate::brdf::tests::samples::of_model;
+    use crate::farthest::Farthest;
     use crate::threads::test_materials;
 
     #[test]

@@ -13,7 +13,7 @@ pub fn texels_of(prepared: &Prepared, rendering: &Rendering, pixel: UVec2) -> Ve
     texels_of_pixel(&prepared.view, &rendering.geometry, pixel)
 }
 
-#[path = "../../src/brdf/tests/farthest.rs"]
+#[path = "../../src/farthest.rs"]
 mod farthest;
 pub use farthest::Farthest;
 

@@ -127,8 +127,8 @@ fn directions(theta_h: f64, theta_d: usize, phi_d: usize) -> (DVec3, DVec3) {
 mod tests {
     use super::*;
     use crate::brdf::MerlTable;
-    use crate::brdf::tests::Farthest;
     use crate::brdf::tests::samples::of_model;
+    use crate::farthest::Farthest;
 
     #[test]
     fn an_exported_brdf_comes_back() {

@@ -85,8 +85,8 @@ fn table(bytes: &[u8]) -> Result<Goniometric, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::brdf::tests::Farthest;
     use crate::brdf::tests::direction;
+    use crate::farthest::Farthest;
     use glam::dvec3;
 
     /// The bytes of a file of 3 angles, 4 or 8 azimuths and 2 turns, with `value` of plane, theta_in, theta_out, phi_diff and phi_in, in bins.

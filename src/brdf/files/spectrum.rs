@@ -133,7 +133,7 @@ const CIE_1931_AND_D65: [[f64; 4]; 81] = [
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::brdf::tests::Farthest;
+    use crate::farthest::Farthest;
 
     /// The colour of a spectrum that is given at these wavelengths.
     fn colour(wavelengths_nm: &[f64], spectrum: impl Fn(f64) -> f64) -> DVec3 {

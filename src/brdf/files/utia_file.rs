@@ -77,8 +77,8 @@ fn make_one_along_the_normal(plane: &mut [f32]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::brdf::tests::Farthest;
     use crate::brdf::tests::direction;
+    use crate::farthest::Farthest;
     use glam::dvec3;
 
     /// The bytes of a file with `value` of plane, theta_i, phi_i, theta_v and phi_v, these in steps.

@@ -142,9 +142,9 @@ impl Model for Custom {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::brdf::tests::Farthest;
     use crate::brdf::tests::samples::of_model;
     use crate::brdf::{half_vector_width, lobe_radius, reflect, tabulate};
+    use crate::farthest::Farthest;
     use glam::{DVec2, dvec3};
     use std::f64::consts::{FRAC_PI_2, PI};
 

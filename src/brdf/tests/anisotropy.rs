@@ -3,6 +3,7 @@ use rayon::prelude::*;
 
 use super::samples::of_model;
 use super::*;
+use crate::farthest::Farthest;
 
 /// Pairs of directions all over the hemisphere, half of them near mirror directions.
 fn pairs() -> impl Iterator<Item = (DVec3, DVec3)> {

@@ -3,6 +3,7 @@ use std::f64::consts::{FRAC_1_PI, PI};
 
 use super::samples::of_model;
 use super::*;
+use crate::farthest::Farthest;
 
 /// Pairs of directions up to `most_deg` from the normal.
 fn pairs(most_deg: f64) -> impl Iterator<Item = (DVec3, DVec3)> {

@@ -3,6 +3,7 @@ use rayon::prelude::*;
 
 use super::samples;
 use super::*;
+use crate::farthest::Farthest;
 
 /// Pairs of directions all over the hemisphere.
 fn pairs() -> impl Iterator<Item = (DVec3, DVec3)> {

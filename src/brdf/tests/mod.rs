@@ -1,12 +1,11 @@
 //! Physics of the BRDFs, against closed forms, reciprocity and energy; and hostile input.
-pub use farthest::Farthest;
 
 use super::*;
+use crate::farthest::Farthest;
 
 mod anisotropy;
 mod closed_forms;
 mod every_model;
-mod farthest;
 mod published_fits;
 mod rgl;
 pub(crate) mod samples;

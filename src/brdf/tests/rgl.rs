@@ -2,6 +2,7 @@
 use std::path::Path;
 
 use super::*;
+use crate::farthest::Farthest;
 use crate::files::measured;
 
 /// The folder of measured files.

@@ -248,8 +248,8 @@ fn tent_integrals(start: f64, size: f64, count: usize, measure: impl Fn(f64) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::brdf::tests::Farthest;
     use crate::environment::tests::environment;
+    use crate::farthest::Farthest;
 
     /// The integral of radiance times g over a cell, by midpoints.
     fn midpoints(map: &Environment, place: CellPlace, g: impl Fn(f64, f64) -> f64) -> DVec3 {

@@ -4,10 +4,11 @@ use std::f64::consts::{FRAC_1_PI, PI, TAU};
 use glam::{DQuat, DVec2, DVec3, dvec3};
 
 use super::*;
-use crate::brdf::tests::{Farthest, conductor, samples::of_model};
+use crate::brdf::tests::{conductor, samples::of_model};
 use crate::brdf::{Brdf, MAX_THETA_O_DEG};
 use crate::environment::Environment;
 use crate::environment::tests::environment;
+use crate::farthest::Farthest;
 
 const DISPLAY: Display = Display { exposure: 1.0, gamma: 2.2 };
 

@@ -6,8 +6,9 @@ use rayon::prelude::*;
 
 use super::*;
 use crate::brdf::base_files_of;
-use crate::brdf::tests::{Farthest, direction, from_toml};
+use crate::brdf::tests::{direction, from_toml};
 use crate::brdf::{fresnel_dielectric, merl_bytes};
+use crate::farthest::Farthest;
 
 fn read(text: &str) -> Result<Brdf> {
     from_toml(&text.replace(';', "\n"))
