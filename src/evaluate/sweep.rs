@@ -62,8 +62,8 @@ pub struct Row {
     pub max: f64,
     /// See [`Metrics::nan`].
     pub nan: u64,
-    /// Time of the passes that make linear radiance, on the GPU: geometry cache, classification and shading, without copying the
-    /// picture back; in milliseconds.
+    /// Time of the passes that make linear radiance, on the GPU: geometry cache, classification, shading and background, without copying
+    /// the picture back; in milliseconds.
     pub gpu_ms: f64,
     /// From the start of recording until the GPU is done and has copied the picture back, in milliseconds.
     pub frame_ms: f64,

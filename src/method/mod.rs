@@ -4,6 +4,7 @@
 //! What makes that GLSL file a shader is `shade_shader` of `passes/shade.rs`: nothing here knows a device.
 use crate::environment::Environment;
 use crate::error::{Error, Result};
+use crate::shader_constants::ris::CANDIDATES;
 use crate::threads::ThreadKind;
 
 mod lookups;
@@ -60,8 +61,8 @@ impl Method {
     pub fn max_count(self, subpixels: u32) -> u32 {
         // A pixel at an edge takes all samples in each sub-pixel. lavapipe silently leaves loops after 65535 iterations in all.
         const MOST_ITERATIONS: u32 = 65_000;
-        // Samples of `ris` have a loop of their own, over four pairs of candidates and once more to find its end.
-        let iterations_a_sample = if self == Self::Ris { 6 } else { 1 };
+        // Samples of `ris` have a loop of their own, over pairs of candidates and once more to find its end.
+        let iterations_a_sample = if self == Self::Ris { CANDIDATES / 2 + 2 } else { 1 };
         let most_samples = MOST_ITERATIONS / (subpixels * subpixels * iterations_a_sample);
         let samples = if self.lookups().split_sum { 1 } else { most_samples };
         self.threads().map_or(samples, |kind| kind.max_count() as u32)

@@ -3,6 +3,7 @@ use super::{CameraRays, Counters, DeviceIrradiance, DeviceLight, DeviceMaterials
 use crate::graph::{BufferDesc, BufferHandle, FrameGraph, ImageDesc, ImageHandle};
 use crate::memo::Keyed;
 use crate::method::{Method, Sampling};
+use crate::shader_constants::ris::CANDIDATES;
 use crate::vulkan::{ComputePipeline, Shader, compiled};
 use crate::{Error, Result};
 use ash::vk;
@@ -53,7 +54,7 @@ const SAMPLES_OF_LAMPS: u64 = 5;
 
 impl Shade {
     /// In how many portions a picture is shaded, so that no submission takes too long. Fitted threads are a sixteenth of the work of a sample or
-    /// less, those of the paper a seventh (512 take 3.7 ms on that GPU, 512 samples 26 ms), samples of `ris` are four times that. At edges each
+    /// less, those of the paper a seventh (512 take 3.7 ms on that GPU, 512 samples 26 ms), samples of `ris` as much for each two of their candidates. At edges each
     /// sub-pixel has all samples and all lamps: where all pixels are edges, 2 x 2 of them take as long as may be, and more count as more.
     pub(crate) fn portion_count(&self, view: &View) -> u32 {
         let pixels = u64::from(view.width) * u64::from(view.height);
@@ -61,7 +62,7 @@ impl Shade {
         let times_edges = (u64::from(view.subpixels).pow(2) / 4).max(1);
         let of_lamps = if self.light.has_lamps() { SAMPLES_OF_LAMPS } else { 0 };
         let work = match self.method {
-            Method::Ris => 4 * samples * times_edges * pixels,
+            Method::Ris => u64::from(CANDIDATES / 2) * samples * times_edges * pixels,
             Method::Paper => samples * times_edges * pixels / 7,
             method if method.threads().is_some() => (samples + 16 * of_lamps) * times_edges * pixels / 16,
             _ => samples * times_edges * pixels,
