@@ -53,20 +53,30 @@ fn wherever_the_device_fails_it_is_said_and_nothing_is_left() {
     }
 }
 
+/// The default scene but for its material, light and number of threads, on a device, with the memo that has what it is made of.
+fn on_device(
+    material: MaterialSource,
+    environment: &str,
+    threads: u32,
+    (device, memo): &(Arc<Device>, Memo),
+) -> DeviceScene {
+    let mut scene = Scene::default();
+    (scene.image.width, scene.image.height) = (8, 6);
+    scene.environment.source = Source::Builtin(environment.to_owned());
+    scene.materials[0].source = material;
+    scene.shading.threads = Some(threads);
+    let round = memo.round(&());
+    let prepared = prepare(&scene, &round).expect("a scene that can be prepared");
+    DeviceScene::new(device, &prepared, &round).expect("a scene that fits the device")
+}
+
 #[test]
 fn pictures_of_8_megapixels_are_shaded_at_once_by_64_threads_unless_there_are_lamps() {
-    let (device, _) = test_device::open_validated();
-    let memo = Memo::default();
+    let made = (test_device::open_validated().0, Memo::default());
     let portions = |environment: &str, width: u32, height: u32, threads: u32| {
-        let mut scene = Scene::default();
-        (scene.image.width, scene.image.height) = (8, 6);
-        scene.environment.source = Source::Builtin(environment.to_owned());
-        scene.shading.threads = Some(threads);
-        let round = memo.round(&());
-        let prepared = prepare(&scene, &round).expect("a scene that can be prepared");
-        let of_device = DeviceScene::new(&device, &prepared, &round).expect("a scene that fits the device");
-        let view = View { width, height, ..of_device.view.clone() };
-        of_device.shade.portion_count(&view)
+        let DeviceScene { view, shade, .. } =
+            on_device(MaterialSource::Builtin("gold".to_owned()), environment, threads, &made);
+        shade.portion_count(&View { width, height, ..view })
     };
     assert_eq!(portions("white", 4096, 2048, 64), 1);
     assert_eq!(portions("white", 4096, 2049, 64), 2);
@@ -76,19 +86,9 @@ fn pictures_of_8_megapixels_are_shaded_at_once_by_64_threads_unless_there_are_la
 
 #[test]
 fn only_what_sharp_kernels_need_at_grazing_views_makes_a_second_shader() {
-    let (device, _) = test_device::open_validated();
-    let memo = Memo::default();
-    let shaders = |material: MaterialSource| {
-        let mut scene = Scene::default();
-        (scene.image.width, scene.image.height) = (8, 6);
-        scene.environment.source = Source::Builtin("lamps-70".to_owned());
-        scene.materials[0].source = material;
-        let round = memo.round(&());
-        let prepared = prepare(&scene, &round).expect("a scene that can be prepared");
-        let of_device = DeviceScene::new(&device, &prepared, &round).expect("a scene that fits the device");
-        // One for each class of pixels: interior ones and those at edges.
-        of_device.shade.pipelines.len() / 2
-    };
+    let made = (test_device::open_validated().0, Memo::default());
+    // One pipeline for each class of pixels: interior ones and those at edges.
+    let shaders = |material| on_device(material, "lamps-70", 16, &made).shade.pipelines.len() / 2;
     // Above 80 degrees it has kernels sharper than the pyramid.
     let parameters = "distribution = 'beckmann'\nalpha = 0.015\nior = 1.5\ndiffuse = [0.6, 0.6, 0.55]";
     let parameters = parameters.parse().expect("TOML");

@@ -104,7 +104,6 @@ fn pictures_are_to_the_byte_those_of_files_of_the_same_numbers() {
             let wanted = Wanted { radiance: true, display: true, geometry: true };
             let prepared = prepare(&scene(environment.clone(), mesh.clone()), &gpu.round()).expect("a scene");
             let rendering = gpu.render(&prepared, wanted);
-            drop(prepared);
             gpu.finish();
             let bits: Vec<_> = rendering.radiance.iter().map(|texel| texel.map(f32::to_bits)).collect();
             (bits, rendering.display, rendering.geometry)

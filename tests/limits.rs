@@ -74,7 +74,7 @@ fn cube() -> Scene {
     ball().with_mesh(mesh(corners, &sides))
 }
 
-/// Prints a row for each number of threads, whose RMS has to be about the number beside it: that of the chapter, which is rounded, or less.
+/// Prints a row for each number of threads, whose RMS has to be the number beside it, which the chapter states, within 30 %.
 fn measure(gpu: &Validated, name: &str, material: &str, light: EnvironmentSource, scene: Scene, stated: &[(u32, f64)]) {
     let cases = Cases {
         methods: vec![Method::Fitted.into()],
@@ -93,7 +93,7 @@ fn measure(gpu: &Validated, name: &str, material: &str, light: EnvironmentSource
     assert_eq!(measured.rows.len(), stated.len(), "{name}");
     for (row, &(threads, stated)) in measured.rows.iter().zip(stated) {
         println!("{name:34}{threads:8}{:8.4}{:7.2}", row.rms, row.max);
-        // Other processors fit a little otherwise.
+        // The chapter rounds: 0.0005 may be 0.00045.
         let is_as_stated = (0.7 * stated..1.3 * stated).contains(&row.rms);
         assert!(row.threads == threads && is_as_stated, "{name}, stated {stated}: {row:?}");
     }

@@ -412,13 +412,9 @@ fn closing_takes_less_than_a_second_whatever_is_being_made() {
     let many_threads = "\"wait\"\n{\"set\": {\"threads\": 128}}\n{\"move\": [10, 10]}\n\"quit\"".to_owned();
     let drag = format!("\"wait\"\n{}\"quit\"", (0..10).map(alpha).collect::<String>());
     for (material, replay) in [("silver", many_threads), ("gold", drag)] {
-        // Whatever is being made ends within 0.8 s: what other work on the machine delays is tried again.
-        let closes_at_once = || {
-            let time = time_to_close(&viewer, &["--material", material, "--environment", "white"], &replay);
-            println!("{material}: {time:?}");
-            time < Duration::from_secs(1)
-        };
-        assert!((0..3).any(|_| closes_at_once()), "{replay}");
+        let time = time_to_close(&viewer, &["--material", material, "--environment", "white"], &replay);
+        println!("{material}: {time:?}");
+        assert!(time < Duration::from_secs(1), "{time:?}: {replay}");
     }
 }
 

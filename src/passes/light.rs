@@ -25,7 +25,7 @@ pub struct DeviceLight {
 
 impl DeviceLight {
     /// Whether there are small bright sources that are shaded by the BRDF.
-    pub(crate) fn has_lamps(&self) -> bool {
+    pub(super) fn has_lamps(&self) -> bool {
         self.has_lamps
     }
 }

@@ -8,7 +8,7 @@ use crate::{Error, Result};
 /// Whether `device` can render a picture as large as that of `scene`, which need not be prepared yet.
 ///
 /// # Errors
-/// More sub-pixels along a side than images of `device` can have, or more pixels than its shaders can list.
+/// More sub-pixels along a side than `device` draws, or more pixels than its shaders can list.
 pub fn check_picture(device: &Device, Scene { image, shading, .. }: &Scene) -> Result<()> {
     let &ImageSettings { width, height, subpixels, .. } = image;
     check_cache_size(device, [width, height].map(|side| side.saturating_mul(subpixels)))?;
@@ -32,7 +32,7 @@ pub(crate) fn check_lists(device: &Device, size_px: [u32; 2], shaders: usize) ->
     Err(Error::input("image size", problem, "use a smaller size"))
 }
 
-/// An error for a geometry cache of so many columns and rows of sub-pixels, if images of `device` cannot be so large.
+/// An error for a geometry cache of so many columns and rows of sub-pixels, if `device` does not draw so large ones.
 pub(crate) fn check_cache_size(device: &Device, [width, height]: [u32; 2]) -> Result<()> {
     let largest = device.longest_target_side();
     if width.max(height) <= largest {

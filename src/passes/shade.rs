@@ -54,8 +54,8 @@ const SAMPLES_OF_LAMPS: u64 = 5;
 
 impl Shade {
     /// In how many portions a picture is shaded, so that no submission takes too long. Fitted threads are a sixteenth of the work of a sample or
-    /// less, those of the paper a seventh (512 take 3.7 ms on that GPU, 512 samples 26 ms), samples of `ris` as much for each two of their candidates. At edges each
-    /// sub-pixel has all samples and all lamps: where all pixels are edges, 2 x 2 of them take as long as may be, and more count as more.
+    /// less, those of the paper a seventh (512 take 3.7 ms on that GPU, 512 samples 26 ms), and each two candidates of `ris` are a sample. At edges
+    /// each sub-pixel has all samples and all lamps: where all pixels are edges, 2 x 2 of them take as long as may be, and more count as more.
     pub(crate) fn portion_count(&self, view: &View) -> u32 {
         let pixels = u64::from(view.width) * u64::from(view.height);
         let samples = u64::from(self.sampling.count);

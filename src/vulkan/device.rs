@@ -256,7 +256,7 @@ impl Device {
         &self.properties.limits
     }
 
-    /// Columns or rows that an image can have which is drawn into.
+    /// Most columns and rows of an image that is drawn into.
     pub fn longest_target_side(&self) -> u32 {
         let limits = self.limits();
         let [viewport_width, viewport_height] = limits.max_viewport_dimensions;

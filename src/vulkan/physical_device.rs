@@ -91,7 +91,7 @@ pub(super) struct Candidate {
     pub properties: vk::PhysicalDeviceProperties,
     pub queue_family: u32,
     pub timestamp_valid_bits: u32,
-    /// The largest buffer; what needs more memory is refused by allocation where the device does not say.
+    /// Most bytes of a buffer; `u64::MAX` where the device does not say.
     pub most_buffer_bytes: u64,
     pub driver: vk::DriverId,
     pub extensions: Vec<&'static CStr>,
@@ -119,7 +119,7 @@ pub(super) fn candidates(instance: &Instance) -> Result<Vec<Candidate>> {
     physical_devices.into_iter().enumerate().map(|(index, physical)| candidate(instance, index, physical)).collect()
 }
 
-/// How large buffers can be: Vulkan 1.3 tells.
+/// Most bytes of a buffer, which devices say from Vulkan 1.3 on (`maxBufferSize`).
 fn most_buffer_bytes(instance: &Instance, physical: vk::PhysicalDevice, api_version: u32) -> u64 {
     if api_version < vk::API_VERSION_1_3 {
         return u64::MAX;

@@ -9,18 +9,29 @@ use threadlight::low_level::vulkan::{Device, PipelineCache};
 use crate::common::{bare_device, program};
 use crate::readers::Reader;
 
-/// What of the processor's time and of addresses the program may take, in seconds and KiB, where there is a shell: its own threads and blocks of
-/// memory take 1 GiB of these.
+/// The program's name and arguments follow: it ends if it takes more than a second of the processor's time, or 2 GiB of addresses. Of these clay takes
+/// less than 128 MiB on two cores; allocators reserve more for each further one.
 const LIMITS: &str = "ulimit -t 1 && ulimit -v 2097152 && exec \"$0\" \"$@\"";
+
+/// `program` within [`LIMITS`], which are those of Unix.
+fn limited(program: &Command) -> Command {
+    let mut limited = Command::new("sh");
+    limited.args(["-c", LIMITS]).arg(program.get_program());
+    if let Some(folder) = program.get_current_dir() {
+        limited.current_dir(folder);
+    }
+    for (name, value) in program.get_envs() {
+        match value {
+            Some(value) => limited.env(name, value),
+            None => limited.env_remove(name),
+        };
+    }
+    limited
+}
 
 /// Gives the program `bytes` on its standard input; the error is what it says.
 fn evaluate(arguments: &[&str], bytes: &[u8]) -> Result<(), String> {
-    let unlimited = program(env!("CARGO_TARGET_TMPDIR"));
-    let mut program = Command::new("sh")
-        .args(["-c", LIMITS])
-        .arg(unlimited.get_program())
-        .envs(unlimited.get_envs().filter_map(|(name, value)| Some((name, value?))))
-        .env_remove("RUST_LOG")
+    let mut program = limited(&program(env!("CARGO_TARGET_TMPDIR")))
         .args(["materials", "evaluate", "clay"])
         .args(arguments)
         .stdin(Stdio::piped())
