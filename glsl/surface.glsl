@@ -15,14 +15,19 @@ struct Surface {
     vec2 phi_o;
 };
 
+// Below this, the rounding error of what of w_o is orthogonal to n, its direction means nothing; the frame may then turn freely about n:
+// what is seen along n has no azimuth, and phi_o follows the frame.
+const float LEAST_SIN_THETA_O = 1e-6;
+
+// Tangents of unit length whose sum is shorter cancel each other: any will do.
+const float LEAST_TANGENT = 1e-3;
+
 // n and w_o are unit vectors.
 Surface make_surface(vec3 n, vec3 w_o) {
     float cos_theta_o = dot(n, w_o);
     vec3 across = w_o - cos_theta_o * n;
     float sin_theta_o = length(across);
-    // Below 1e-6, the rounding error of `across`, its direction means nothing; the frame may then turn freely about n:
-    // what is seen along n has no azimuth, and phi_o follows the frame.
-    vec3 x = sin_theta_o > 1e-6 ? across / sin_theta_o : any_tangent(n);
+    vec3 x = sin_theta_o > LEAST_SIN_THETA_O ? across / sin_theta_o : any_tangent(n);
     Surface surface;
     surface.frame = mat3(x, cross(n, x), n);
     surface.w_o = w_o;
@@ -36,9 +41,8 @@ Surface make_surface(vec3 n, vec3 w_o) {
 void set_tangent(inout Surface surface, vec3 tangent) {
     // The tangent's azimuth in the shading frame is -phi_o.
     vec2 along = vec2(dot(surface.frame[0], tangent), -dot(surface.frame[1], tangent));
-    // Tangents of unit length whose sum is shorter than 1e-3 cancel each other: any will do.
     float size = length(along);
-    surface.phi_o = size > 1e-3 ? along / size : vec2(1.0, 0.0);
+    surface.phi_o = size > LEAST_TANGENT ? along / size : vec2(1.0, 0.0);
 }
 
 // `w` of the shading frame, turned about z by an angle of this cosine and sine.

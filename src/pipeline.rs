@@ -141,7 +141,7 @@ impl DeviceScene {
 
     /// Where in the picture objects may be.
     pub(crate) fn region(&self, view: &View) -> Region {
-        self.geometry_cache.region(view, self.classify.tile_px())
+        self.geometry_cache.region(view)
     }
 
     /// An error for a `view` that is larger than the device can do with the shaders that the scene has.
@@ -171,7 +171,7 @@ impl DeviceScene {
         self.check_size(&self.view)?;
         let mut graph = FrameGraph::new();
         let region = match wanted.geometry {
-            true => Region::whole(&self.view, self.classify.tile_px()),
+            true => Region::whole(&self.view),
             false => self.region(&self.view),
         };
         let frame = declare(&mut graph, self, region, &self.view);
@@ -262,7 +262,7 @@ fn ask_geometry_cache(device: &Arc<Device>, prepared: &Prepared, round: &Round) 
 pub fn render_geometry(device: &Arc<Device>, prepared: &Prepared, round: &Round) -> Result<Vec<[u32; 2]>> {
     let pass = ask_geometry_cache(device, prepared, round)?;
     let mut graph = FrameGraph::new();
-    let geometry = geometry_cache(&mut graph, &pass, Region::whole(&prepared.view, [1, 1]), &prepared.view);
+    let geometry = geometry_cache(&mut graph, &pass, Region::whole(&prepared.view), &prepared.view);
     let mut readbacks = Readbacks::new(device, graph);
     let target = readbacks.image("geometry", geometry, true)?;
     readbacks.run("geometry")?;

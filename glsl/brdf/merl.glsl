@@ -2,9 +2,13 @@
 // a.x, a.y: y and z offset of this table in the atlas of all tables, in texels; a.z: what a texel of 1 stands for.
 //
 // The including shader defines `vec4 brdf_table_texel(vec3 texel_coordinate)`: a trilinear fetch from the atlas at a position
-// in texels (centres at i + 0.5) whose x repeats every 60.
+// in texels (centres at i + 0.5) whose x repeats every PHI_D_TEXELS.
 #include "../arc_tangent.glsl"
 #include "parameters.glsl"
+
+// Texels of a table along phi_d, 0 to 180 degrees, and along theta_d and theta_h, 0 to 90.
+const float PHI_D_TEXELS = 60.0;
+const float THETA_TEXELS = 90.0;
 
 vec3 merl(BrdfParameters parameters, vec3 w_i, vec3 w_o) {
     vec3 h = normalize(w_i + w_o);
@@ -21,9 +25,9 @@ vec3 merl(BrdfParameters parameters, vec3 w_i, vec3 w_o) {
     if (d.x * d.y < 0.0) phi_d = 2.0 * HALF_PI - phi_d;
 
     // Clamped by hand so that neighbours in the atlas never bleed in.
-    float x = 60.0 * phi_d / (2.0 * HALF_PI);
-    float y = clamp(90.0 * theta_d / HALF_PI, 0.5, 89.5) + parameters.a.x;
-    float z = clamp(90.0 * sqrt(theta_h / HALF_PI), 0.5, 89.5) + parameters.a.y;
+    float x = PHI_D_TEXELS * phi_d / (2.0 * HALF_PI);
+    float y = clamp(THETA_TEXELS * theta_d / HALF_PI, 0.5, THETA_TEXELS - 0.5) + parameters.a.x;
+    float z = clamp(THETA_TEXELS * sqrt(theta_h / HALF_PI), 0.5, THETA_TEXELS - 0.5) + parameters.a.y;
     vec4 texel = brdf_table_texel(vec3(x, y, z));
     return texel.a > 0.0 ? parameters.a.z / texel.a * texel.rgb : vec3(0.0);
 }

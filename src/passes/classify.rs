@@ -103,14 +103,6 @@ pub struct Classify {
     pub shader_of_mixed: u32,
 }
 
-impl Classify {
-    /// Width and height of a tile in pixels: it is a workgroup.
-    pub fn tile_px(&self) -> [u32; 2] {
-        let [width, height, _] = self.pipeline.group_size();
-        [width, height]
-    }
-}
-
 /// Which shader a material is shaded by: the same in glsl/classify.comp.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]

@@ -198,8 +198,8 @@ impl GeometryCache {
         })
     }
 
-    /// Where in the picture objects may be, in tiles of this size.
-    pub fn region(&self, view: &View, tile_px: [u32; 2]) -> Region {
+    /// Where in the picture objects may be.
+    pub fn region(&self, view: &View) -> Region {
         let (_, _, forward) = view.camera.basis();
         let corners = self.seen(view).flat_map(|object| {
             let &DeviceMesh { sphere, bounds: (low, high), .. } = &*self.meshes[object.mesh];
@@ -213,7 +213,7 @@ impl GeometryCache {
                 Corner { from_eye: turned + from_eye, error: ROUNDING * (turned.length() + off_axis) }
             })
         });
-        Region::of_boxes(view, tile_px, corners)
+        Region::of_boxes(view, corners)
     }
 
     /// A sphere around an object, in world space.

@@ -1,5 +1,6 @@
 //! Which part of the picture objects may be in: what is drawn, cleared and sorted; the rest of it sees no surface.
 use super::View;
+use crate::shader_constants::tiles::TILE_SIDE;
 use glam::{DVec2, DVec3};
 use std::cmp::Ordering;
 
@@ -10,8 +11,6 @@ pub struct Region {
     pub first_tile: [u32; 2],
     /// Those after the last.
     pub end_tile: [u32; 2],
-    /// Width and height of a tile in pixels.
-    pub tile_px: [u32; 2],
 }
 
 /// A corner of a box around an object, as seen from the eye.
@@ -33,12 +32,12 @@ const MIN_DEPTH: f64 = 0.01;
 
 impl Region {
     /// All of the picture.
-    pub fn whole(view: &View, tile_px: [u32; 2]) -> Self {
-        Self { first_tile: [0; 2], end_tile: tiles(view, tile_px), tile_px }
+    pub fn whole(view: &View) -> Self {
+        Self { first_tile: [0; 2], end_tile: tiles(view) }
     }
 
     /// Where boxes with these corners are in the picture.
-    pub fn of_boxes(view: &View, tile_px: [u32; 2], corners: impl IntoIterator<Item = Corner>) -> Self {
+    pub fn of_boxes(view: &View, corners: impl IntoIterator<Item = Corner>) -> Self {
         let (right, up, forward) = view.camera.basis();
         let half_size = view.half_size();
         let size_px = DVec2::new(f64::from(view.width), f64::from(view.height));
@@ -48,7 +47,7 @@ impl Region {
             let least_depth = (MIN_DEPTH * from_eye.length()).max(error / MIN_DEPTH);
             // A NaN is not before the eye.
             if depth.partial_cmp(&least_depth) != Some(Ordering::Greater) {
-                return Self::whole(view, tile_px);
+                return Self::whole(view);
             }
             let px = 0.5 * size_px / (depth * half_size);
             let place = 0.5 * size_px + px * DVec2::new(from_eye.dot(right), -from_eye.dot(up));
@@ -56,20 +55,20 @@ impl Region {
             let margin = MARGIN_PX + px * error * (1.0 + from_eye.length() / depth);
             (low, high) = (low.min(place - margin), high.max(place + margin));
         }
-        let tile = DVec2::new(f64::from(tile_px[0]), f64::from(tile_px[1]));
-        let end = tiles(view, tile_px);
+        let end = tiles(view);
+        let tile_px = f64::from(TILE_SIDE);
         // Without corners, or with all of them beside the picture, the first tile stands for nothing.
-        let (first, last) = ((low / tile).floor().to_array(), (high / tile).ceil().to_array());
+        let (first, last) = ((low / tile_px).floor().to_array(), (high / tile_px).ceil().to_array());
         let first_tile = [0, 1].map(|axis| (first[axis].max(0.0) as u32).min(end[axis] - 1));
         let end_tile = [0, 1].map(|axis| (last[axis].max(0.0) as u32).clamp(first_tile[axis] + 1, end[axis]));
-        Self { first_tile, end_tile, tile_px }
+        Self { first_tile, end_tile }
     }
 
     /// Left, top, width and height in sub-pixels of `view`.
     pub fn subpixels(&self, view: &View) -> [u32; 4] {
         let size = [view.width, view.height];
-        let first = [0, 1].map(|axis| self.first_tile[axis] * self.tile_px[axis]);
-        let end = [0, 1].map(|axis| (self.end_tile[axis] * self.tile_px[axis]).min(size[axis]));
+        let first = [0, 1].map(|axis| self.first_tile[axis] * TILE_SIDE);
+        let end = [0, 1].map(|axis| (self.end_tile[axis] * TILE_SIDE).min(size[axis]));
         [first[0], first[1], end[0] - first[0], end[1] - first[1]].map(|pixels| pixels * view.subpixels)
     }
 
@@ -80,16 +79,14 @@ impl Region {
 }
 
 /// Columns and rows of tiles of the picture.
-fn tiles(view: &View, tile_px: [u32; 2]) -> [u32; 2] {
-    [view.width.div_ceil(tile_px[0]), view.height.div_ceil(tile_px[1])]
+fn tiles(view: &View) -> [u32; 2] {
+    [view.width, view.height].map(|pixels| pixels.div_ceil(TILE_SIDE))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::scene::Camera;
-
-    const TILE_PX: [u32; 2] = [8, 8];
 
     fn exact(from_eye: DVec3) -> Corner {
         Corner { from_eye, error: 0.0 }
@@ -128,7 +125,7 @@ mod tests {
             let corner = |k: usize| {
                 centre + half * DVec3::from([0, 1, 2].map(|axis| f64::from((k >> axis & 1) as u8) * 2.0 - 1.0))
             };
-            let region = Region::of_boxes(&view, TILE_PX, (0..8).map(corner).map(exact));
+            let region = Region::of_boxes(&view, (0..8).map(corner).map(exact));
             let [left, top, width, height] = region.subpixels(&view).map(|subpixels| f64::from(subpixels) / 2.0);
             for k in 0..200 {
                 let at = |m: usize| (k * m % 199) as f64 / 99.0 - 1.0;
@@ -140,7 +137,7 @@ mod tests {
                 let is_within = pixel.x >= left && pixel.y >= top && pixel.x < left + width && pixel.y < top + height;
                 assert!(is_within, "{centre} {half}: {pixel} is not in {region:?}");
             }
-            let whole = Region::whole(&view, TILE_PX);
+            let whole = Region::whole(&view);
             if let Some(corners) = (0..8).map(|k| pixel_of(&view, corner(k))).collect::<Option<Vec<_>>>()
                 && region != whole
             {
@@ -157,17 +154,17 @@ mod tests {
     fn what_is_behind_the_eye_or_undefined_may_be_anywhere_and_nothing_is_one_tile() {
         let view = view();
         let (_, _, forward) = view.camera.basis();
-        let whole = Region::whole(&view, TILE_PX);
+        let whole = Region::whole(&view);
         assert_eq!((whole.tiles(), whole.subpixels(&view)), ([51, 26], [0, 0, 806, 406]));
         for corners in [vec![forward, -forward], vec![DVec3::ZERO], vec![forward, DVec3::NAN]] {
-            assert_eq!(Region::of_boxes(&view, TILE_PX, corners.into_iter().map(exact)), whole);
+            assert_eq!(Region::of_boxes(&view, corners.into_iter().map(exact)), whole);
         }
-        assert_eq!(Region::of_boxes(&view, TILE_PX, [Corner { from_eye: forward, error: 0.02 }]), whole);
-        assert_eq!(Region::of_boxes(&view, TILE_PX, []).tiles(), [1, 1]);
+        assert_eq!(Region::of_boxes(&view, [Corner { from_eye: forward, error: 0.02 }]), whole);
+        assert_eq!(Region::of_boxes(&view, []).tiles(), [1, 1]);
         // Right of the picture and below it.
         let (right, up, _) = view.camera.basis();
         for beside in [forward + 2.0 * right, forward - 2.0 * up, forward + 2.0 * up, forward - 2.0 * right] {
-            let [columns, rows] = Region::of_boxes(&view, TILE_PX, [exact(beside)]).tiles();
+            let [columns, rows] = Region::of_boxes(&view, [exact(beside)]).tiles();
             assert!(columns == 1 || rows == 1, "{beside}");
         }
     }
@@ -182,7 +179,7 @@ mod tests {
         {
             let beside = 0.0013 * f64::from(step);
             let at = forward + (0.1 + beside) * right - (0.05 + beside) * up;
-            let [left, top, width, height] = Region::of_boxes(&view, TILE_PX, [Corner { from_eye: at, error }])
+            let [left, top, width, height] = Region::of_boxes(&view, [Corner { from_eye: at, error }])
                 .subpixels(&view)
                 .map(|subpixels| f64::from(subpixels) / 2.0);
             for k in 0..200 {

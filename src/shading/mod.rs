@@ -11,6 +11,7 @@ use crate::memo::Round;
 use crate::method::{Lookups, Method, Pattern};
 use crate::passes::{SMOOTH_DEG, SmoothVariance, View};
 use crate::prepare::{Prepared, PreparedMaterial};
+use crate::shader_constants::surface::{LEAST_COS_THETA_O, LEAST_SIN_THETA_O, LEAST_TANGENT};
 use crate::steps::{LookedUp, light};
 use crate::tangent::any_tangent;
 use crate::threads::fitted::{place_of_sum, sums_of_pixel};
@@ -75,8 +76,7 @@ impl Surface {
         let cos_theta_o = n.dot(w_o);
         let across = w_o - cos_theta_o * n;
         let sin_theta_o = across.length();
-        // The reason for 1e-6 stands in the shader.
-        let x = if sin_theta_o > 1e-6 { across / sin_theta_o } else { any_tangent(n) };
+        let x = if sin_theta_o > LEAST_SIN_THETA_O { across / sin_theta_o } else { any_tangent(n) };
         Self {
             frame: Mat3::from_cols(x, n.cross(x), n),
             w_o,
@@ -89,16 +89,18 @@ impl Surface {
     /// Turns the tangent to what of `tangent`, of any length, is in the tangent plane. Twin of `set_tangent`.
     pub fn set_tangent(&mut self, tangent: Vec3) {
         let along = Vec2::new(self.frame.x_axis.dot(tangent), -self.frame.y_axis.dot(tangent));
-        // The reason for 1e-3 stands in the shader.
-        self.phi_o = if along.length() > 1e-3 { along / along.length() } else { Vec2::X };
+        self.phi_o = if along.length() > LEAST_TANGENT { along / along.length() } else { Vec2::X };
     }
 
     /// Towards the eye in the shading frame, at most [`MAX_THETA_O_DEG`] from the normal. Twin of `view_direction`.
     pub fn view_direction(&self) -> Vec3 {
-        let cos_theta_o = self.frame.z_axis.dot(self.w_o).max(MAX_THETA_O_DEG.to_radians().cos() as f32);
+        let cos_theta_o = self.frame.z_axis.dot(self.w_o).max(LEAST_COS_THETA_O);
         Vec3::new(self.frame.x_axis.dot(self.w_o), 0.0, cos_theta_o).normalize()
     }
 }
+
+/// The cosine of an angle so near to a right one is what it lacks.
+const _: () = assert!((LEAST_COS_THETA_O as f64 / (90.0 - MAX_THETA_O_DEG).to_radians() - 1.0).abs() < 1e-4);
 
 /// Where a view angle (radians) is among `count` rows, in single precision as shaders have it; and the rows below and above.
 fn rows_around(theta_o: f32, count: usize) -> (f32, [usize; 2]) {

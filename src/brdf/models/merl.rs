@@ -12,6 +12,7 @@ use crate::brdf::made_table::GREATEST_TEXEL;
 use crate::brdf::models::MOST_MEASURED;
 use crate::brdf::{Model, Parameters};
 use crate::error::{Error, Result};
+use crate::shader_constants::merl as glsl;
 use crate::vector_math::half_floats;
 
 /// Bins over theta_h (square-root spaced, 0 to 90 degrees).
@@ -33,6 +34,8 @@ const BINS_A_TEXEL: usize = 3;
 
 /// Texels of a table on the device along x, y and z of a 3D texture: phi_d, theta_d and theta_h.
 pub const DEVICE_TABLE_SIZE: [usize; 3] = [PHI_D_BINS / BINS_A_TEXEL, THETA_D_BINS, THETA_H_BINS];
+const _: () = assert!(DEVICE_TABLE_SIZE[0] == glsl::PHI_D_TEXELS as usize);
+const _: () = assert!(THETA_D_BINS == glsl::THETA_TEXELS as usize && THETA_H_BINS == THETA_D_BINS);
 
 /// A measured BRDF. Cheap to clone.
 #[derive(Clone)]

@@ -1,6 +1,7 @@
 //! Where kernels give way to the BRDF beside small bright lights.
 use super::FittedTable;
 use crate::brdf::LobeShape;
+use crate::shader_constants::fitted::{FAR, WIDEST_WHOLE_RAD};
 
 /// By what shading decides between what kernels make of a small bright light and the BRDF at points of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -20,10 +21,9 @@ const WIDE_UNDER_CUSP_RAD: f64 = 0.005;
 /// Earlier, rims of mirrored lamps are off in mirrors; later, lamps are in glossy plastics.
 const CLEAR: [f32; 2] = [1.25, 2.5];
 /// Steep flanks that end in the dark show the edges of lamps, which kernels know better than squares in the place of parts.
-const CLEAR_OF_FLANKS: [f32; 2] = [2.5, 4.0];
-/// Wider ones are slight slopes to the parts of a lamp near the mirrored view: these are no wider than `WIDEST_WHOLE_RAD` in
-/// glsl/methods/fitted.glsl.
-const WIDEST_STEEP_RAD: f64 = 0.1;
+const CLEAR_OF_FLANKS: [f32; 2] = [2.5, FAR];
+/// Wider ones are slight slopes to the parts of a lamp near the mirrored view: these are no wider.
+const WIDEST_STEEP_RAD: f64 = WIDEST_WHOLE_RAD as f64;
 /// Kernels that are expected to err by more than this part of the radiance give way sooner, with its square root,
 const GOOD_ERROR: f32 = 0.01;
 /// but no sooner than this part. Measured on 20 materials with 8 to 64 threads under the lamps of a studio: of those expected to err by less
