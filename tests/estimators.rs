@@ -217,11 +217,11 @@ fn both_sides_of_a_measured_table_are_the_same_in_glsl() {
 #[test]
 fn all_of_the_most_samples_are_taken() {
     let gpu = Validated::new();
-    for method in Method::ALL.iter().filter(|method| method.runs_on_gpu() && method.threads().is_none()) {
+    for method in Method::on_gpu().filter(|method| method.threads().is_none()) {
         // Most sub-pixels make most turns.
         let count = method.max_count(MAX_SUBPIXELS).min(MAX_SAMPLES);
         let white = Source::Builtin("white".into());
-        let mut scene = scene(model("model = 'lambert'\nreflectance = 0.6"), white, *method, count, (5, 4));
+        let mut scene = scene(model("model = 'lambert'\nreflectance = 0.6"), white, method, count, (5, 4));
         scene.image.subpixels = MAX_SUBPIXELS;
         let rendering = render(&gpu, &ready(&scene));
         let covered: Vec<_> = rendering.radiance.into_iter().map(Vec4::from).filter(|pixel| pixel.w > 0.0).collect();

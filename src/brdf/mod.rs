@@ -61,17 +61,20 @@ const ALBEDO_HALVINGS: u32 = 4;
 /// The relative change at which it stops. The error of a midpoint rule is a third of the change.
 const ALBEDO_CHANGE: f64 = 5e-4;
 
+/// Directions nearer to the horizon are below it: squares of half vectors between two of them, and f over their cosines, are numbers.
+const LEAST_COSINE: f64 = 1e-30;
+
 /// The largest view angle: at 90 degrees f is 0. A renderer only meets it where an interpolated normal turns from the eye.
 pub const MAX_THETA_O_DEG: f64 = 89.99;
 
 include!(concat!(env!("OUT_DIR"), "/brdf_twins.rs"));
 
 impl Brdf {
-    /// f(w_i, w_o) in 1/sr, per linear Rec. 709 channel; 0 where a cosine is not positive.
+    /// f(w_i, w_o) in 1/sr, per linear Rec. 709 channel; 0 where a cosine is not positive, or so small that no light is.
     #[inline]
     pub fn evaluate(&self, w_i: DVec3, w_o: DVec3) -> DVec3 {
         // Written so that a NaN counts as "not positive".
-        if !(w_i.z > 0.0 && w_o.z > 0.0) {
+        if !(w_i.z > LEAST_COSINE && w_o.z > LEAST_COSINE) {
             return DVec3::ZERO;
         }
         dispatch!(self, model => model.evaluate(w_i, w_o))
@@ -223,6 +226,11 @@ impl Brdf {
     /// 1e-3 of the truth for roughness_alpha >= 0.001; lobes about another direction that are narrower than about 3 degrees may fall between its
     /// points.
     pub fn albedo_from(&self, theta_o: f64, phi_o: f64) -> DVec3 {
+        self.albedo_until(theta_o, phi_o, ALBEDO_CHANGE)
+    }
+
+    /// The same, of steps that are halved until that changes it by no more than this part.
+    pub(crate) fn albedo_until(&self, theta_o: f64, phi_o: f64, least_change: f64) -> DVec3 {
         let narrowness = lobe::narrowness(self);
         let in_steps = |halvings: u32| {
             let [theta_steps, phi_steps] = ALBEDO_STEPS.map(|steps| steps << halvings);
@@ -231,7 +239,7 @@ impl Brdf {
         let mut albedo = in_steps(0);
         for halvings in 1..=ALBEDO_HALVINGS {
             let coarser = mem::replace(&mut albedo, in_steps(halvings));
-            if (albedo - coarser).abs().cmple(ALBEDO_CHANGE * albedo).all() {
+            if (albedo - coarser).abs().cmple(least_change * albedo).all() {
                 break;
             }
         }

@@ -155,6 +155,11 @@ fn number(range: RangeInclusive<f64>, what: &'static str) -> impl Fn(&str) -> Re
     move |text| text.parse().ok().filter(|number| range.contains(number)).ok_or_else(|| format!("use {what}"))
 }
 
+/// Parses an error of display values: a picture that is wrong everywhere has 1.
+fn display_error() -> impl Fn(&str) -> Result<f64, String> + Clone {
+    number(f64::MIN_POSITIVE..=1.0, "a positive number up to 1")
+}
+
 /// The last part of a path, without its extension.
 fn stem(path: &Path) -> String {
     path.file_stem().unwrap_or_default().to_string_lossy().into_owned()

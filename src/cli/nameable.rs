@@ -1,6 +1,7 @@
 //! Help texts of what flags can name, and of their ranges: they follow from the tables of formats and methods, and from what is checked.
 use threadlight::low_level::brdf::Brdf;
 use threadlight::low_level::environment::Environment;
+use threadlight::low_level::evaluate::reference::Processor;
 use threadlight::low_level::method::{DEFAULT_SAMPLES, Method};
 use threadlight::low_level::scene::{MAX_SAMPLES, MAX_SIZE_PX, MAX_SUBPIXELS, Mesh, Scene};
 use threadlight::low_level::threads::{self, ThreadKind, fitted};
@@ -23,6 +24,14 @@ pub fn environment(what: &str) -> String {
 /// `what` and how a mesh is named.
 pub fn mesh(what: &str) -> String {
     format!("{what}: a built-in name, {}", Mesh::FILES.names())
+}
+
+/// How exact pictures of the method `reference` are to be.
+pub fn tolerance() -> String {
+    let [cpu, gpu] = [Processor::Cpu, Processor::Gpu].map(Processor::default_tolerance);
+    format!(
+        "Method `reference` goes on until its estimated error of display values is below this: each pixel's on the CPU (default {cpu:e}), their RMS over the picture on the GPU (default {gpu:e})"
+    )
 }
 
 /// `what` and how scenes are named: by scene files or by meshes.

@@ -2,7 +2,7 @@
 use super::progress::TerminalProgress;
 use super::rendered::{ReferenceStats, Rendered, Stats};
 use super::scene_flags::{MachineFlags, SceneFlags, one_of};
-use super::{json, none_of, number, print, say};
+use super::{display_error, json, nameable, none_of, print, say};
 use clap::builder::TypedValueParser;
 use clap::value_parser;
 use std::path::PathBuf;
@@ -42,11 +42,9 @@ pub struct Render {
     scene: SceneFlags,
     /// Takes as few threads as give an expected RMS of display values of at most X, instead of --threads. It makes those of
     /// each number that it tries, and the reference in some pixels: minutes where X is small.
-    #[arg(long, value_name = "X", conflicts_with = "threads", value_parser = number(f64::MIN_POSITIVE..=1.0, "a positive number up to 1"))]
+    #[arg(long, value_name = "X", conflicts_with = "threads", value_parser = display_error())]
     error: Option<f64>,
-    /// Method `reference` goes on until its estimated error of display values is below this: each pixel's on the
-    /// CPU (default 2e-4), their RMS over the picture on the GPU (default 1e-3).
-    #[arg(long, value_name = "X", value_parser = number(f64::MIN_POSITIVE..=1.0, "a positive number up to 1"))]
+    #[arg(long, help = nameable::tolerance(), value_name = "X", value_parser = display_error())]
     tolerance: Option<f64>,
     /// Where method `reference` runs: `cpu`, by quadrature in double precision, or `gpu`, by 4096
     /// samples or more (default cpu).

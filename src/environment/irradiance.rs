@@ -215,8 +215,9 @@ fn gather(environment: &Environment, observer: &dyn Observer) -> Result<Vec<Cell
             sum.centroid += cell.centroid;
         }
         let middle = sum.middle.normalize_or_zero();
-        // Where there is no light, any place will do.
-        Cell { middle, centroid: sum.centroid.try_normalize().unwrap_or(middle), ..sum }
+        // In double precision, since the square of its length may be no number in single. Where there is no light, any place will do.
+        let centroid = sum.centroid.as_dvec3().try_normalize().map_or(middle, |centroid| centroid.as_vec3());
+        Cell { middle, centroid, ..sum }
     };
     Ok((0..6 * CELLS_SIZE * CELLS_SIZE).map(cell).collect())
 }
@@ -269,13 +270,17 @@ mod tests {
     }
 
     #[test]
-    fn a_constant_stays_as_it_is_however_few_pixels_it_has() {
-        for (width, height) in [(1, 1), (3, 2), (64, 32), (1, 300), (300, 1)] {
-            let map = environment(width, height, |_, _| [1.0, 0.1, 7.0]);
+    fn a_constant_stays_as_it_is_however_few_pixels_it_has_and_however_bright_it_is() {
+        // In single precision the squares of such light are rounded to one of few numbers, or infinite.
+        let [dim, bright] = [1.4e-20, 1e25];
+        let sizes = [(1, 1), (3, 2), (64, 32), (1, 300), (300, 1)].map(|size| (size, 1.0));
+        for ((width, height), light) in sizes.into_iter().chain([((16, 8), dim), ((16, 8), bright)]) {
+            let expected = light * Vec3::new(1.0, 0.1, 7.0);
+            let map = environment(width, height, |_, _| expected.to_array());
             let moments = LightMoments::of(&map, TERMS, &()).unwrap();
             let irradiance = [BaseProfile::EVEN, COATED].map(|base| moments.irradiance(&base));
             for texel in irradiance.iter().flat_map(|map| &map.levels[0]) {
-                assert!((Vec3::from(*texel) / Vec3::new(1.0, 0.1, 7.0) - 1.0).farthest() < 1e-5, "{texel:?}");
+                assert!((Vec3::from(*texel) / expected - 1.0).farthest() < 1e-5, "{texel:?}");
             }
         }
     }

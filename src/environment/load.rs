@@ -1,7 +1,7 @@
 //! Reads environments from files of any format and repairs pixels that are no radiance.
 use std::path::Path;
 
-use super::{Environment, FORMATS, RepairCounts, procedural};
+use super::{Environment, FORMATS, RepairCounts, procedural, weight_solid_angle};
 use crate::error::{Error, Result};
 use crate::files::FileKind;
 
@@ -88,7 +88,7 @@ fn take_from_surroundings(
     deficit: f64,
 ) {
     let (column, row) = (index % width, index / width);
-    let solid_angle = |row: usize| (std::f64::consts::PI * (row as f64 + 0.5) / height as f64).sin();
+    let solid_angle = |row: usize| weight_solid_angle(width, height, row);
     let mut missing = deficit * solid_angle(row);
     for radius in 1..=3 {
         let rows = row.saturating_sub(radius)..(row + radius + 1).min(height);
@@ -189,16 +189,11 @@ mod tests {
             texels[sun][0] = 100.0;
             texels[index][0] = -deficit;
             let map = |texels| Environment::new(String::new(), width, height, texels, Default::default());
-            let sum = |map: &Environment| {
-                let rows = (0..height).map(|row| (std::f64::consts::PI * (row as f64 + 0.5) / height as f64).sin());
-                let row_sums =
-                    map.texels.chunks(width).map(|row| row.iter().map(|texel| f64::from(texel[0])).sum::<f64>());
-                rows.zip(row_sums).map(|(solid_angle, sum)| solid_angle * sum).sum::<f64>()
-            };
-            let before = sum(&map(texels.clone()));
+            let before = map(texels.clone()).mean_radiance().x;
             let repaired = Environment::repaired(String::new(), width, height, texels);
             assert_eq!(repaired.repaired.negative, 1);
-            assert!((sum(&repaired) - before).abs() < 1e-4, "{index}: {before} became {}", sum(&repaired));
+            let after = repaired.mean_radiance().x;
+            assert!((after / before - 1.0).abs() < 1e-6, "{index}: {before} became {after}");
             assert!(repaired.texels.iter().all(|texel| texel[0] >= 0.0 && texel[1..] == [2.0, 3.0]));
         }
         // All around give alike.

@@ -206,14 +206,7 @@ impl Environment {
     /// The integral of a pixel's bilinear weight over the sphere, in sr: the share that a pixel of `row` has in the energy
     /// of [`Self::radiance`]. It differs from [`Self::solid_angle`] where the sine of theta bends: most at the poles.
     pub fn weight_solid_angle(&self, row: usize) -> f64 {
-        let centre = |row: usize| PI * (row as f64 + 0.5) / self.height as f64;
-        let step = PI / self.height as f64;
-        // Integrals of sin theta times a ramp from 0 to 1 (up) or 1 to 0 (down), by parts.
-        let up = |from: f64, to: f64| (to.sin() - from.sin()) / step - to.cos();
-        let down = |from: f64, to: f64| from.cos() - (to.sin() - from.sin()) / step;
-        let above = if row == 0 { 1.0 - centre(0).cos() } else { up(centre(row - 1), centre(row)) };
-        let below = if row + 1 == self.height { 1.0 + centre(row).cos() } else { down(centre(row), centre(row + 1)) };
-        TAU / self.width as f64 * (above + below)
+        weight_solid_angle(self.width, self.height, row)
     }
 
     /// The mean of [`Self::radiance`] over the sphere.
@@ -247,6 +240,18 @@ impl Environment {
 fn angles(direction: DVec3) -> [f64; 2] {
     let DVec3 { x, y, z } = direction;
     [x.atan2(-z), (x * x + z * z).sqrt().atan2(y)]
+}
+
+/// [`Environment::weight_solid_angle`] of a map of so many columns and rows.
+fn weight_solid_angle(width: usize, height: usize, row: usize) -> f64 {
+    let centre = |row: usize| PI * (row as f64 + 0.5) / height as f64;
+    let step = PI / height as f64;
+    // Integrals of sin theta times a ramp from 0 to 1 (up) or 1 to 0 (down), by parts.
+    let up = |from: f64, to: f64| (to.sin() - from.sin()) / step - to.cos();
+    let down = |from: f64, to: f64| from.cos() - (to.sin() - from.sin()) / step;
+    let above = if row == 0 { 1.0 - centre(0).cos() } else { up(centre(row - 1), centre(row)) };
+    let below = if row + 1 == height { 1.0 + centre(row).cos() } else { down(centre(row), centre(row + 1)) };
+    TAU / width as f64 * (above + below)
 }
 
 fn to_dvec3(texel: &[f32; 3]) -> DVec3 {

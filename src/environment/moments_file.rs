@@ -7,7 +7,7 @@ use crate::error::Result;
 use crate::files::{self, ValuesFormat, write_whole};
 
 /// Version of the file format and of the moments in it: to be raised when the same environment gets others.
-pub const FORMAT_VERSION: u32 = 1;
+pub const FORMAT_VERSION: u32 = 2;
 
 const FORMAT: ValuesFormat = ValuesFormat { magic: b"MOMENTS\0", version: FORMAT_VERSION };
 

@@ -15,7 +15,7 @@ const SIZE: (usize, usize) = (1024, 512);
 const SUN_DIRECTION: DVec3 = DVec3::new(-0.55, 0.56, 0.62);
 /// Angular radius of the sun of `sun`: three times the real one, so that a picture of 1024 x 512 can hold it.
 const SUN_RADIUS_DEG: f64 = 0.75;
-/// Radiance of its disc. Times 5.4e-4 sr it sheds three times the light of the sky above it.
+/// Radiance of its disc. Times 5.4e-4 sr it sheds 1.3 times the light (luminance) of the sky above the horizon.
 const SUN_RADIANCE: DVec3 = DVec3::new(7600.0, 6500.0, 5000.0);
 
 /// The names that [`Environment::builtin`] takes.

@@ -16,6 +16,9 @@ pub const CHANNELS: [(&str, [u8; 3]); 3] = [("red", [200, 30, 30]), ("green", [2
 /// Columns and rows of the image, a degree each.
 pub const CELLS: usize = 90;
 
+/// The relative change at which albedos are good enough: the width of a line in plots.
+const ALBEDO_CHANGE: f64 = 4e-3;
+
 /// A BRDF seen from one azimuth, which plots have as the plane of incidence or that of the half vector.
 #[derive(Clone, Copy, Debug)]
 pub struct Side<'a> {
@@ -63,9 +66,9 @@ impl<'a> Side<'a> {
         (0..CELLS * CELLS).map(cell).collect()
     }
 
-    /// The albedo seen from `theta_o_deg`.
+    /// The albedo seen from `theta_o_deg`, as exactly as plots show it.
     pub fn albedo(&self, theta_o_deg: f64) -> DVec3 {
-        self.brdf.albedo_from(theta_o_deg.to_radians(), self.azimuth_deg.to_radians())
+        self.brdf.albedo_until(theta_o_deg.to_radians(), self.azimuth_deg.to_radians(), ALBEDO_CHANGE)
     }
 }
 

@@ -21,6 +21,11 @@ pub use variant::Variant;
 pub const DEFAULT_SAMPLES: u32 = 100;
 
 impl Method {
+    /// Those that a shader runs: all but the reference.
+    pub fn on_gpu() -> impl Iterator<Item = Self> {
+        Self::ALL.iter().copied().filter(|method| method.runs_on_gpu())
+    }
+
     /// The method of that name.
     ///
     /// # Errors
@@ -97,7 +102,7 @@ impl Method {
         self == Self::Fitted
     }
 
-    /// Whether a shader runs it: all but the reference.
+    /// Whether a shader runs it.
     pub fn runs_on_gpu(self) -> bool {
         self != Self::Reference
     }

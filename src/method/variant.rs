@@ -37,8 +37,7 @@ impl Variant {
             None => Method::from_name(name).map(Self::from).map_err(|_| {
                 let fixed = Method::ALL.iter().filter(|method| method.has_pattern());
                 let fixed = fixed.map(|method| Self::new(*method, Pattern::Fixed));
-                let all = Method::ALL.iter().filter(|method| method.runs_on_gpu()).map(|method| Self::from(*method));
-                Method::unknown(name, all.chain(fixed).map(Self::name).collect())
+                Method::unknown(name, Method::on_gpu().map(Self::from).chain(fixed).map(Self::name).collect())
             }),
         }
     }

@@ -171,7 +171,7 @@ mod tests {
         for name in variants {
             assert!(Method::from_name(name).is_ok_and(|method| method.name() == name), "{name} is not in the table");
         }
-        for &method in Method::ALL.iter().filter(|method| method.runs_on_gpu()) {
+        for method in Method::on_gpu() {
             assert_eq!(shade_shader(method).unwrap().name(), format!("shade_{}", method.name()));
         }
         assert!(shade_shader(Method::Reference).is_err());
@@ -187,7 +187,7 @@ mod tests {
 
     #[test]
     fn what_methods_look_up_is_what_their_shaders_declare() {
-        for &method in Method::ALL.iter().filter(|method| method.runs_on_gpu()) {
+        for method in Method::on_gpu() {
             let declares = |name| shade_shader(method).unwrap().declares(name).unwrap();
             let split_sum = declares("SplitSums");
             let blurred = declares("irradiance_maps");

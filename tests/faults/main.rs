@@ -98,8 +98,10 @@ impl Place {
 
     /// Fills the cache with all that a picture needs.
     fn fill_cache(&self) {
+        // What has made it takes the folder of the cache away.
+        let (_, files) = self.undisturbed();
         std::fs::create_dir_all(self.cache()).expect("a cache");
-        for (name, bytes) in &self.undisturbed().1 {
+        for (name, bytes) in files {
             std::fs::write(self.cache().join(name), bytes).expect("a file");
         }
     }

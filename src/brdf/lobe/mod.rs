@@ -133,9 +133,12 @@ fn lobe_axes(brdf: &Brdf) -> (f64, DVec2) {
     ((exact_width(brdf, narrow) / exact_width(brdf, wide)).max(NARROWEST_ALPHA), wide)
 }
 
-/// [`half_vector_width`] towards one azimuth, to a millionth.
+/// [`half_vector_width`] towards one azimuth, to a millionth; a right angle where there is no lobe.
 fn exact_width(brdf: &Brdf, azimuth: DVec2) -> f64 {
     let mut outside = first_angle(|angle| is_off_peak(brdf, azimuth, angle));
+    if outside == FRAC_PI_2 {
+        return outside;
+    }
     let mut inside = outside / STEP;
     for _ in 0..20 {
         let middle = 0.5 * (inside + outside);

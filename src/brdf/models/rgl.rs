@@ -21,11 +21,11 @@
 //! only approximately: to some per cent at moderate angles, by factors up to 4 at 85 degrees.
 //!
 //! Channels of saturated colours are negative in places, since they are out of Rec. 709's gamut; these count as 0.
-use std::array;
 use std::f64::consts::{FRAC_1_PI, FRAC_2_PI};
+use std::ops::{Add, Mul};
 use std::sync::Arc;
 
-use glam::{DVec2, DVec3, FloatExt, Vec3, dvec2};
+use glam::{DVec2, DVec3, DVec4, FloatExt, Vec3, Vec4, dvec2, dvec4};
 
 use crate::brdf::{Model, Parameters, theta};
 use crate::error::{Error, Result};
@@ -106,11 +106,10 @@ struct View<'a> {
 
 impl Blend {
     /// The means of what is `at` each square.
-    fn mean<const N: usize>(&self, at: impl Fn(usize) -> [f64; N]) -> [f64; N] {
-        self.squares[..self.count].iter().fold([0.0; N], |sum, &(square, weight)| {
-            let values = at(square);
-            array::from_fn(|i| sum[i] + values[i] * weight)
-        })
+    #[inline]
+    fn mean<T: Default + Add<Output = T> + Mul<f64, Output = T>>(&self, at: impl Fn(usize) -> T) -> T {
+        let weighted = self.squares[..self.count].iter().map(|&(square, weight)| at(square) * weight);
+        weighted.fold(T::default(), |sum, value| sum + value)
     }
 }
 
@@ -119,6 +118,7 @@ impl<T> Grid<T> {
         self.size[0] * self.size[1]
     }
 
+    #[inline]
     fn cell(&self, u: DVec2) -> Cell {
         let [columns, rows] = self.size;
         let position = u.clamp(DVec2::ZERO, DVec2::ONE) * dvec2((columns - 1) as f64, (rows - 1) as f64);
@@ -129,10 +129,11 @@ impl<T> Grid<T> {
 
 impl<T: Copy> Grid<T> {
     /// The four nodes of a cell in one square: (0, 0), (1, 0), (0, 1), (1, 1).
+    #[inline]
     fn corners(&self, square: usize, cell: &Cell) -> [T; 4] {
-        let first = square * self.nodes() + cell.first;
-        let columns = self.size[0];
-        [first, first + 1, first + columns, first + columns + 1].map(|node| self.values[node])
+        let low = &self.values[square * self.nodes() + cell.first..];
+        let high = &low[self.size[0]..];
+        [low[0], low[1], high[0], high[1]]
     }
 }
 
@@ -140,7 +141,7 @@ impl Grid<f32> {
     /// Bilinear between nodes of the first square.
     fn at(&self, u: DVec2) -> f64 {
         let cell = self.cell(u);
-        let [low, high] = along_cell(self.corners(0, &cell).map(f64::from), cell.inside.y);
+        let [low, high] = along_cell(Vec4::from(self.corners(0, &cell)).as_dvec4(), cell.inside.y);
         low.lerp_monotonic(high, cell.inside.x)
     }
 }
@@ -149,10 +150,12 @@ impl Grid<Vec3> {
     /// Bilinear between nodes, linear between squares.
     fn at(&self, blend: &Blend, u: DVec2) -> DVec3 {
         let cell = self.cell(u);
-        DVec3::from(blend.mean(|square| {
-            let [a, b, c, d] = self.corners(square, &cell).map(Vec3::as_dvec3);
-            a.lerp(b, cell.inside.x).lerp(c.lerp(d, cell.inside.x), cell.inside.y).into()
-        }))
+        blend.mean(|square| {
+            let [a, b, c, d] = self.corners(square, &cell);
+            let (low, high) =
+                (a.as_dvec3().lerp(b.as_dvec3(), cell.inside.x), c.as_dvec3().lerp(d.as_dvec3(), cell.inside.x));
+            low.lerp(high, cell.inside.y)
+        })
     }
 }
 
@@ -184,16 +187,18 @@ impl Warp {
     fn invert(&self, blend: &Blend, u: DVec2) -> DVec2 {
         let [columns, rows] = self.density.size;
         let cell = self.density.cell(u);
-        let corners = blend.mean(|square| self.density.corners(square, &cell).map(f64::from));
+        let corners = blend.mean(|square| Vec4::from(self.density.corners(square, &cell)).as_dvec4());
         let [low, high] = along_cell(corners, cell.inside.y);
 
         // Of the two rows of the cell, up to it and in all; and of the rows before.
         let last = columns * (cell.row + 1) - 1;
-        let [before, next_before, total, next_total, above] = blend.mean(|square| {
-            let sums = &self.along_rows[square * columns * rows..];
-            let [before, total] = [cell.first, last].map(|node| [sums[node], sums[node + columns]]);
-            [before[0], before[1], total[0], total[1], self.across_rows[square * rows + cell.row]]
-        });
+        let [before, next_before, total, next_total] = blend
+            .mean(|square| {
+                let sums = &self.along_rows[square * columns * rows..];
+                dvec4(sums[cell.first], sums[cell.first + columns], sums[last], sums[last + columns])
+            })
+            .to_array();
+        let above = blend.mean(|square| self.across_rows[square * rows + cell.row]);
         let before = before.lerp_monotonic(next_before, cell.inside.y);
         let y = above + integral_in_cell(total, next_total, cell.inside.y);
         let total = total.lerp_monotonic(next_total, cell.inside.y);
@@ -204,8 +209,8 @@ impl Warp {
 }
 
 /// The values in the middle of the left and of the right side of a cell, `y` of the way along them.
-fn along_cell(corners: [f64; 4], y: f64) -> [f64; 2] {
-    [corners[0].lerp_monotonic(corners[2], y), corners[1].lerp_monotonic(corners[3], y)]
+fn along_cell(corners: DVec4, y: f64) -> [f64; 2] {
+    [corners.x.lerp_monotonic(corners.z, y), corners.y.lerp_monotonic(corners.w, y)]
 }
 
 /// The integral from 0 to `x` of what goes linearly from `low` at 0 to `high` at 1.

@@ -26,7 +26,7 @@ use crate::error::{Error, Result};
 /// A BRDF as shaders look it up. Cheap to clone.
 #[derive(Clone, Debug)]
 pub struct Tabulated {
-    /// In 1/sr; index (|cos phi_d|) + 17 ((cos theta_d) + 75 (tan(theta_h / 2) + tangents side)).
+    /// f (n . w_i + n . w_o) / 2 in 1/sr; index (|cos phi_d|) + 17 ((1 - tan(theta_d / 2)) + 75 (tan(theta_h / 2) + tangents side)).
     table: MadeTable,
     grid: Grid,
 }
@@ -81,7 +81,7 @@ impl Grid {
         let (sin_theta_d, cos_theta_d) = of_half_tangent(half_tangent);
         let tangent = exponential(t, self.knee).min(1.0 - 1e-6);
         let (sin_theta_h, cos_theta_h) = of_half_tangent(tangent);
-        // n . w = cos theta_h cos theta_d -+ tan(theta_h / 2) `along`.
+        // n . w = cos theta_h cos theta_d -+ sin theta_h `along`.
         let most = (1.0 - FROM_HORIZON) * cos_theta_h * cos_theta_d / sin_theta_h;
         let along = (sin_theta_d * p).min(most);
         let across = (sin_theta_d * sin_theta_d - along * along).max(0.0).sqrt();

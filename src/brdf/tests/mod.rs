@@ -87,13 +87,17 @@ fn every_model_is_reciprocal() {
 
 #[test]
 fn every_model_is_finite_everywhere_and_zero_below_the_horizon() {
-    let angles = [0.0, 1e-9, 1e-4, 30.0, 89.999_999, 90.0];
+    // By angle, and nearer to the horizon than angles tell.
+    let seen_from = |phi: f64| {
+        let by_angle = [0.0, 1e-9, 1e-4, 30.0, 89.999_999, 90.0].map(|theta| direction(theta, phi));
+        let by_cosine = [1e-17, 1.1e-30, 1e-150, 1e-170, 1e-300].map(|cosine| direction(90.0, phi).with_z(cosine));
+        by_angle.into_iter().chain(by_cosine)
+    };
     for brdf in all_models() {
-        for theta_o in angles {
-            let w_o = direction(theta_o, 0.0);
+        for w_o in seen_from(0.0) {
             for w_i in [w_o, -w_o, dvec3(-w_o.x, 0.0, w_o.z)]
                 .into_iter()
-                .chain(angles.into_iter().flat_map(|theta_i| [0.0, 90.0, 180.0].map(|phi| direction(theta_i, phi))))
+                .chain([0.0, 90.0, 180.0].into_iter().flat_map(seen_from))
             {
                 let f = brdf.evaluate(w_i, w_o);
                 assert!(f.is_finite() && f.min_element() >= 0.0, "{brdf:?} {w_i} {w_o} {f}");

@@ -1,7 +1,7 @@
 //! What the measurements have in common on the command line: what to measure, on which device, and where to write it.
 use crate::cli::render::processor;
 use crate::cli::scene_flags::{DeviceFlags, parse_size, subpixels};
-use crate::cli::{json, nameable, number, print, stem};
+use crate::cli::{display_error, json, nameable, print, stem};
 use clap::builder::NonEmptyStringValueParser;
 use clap::parser::ValueSource;
 use clap::{ArgMatches, Args, Command, FromArgMatches, value_parser};
@@ -113,7 +113,7 @@ impl Defaults {
         let names = |given: &[&str], all: Vec<&str>| if given == all { "all".to_owned() } else { given.join(",") };
         let materials = names(&self.materials, Brdf::builtin_names().collect());
         let methods: Vec<_> = self.methods.iter().map(|method| method.name()).collect();
-        let methods = names(&methods, methods_on_gpu().map(Method::name).collect());
+        let methods = names(&methods, Method::on_gpu().map(Method::name).collect());
         let counts = self.counts.iter().map(u32::to_string).collect::<Vec<_>>().join(",");
         let size = self.size.map_or("that of the scene".to_owned(), |(width, height)| format!("{width}x{height}"));
         let tolerance = tolerance.map_or(String::new(), |tolerance| {
@@ -125,11 +125,6 @@ impl Defaults {
             "Defaults: --materials {materials}; --methods {methods}; --counts {counts}; --size {size}{tolerance}.\n\n{follows}"
         )
     }
-}
-
-/// Those of which pictures are measured.
-pub fn methods_on_gpu() -> impl Iterator<Item = Method> {
-    Method::ALL.iter().copied().filter(|method| method.runs_on_gpu())
 }
 
 impl CasesArguments {
@@ -273,7 +268,7 @@ pub const QUICK_TOLERANCE: f64 = 1e-3;
 #[derive(clap::Args)]
 pub struct TruthArguments {
     /// Error of the reference pictures, in display values, that is good enough.
-    #[arg(long, value_name = "X", value_parser = number(f64::MIN_POSITIVE..=1.0, "a number above 0, at most 1"))]
+    #[arg(long, value_name = "X", value_parser = display_error())]
     reference_tolerance: Option<f64>,
     /// Where the reference pictures are made, as `threadlight render --help` explains.
     #[arg(long, value_name = "cpu|gpu", default_value = "cpu", value_parser = processor(), hide_possible_values = true)]

@@ -1,11 +1,12 @@
 //! `threadlight bench error`: error and time of methods and thread counts over materials, environments and scenes.
-use super::arguments::{CasesArguments, Defaults, OutputArguments, TruthArguments, methods_on_gpu};
+use super::arguments::{CasesArguments, Defaults, OutputArguments, TruthArguments};
 use crate::cli::print;
 use crate::cli::progress::TerminalProgress;
 use clap::value_parser;
 use threadlight::Error;
 use threadlight::low_level::evaluate::sweep::Measured;
 use threadlight::low_level::evaluate::{Row, Shard, Sweep, plots, reference, tables};
+use threadlight::low_level::method::Method;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -62,7 +63,7 @@ pub struct BenchError {
 fn defaults() -> Defaults {
     Defaults {
         materials: vec!["gold"],
-        methods: methods_on_gpu().collect(),
+        methods: Method::on_gpu().collect(),
         counts: &[1, 4, 16, 32, 64, 100, 512],
         size: None,
     }

@@ -1,9 +1,8 @@
 //! `threadlight bench live`: what drafts of threads cost and are worth while a parameter is dragged.
 use super::arguments::{JsonArgument, QUICK_TOLERANCE};
-use crate::cli::none_of;
-use crate::cli::number;
 use crate::cli::progress::TerminalProgress;
 use crate::cli::scene_flags::{MachineFlags, SceneFlags, takes_methods};
+use crate::cli::{display_error, none_of};
 use clap::value_parser;
 use threadlight::low_level::evaluate::live::{self, Drag};
 use threadlight::low_level::evaluate::reference::ReferenceSettings;
@@ -49,7 +48,7 @@ pub struct BenchLive {
     #[arg(long, value_name = "N", default_value_t = 60, value_parser = value_parser!(u32).range(2..=10_000))]
     steps: u32,
     /// Estimated error of the reference, RMS of display values.
-    #[arg(long, value_name = "X", default_value_t = QUICK_TOLERANCE, value_parser = number(f64::MIN_POSITIVE..=1.0, "a positive number up to 1"))]
+    #[arg(long, value_name = "X", default_value_t = QUICK_TOLERANCE, value_parser = display_error())]
     reference_tolerance: f64,
     #[command(flatten)]
     json: JsonArgument,

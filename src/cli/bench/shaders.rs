@@ -50,7 +50,7 @@ impl BenchShaders {
         self.json.check(&self.scene.files(&scene))?;
         let methods = match &self.scene.method {
             Some(method) => vec![*method],
-            None => Method::ALL.iter().copied().filter(|method| method.runs_on_gpu()).collect(),
+            None => Method::on_gpu().collect(),
         };
         let instance = Instance::new(false).map_err(Error::from)?;
         let device = CompilingDevice::new(&instance, self.device.as_deref()).map_err(Error::from)?;

@@ -107,8 +107,7 @@ pub fn run(
         ));
     }
     cases.retain(|case| extent.only.is_empty() || extent.only.iter().any(|only| is_in(case, only)));
-    let methods = || Method::ALL.iter().filter(|method| method.runs_on_gpu());
-    let methods: Vec<Method> = methods().filter(|method| extent.all || method.threads().is_some()).copied().collect();
+    let methods: Vec<_> = Method::on_gpu().filter(|method| extent.all || method.threads().is_some()).collect();
     let formats: &[bool] = if extent.all { &[false, true] } else { &[false] };
     let pictures = Parts::new(cases.len() * methods.len() * formats.len(), observer);
     for case in &cases {

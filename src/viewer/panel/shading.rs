@@ -26,7 +26,7 @@ pub fn show(ui: &mut Ui, viewer: &Viewer, inputs: &mut Vec<Input>) {
             .selected_text(method.name())
             .width(160.0)
             .show_ui(ui, |ui| {
-                for &other in Method::ALL.iter().filter(|method| method.runs_on_gpu()) {
+                for other in Method::on_gpu() {
                     let label = ui.selectable_label(other == method, other.name()).on_hover_text(other.summary());
                     if label.clicked() && other != method {
                         inputs.push(Input::Set(Change::Method(other)));

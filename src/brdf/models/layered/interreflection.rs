@@ -26,7 +26,7 @@ const STEPS: usize = 512;
 const TRAPPED: usize = 20;
 /// Light this near to the mirror direction counts as such: enough for some hundred points of the lattice.
 const NEAR_RAD: f64 = 0.05;
-/// P has 2^DOUBLINGS terms: of white Lambert's base under ior 3, 4e-6 is left after 256.
+/// P has 2^DOUBLINGS terms: of white Lambert's base under ior 3, 4e-6 is left after 148.
 const DOUBLINGS: usize = 12;
 /// Points of the lattice over half vectors, and its generator: Fibonacci numbers, the second two before the first.
 const POINTS: usize = 10946;
