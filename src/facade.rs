@@ -107,7 +107,7 @@ impl Renderer {
         } else {
             let on_device = DeviceScene::new(&self.device, &prepared, &round)?;
             let wanted = Wanted { radiance: true, display: true, ..Wanted::default() };
-            self.last.insert(on_device).render(wanted, 1)?
+            self.last.insert(on_device).render_watched(wanted, 1, observer)?
         };
         let header = rendering.exr_header(&prepared, self.device_name());
         Ok(Picture { image: scene.image.clone(), header, rendering })

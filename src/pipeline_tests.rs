@@ -73,15 +73,13 @@ fn on_device(
 #[test]
 fn pictures_of_8_megapixels_are_shaded_at_once_by_64_threads_unless_there_are_lamps() {
     let made = (test_device::open_validated().0, Memo::default());
-    let portions = |environment: &str, width: u32, height: u32, threads: u32| {
+    let portions = |environment: &str, threads: u32, sizes: [(u32, u32); 2]| {
         let DeviceScene { view, shade, .. } =
             on_device(MaterialSource::Builtin("gold".to_owned()), environment, threads, &made);
-        shade.portion_count(&View { width, height, ..view })
+        sizes.map(|(width, height)| shade.portion_count(&View { width, height, ..view.clone() }))
     };
-    assert_eq!(portions("white", 4096, 2048, 64), 1);
-    assert_eq!(portions("white", 4096, 2049, 64), 2);
-    assert_eq!(portions("sun", 2560, 1440, 16), 1);
-    assert_eq!(portions("sun", 3840, 2160, 16), 2);
+    assert_eq!(portions("white", 64, [(4096, 2048), (4096, 2049)]), [1, 2]);
+    assert_eq!(portions("sun", 16, [(2560, 1440), (3840, 2160)]), [1, 2]);
 }
 
 #[test]

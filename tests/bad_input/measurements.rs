@@ -62,7 +62,7 @@ fn sweeps_that_cannot_be_measured_are_refused() {
         ("--shard 3", &["--shard", "2/8"]),
         ("--shard 3/2", &["--shard", "2/8"]),
         ("--shard 1/2", &["--shard", "at most 1"]),
-        ("--reference-tolerance 0", &["--reference-tolerance", "above 0"]),
+        ("--reference-tolerance 0", &["--reference-tolerance", "positive number up to 1"]),
         ("--json absent/errors.json", &["absent/errors.json"]),
         ("--plot small.png", &["small.png"]),
         ("--plot absent/plots", &["absent/plots"]),
