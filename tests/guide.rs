@@ -1,6 +1,9 @@
-//! The guide and the README name files, functions and constants: each of them is there. Needs no device.
+//! The guide and the README name files, functions, constants, models and methods: each of them is there. Needs no device.
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
+use threadlight::low_level::brdf::{Brdf, Parameter};
+use threadlight::low_level::method::Method;
 
 /// Folders of the project whose files a text may name.
 const FOLDERS: &[&str] = &["src/", "glsl/", "tests/", "assets/", "ci/"];
@@ -158,4 +161,66 @@ fn the_readme_is_short() {
     assert!(lines <= 150, "{lines} lines");
     let widest = readme.lines().map(|line| line.chars().count()).max().unwrap_or_default();
     assert!(widest <= 160, "{widest} columns");
+}
+
+/// The rows of the guide's tables of `chapter` whose first cell names something in backquotes: each name, and the row.
+fn named_rows(chapter: &str) -> Vec<(&str, &str)> {
+    let rows = chapter.lines().filter_map(|line| Some((line.strip_prefix("| ")?.split_once(" | ")?.0, line)));
+    let names = rows.flat_map(|(cell, row)| cell.split(", ").map(move |name| (name, row)));
+    names.filter_map(|(name, row)| Some((name.strip_prefix('`')?.strip_suffix('`')?, row))).collect()
+}
+
+#[test]
+fn the_guide_lists_each_model_with_all_that_it_reads() {
+    let usage = fs::read_to_string(root().join("src/guide/usage.md")).expect("the chapter");
+    let (_, models) = usage.split_once("| model | parameters |").expect("the table of models");
+    let (models, _) = models.split_once("\n## ").expect("the chapter goes on");
+    let rows = named_rows(models);
+    let names: BTreeSet<_> = rows.iter().map(|(name, _)| *name).collect();
+    assert_eq!(names, Brdf::models_with_parameters().into_iter().collect());
+    // What several models have, as the forms of roughness and of metals, is told below the table.
+    let prose: String = models.lines().filter(|line| !line.starts_with('|')).collect();
+    let has = |text: &str, key: &str| {
+        let quoted = text.split('`').skip(1).step_by(2);
+        let mut words = quoted.flat_map(|code| code.split(|c: char| !(c.is_ascii_alphanumeric() || c == '_')));
+        words.any(|word| word == key)
+    };
+    for (model, row) in rows {
+        let read = Brdf::possible_parameters(model, &Default::default()).expect("a sound table");
+        assert!(!read.is_empty(), "{model}");
+        for Parameter { key, .. } in read {
+            let key = key.rsplit('.').next().unwrap_or_default();
+            assert!(has(row, key) || has(&prose, key), "{model}: the guide does not have `{key}`");
+        }
+    }
+}
+
+#[test]
+fn the_guide_lists_each_environment_variable_of_ours() {
+    let is_of_name = |c: char| c.is_ascii_uppercase() || c == '_';
+    let variables = |text: &str| -> BTreeSet<String> {
+        let words = text.split(|c: char| !is_of_name(c));
+        let of_ours = words.filter(|word| word.strip_prefix("THREADLIGHT_").is_some_and(|rest| !rest.is_empty()));
+        of_ours.map(str::to_owned).collect()
+    };
+    let sources = ["src", "tests"].map(|folder| files_below(&root().join(folder), &["rs"])).concat();
+    let read = sources.iter().flat_map(|path| variables(&fs::read_to_string(path).expect("a readable source")));
+    let usage = fs::read_to_string(root().join("src/guide/usage.md")).expect("the chapter");
+    assert_eq!(read.collect::<BTreeSet<_>>(), variables(&usage));
+}
+
+#[test]
+fn the_guide_lists_each_method_with_how_many_threads_it_may_have() {
+    let usage = fs::read_to_string(root().join("src/guide/usage.md")).expect("the chapter");
+    let (_, methods) = usage.split_once("| method | what it is |").expect("the table of methods");
+    let (methods, _) = methods.split_once("\n## ").expect("the chapter goes on");
+    let rows = named_rows(methods);
+    assert!(rows.iter().map(|(name, _)| *name).eq(Method::ALL.iter().map(|method| method.name())));
+    for (name, row) in rows {
+        let method = Method::from_name(name).expect("a method");
+        if let Some(kind) = method.threads() {
+            let counts = format!("1 to {} of them, {} if not said", kind.max_count(), kind.default_count());
+            assert!(row.contains(&counts), "{name}: {counts}");
+        }
+    }
 }

@@ -13,7 +13,7 @@ use std::path::Path;
 use std::process::Command;
 
 /// The child's name of what fails: a call, how many pictures are shown before, and the index of the result in [`RESULTS`].
-const FAULT: &str = "THREADLIGHT_TEST_FAULT";
+const FAULT: &str = "FAULT_OF_CHILD";
 const RESULTS: [Call; 3] = [Call::ERROR_SURFACE_LOST_KHR, Call::ERROR_OUT_OF_DATE_KHR, Call::ERROR_DEVICE_LOST];
 
 /// Runs the viewer in a process of its own, where a call fails; `None` where there is no display.

@@ -205,6 +205,7 @@ impl<'a> Machine<'a> {
     pub fn pass(&mut self, pass: &PlannedPass<usize>) -> Result<(), String> {
         let since = self.events.len();
         let declared = &self.frame.passes[pass.work].1;
+        assert_eq!(declared.len(), pass.uses.len(), "uses of {}", pass.name);
         for (use_, planned) in declared.iter().zip(&pass.uses) {
             let resource = planned.resource;
             assert_eq!(self.declared[resource], use_.resource);
