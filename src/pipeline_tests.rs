@@ -5,7 +5,7 @@ use crate::method::Method;
 use crate::prepare::prepare;
 use crate::scene::{MaterialSource, Scene, Source};
 use crate::vulkan::faults::{Fault, with_fault};
-use crate::vulkan::test_device;
+use crate::vulkan::{DeviceKind, test_device};
 use ash::vk::Result as Call;
 use std::time::{Duration, Instant};
 
@@ -76,10 +76,13 @@ fn pictures_of_8_megapixels_are_shaded_at_once_by_64_threads_unless_there_are_la
     let portions = |environment: &str, threads: u32, sizes: [(u32, u32); 2]| {
         let DeviceScene { view, shade, .. } =
             on_device(MaterialSource::Builtin("gold".to_owned()), environment, threads, &made);
-        sizes.map(|(width, height)| shade.portion_count(&View { width, height, ..view.clone() }))
+        [DeviceKind::Discrete, DeviceKind::Integrated].map(|kind| {
+            let shade = Shade { most_samples: most_samples(kind), ..shade.clone() };
+            sizes.map(|(width, height)| shade.portion_count(&View { width, height, ..view.clone() }))
+        })
     };
-    assert_eq!(portions("white", 64, [(4096, 2048), (4096, 2049)]), [1, 2]);
-    assert_eq!(portions("sun", 16, [(2560, 1440), (3840, 2160)]), [1, 2]);
+    assert_eq!(portions("white", 64, [(4096, 2048), (4096, 2049)]), [[1, 2], [4, 5]]);
+    assert_eq!(portions("sun", 16, [(2560, 1440), (3840, 2160)]), [[1, 2], [3, 6]]);
 }
 
 #[test]

@@ -42,6 +42,7 @@ pub(crate) use picture_size::{check_cache_size, check_lists};
 pub use present::{Area, present};
 pub use readback::{Readbacks, texels};
 pub use region::Region;
+pub(crate) use shade::most_samples;
 pub use shade::{SHADE_PASS, Shade, Shaded, shade, shade_shader};
 pub use tone_map::{ToneMap, tone_map};
 #[cfg(feature = "viewer")]

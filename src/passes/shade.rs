@@ -4,7 +4,7 @@ use crate::graph::{BufferDesc, BufferHandle, FrameGraph, ImageDesc, ImageHandle}
 use crate::memo::Keyed;
 use crate::method::{Method, Sampling};
 use crate::shader_constants::ris::CANDIDATES;
-use crate::vulkan::{ComputePipeline, Shader, compiled};
+use crate::vulkan::{ComputePipeline, DeviceKind, Shader, compiled};
 use crate::{Error, Result};
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
@@ -42,11 +42,15 @@ pub struct Shade {
     pub sampling: Sampling,
     /// The method of the shader.
     pub method: Method,
+    /// [`most_samples`] of the device.
+    pub most_samples: u64,
 }
 
 /// Samples of `mis` in a submission: half a second for a GPU of 1 Tflop/s, by what an H200 of 60 takes. Systems end what runs for longer than
-/// 2 s (Windows) or 10 s (Linux), and the device is lost with it.
-const MOST_SAMPLES: u64 = 1 << 25;
+/// 2 s (Windows) or 10 s (Linux), and the device is lost with it. GPUs that share the CPU's memory may be a quarter as fast.
+pub(crate) fn most_samples(kind: DeviceKind) -> u64 {
+    if kind == DeviceKind::Integrated { 1 << 23 } else { 1 << 25 }
+}
 
 /// Lamps by the BRDF are the work of so many samples in each of 2 x 2 sub-pixels: alumina-oxide takes 4 ms for them on that GPU, where 1.4 million
 /// pixels see a dragon, as 20 samples of each of these pixels would. A quarter of it counts, as of all that sub-pixels have of their own.
@@ -67,7 +71,7 @@ impl Shade {
             method if method.threads().is_some() => (samples + 16 * of_lamps) * times_edges * pixels / 16,
             _ => samples * times_edges * pixels,
         };
-        work.div_ceil(MOST_SAMPLES).max(1) as u32
+        work.div_ceil(self.most_samples).max(1) as u32
     }
 }
 
