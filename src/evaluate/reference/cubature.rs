@@ -13,10 +13,16 @@ const USUAL_NODES: usize = 3000;
 /// count, changes vanish by chance.
 const LEAST_LEFT: f64 = 1.0 / 8.0;
 
+/// The part of the greatest `g` at its nodes by which a polynomial may miss one that is 0 on one side of a line through the cell and
+/// rises evenly from it on the other.
+const MISSED_AT_HORIZON: f64 = 1.0 / 8.0;
+
 /// An estimate of the integral of radiance times `g` over the sphere, that can be made better.
-pub struct Cubature<'a, G> {
+pub struct Cubature<'a, G, H> {
     light: &'a Light<'a>,
     g: G,
+    /// Whether a horizon crosses a cell: `g` has a kink there.
+    has_horizon: H,
     /// What `g` was found to be at nodes: most are shared by neighbouring cells.
     known: FxHashMap<NodePlace, DVec3>,
     /// The estimate, up to what [`Self::sum`] rounds away.
@@ -40,12 +46,12 @@ struct Cell {
     squares: DVec3,
 }
 
-impl<'a, G: Fn(&[DVec3]) -> Vec<DVec3>> Cubature<'a, G> {
+impl<'a, G: Fn(&[DVec3]) -> Vec<DVec3>, H: Fn(CellPlace) -> bool> Cubature<'a, G, H> {
     /// The estimate from cells of the first level, each split once, and on while `must_split` says so.
-    pub fn new(light: &'a Light, g: G, must_split: impl Fn(CellPlace) -> bool) -> Self {
+    pub fn new(light: &'a Light, g: G, has_horizon: H, must_split: impl Fn(CellPlace) -> bool) -> Self {
         let (integral, squares) = (DVec3::ZERO, DVec3::ZERO);
         let (known, worst) = (FxHashMap::with_capacity_and_hasher(USUAL_NODES, FxBuildHasher), BinaryHeap::new());
-        let mut cubature = Self { light, g, known, integral, squares, cells: vec![], worst };
+        let mut cubature = Self { light, g, has_horizon, known, integral, squares, cells: vec![], worst };
         let mut waiting: Vec<Cell> = CellPlace::all(FIRST_LEVEL).map(|place| cubature.first_cell(place)).collect();
         while let Some(cell) = waiting.pop() {
             for part in cubature.parts(cell) {
@@ -117,14 +123,16 @@ impl<'a, G: Fn(&[DVec3]) -> Vec<DVec3>> Cubature<'a, G> {
         let mut part = 0;
         cell.place.parts().map(|place| {
             let (left, top) = (part % 2 * (NODES - 1), part / 2 * (NODES - 1));
-            let (mut integral, mut change) = (DVec3::ZERO, DVec3::ZERO);
+            let (mut integral, mut change, mut most) = (DVec3::ZERO, DVec3::ZERO, DVec3::ZERO);
             for (i, weight) in weights[part].iter().enumerate() {
                 let (row, column) = (top + i / NODES, left + i % NODES);
                 integral += *weight * values[row][column];
+                most = most.max(values[row][column]);
                 // What cancels here by chance may not do so within the part.
                 change += (*weight * (values[row][column] - interpolated[row][column])).abs();
             }
-            let error = change.max(LEAST_LEFT * light[part] / whole_light * cell.change);
+            let missed = if (self.has_horizon)(place) { MISSED_AT_HORIZON * light[part] * most } else { DVec3::ZERO };
+            let error = change.max(LEAST_LEFT * light[part] / whole_light * cell.change).max(missed);
             part += 1;
             Cell { place, integral, change, squares: error * error }
         })

@@ -102,6 +102,8 @@ pub struct Light<'a> {
     environment: &'a Environment,
     /// Weights level by level from the first, row by row.
     kept: Vec<Vec<Weights>>,
+    /// The sum of [`amount`] over the cells of the first level.
+    whole: f64,
 }
 
 impl<'a> Light<'a> {
@@ -110,7 +112,7 @@ impl<'a> Light<'a> {
         let fits =
             |level: &u32| (1 << level) * KEPT_PX >= environment.height && (2 << level) * KEPT_PX >= environment.width;
         let last = (LEAST_KEPT_LEVEL..LAST_KEPT_LEVEL).find(fits).unwrap_or(LAST_KEPT_LEVEL);
-        let mut light = Self { environment, kept: Vec::new() };
+        let mut light = Self { environment, kept: Vec::new(), whole: 0.0 };
         let places: Vec<_> = CellPlace::all(last).collect();
         let mut levels = vec![places.into_par_iter().map(|place| light.integrate(place)).collect::<Vec<_>>()];
         for level in (FIRST_LEVEL..last).rev() {
@@ -120,6 +122,7 @@ impl<'a> Light<'a> {
             levels.push(places.into_par_iter().map(of_parts).collect());
         }
         levels.reverse();
+        light.whole = levels[0].iter().map(amount).sum();
         light.kept = levels;
         light
     }
@@ -130,6 +133,11 @@ impl<'a> Light<'a> {
             Some(level) => level[index(place)],
             None => self.integrate(place),
         }
+    }
+
+    /// The part of all light that is in a cell, 0 to 1.
+    pub fn share(&self, place: CellPlace) -> f64 {
+        amount(&self.weights(place)) / self.whole.max(f64::MIN_POSITIVE)
     }
 
     /// The weights from pixels.
@@ -157,6 +165,11 @@ impl<'a> Light<'a> {
         }
         weights.map(|weight| weight.as_vec3())
     }
+}
+
+/// How much light a cell has: weights at some of its nodes may be negative.
+fn amount(weights: &Weights) -> f64 {
+    weights.iter().map(|weight| f64::from(weight.abs().element_sum())).sum()
 }
 
 /// A cell's index in its level.

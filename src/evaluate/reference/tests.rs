@@ -241,6 +241,45 @@ fn estimated_errors_are_honest() {
     }
 }
 
+/// Where a lamp sets, f cos has a kink in the few cells that have light at all.
+#[test]
+fn estimated_errors_are_honest_where_the_only_lamp_sets() {
+    let plastic = of_model("plastic", "distribution = 'ggx'\nalpha = 0.1\nior = 1.5\ndiffuse = 0.6");
+    for (column, row) in [(132, 66), (0, 65), (40, 33), (77, 20)] {
+        let map = environment(133, 67, |x, y| if (x, y) == (column, row) { [5000.0; 3] } else { [0.0; 3] });
+        let lamp = map.direction(column as f64, row as f64);
+        for brdf in [lambert(), plastic.clone(), conductor("ggx", 0.3)] {
+            let integrator = Integrator::new(&map, 1.0, [&brdf], 2);
+            for tolerance in [1e-3, 2e-4] {
+                let (mut estimated, mut happened, mut worst) = (0.0, 0.0, 0.0_f64);
+                for i in 0..60 {
+                    // From half-way up to where the last sub-pixel no longer sees it, seen from all around.
+                    let turn = DQuat::from_axis_angle(lamp, 2.4 * f64::from(i));
+                    let up = |away_deg: f64| {
+                        turn * DQuat::from_axis_angle(lamp.any_orthonormal_vector(), away_deg.to_radians()) * lamp
+                    };
+                    let away_deg = 45.0 + 50.0 * f64::from(i) / 60.0;
+                    let w_o = up(away_deg - 60.0 + 0.9 * f64::from(i));
+                    let points = [0.0, 0.5, 1.0, 1.5].map(|more| Point::new(up(away_deg + more), w_o, 0));
+                    let rough = integrator.pixel(&points, tolerance, DISPLAY);
+                    let exact = integrator.pixel(&points, tolerance / 50.0, DISPLAY);
+                    estimated += rough.display_error.length_squared();
+                    for channel in 0..3 {
+                        let difference =
+                            DISPLAY.value(rough.radiance[channel]) - DISPLAY.value(exact.radiance[channel]);
+                        happened += difference * difference;
+                        worst = worst.max(difference.abs());
+                    }
+                }
+                let ratio = (happened / estimated).sqrt();
+                let lamp = format!("{} at {tolerance} under a lamp at {column} {row}", brdf.model());
+                assert!(ratio < 0.8, "{lamp}: the error is {ratio:.2} times its estimate");
+                assert!(worst < 4.0 * tolerance, "{lamp}: a display value errs by {worst:.1e}");
+            }
+        }
+    }
+}
+
 #[test]
 fn suns_of_a_million_in_near_mirrors_at_grazing_angles_converge() {
     let map = sky(1e6);
