@@ -42,7 +42,7 @@ pub struct Shade {
     pub sampling: Sampling,
     /// The method of the shader.
     pub method: Method,
-    /// [`most_samples`] of the device.
+    /// How many samples of `mis` a submission on the device may have.
     pub most_samples: u64,
 }
 
